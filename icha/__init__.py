@@ -1,0 +1,29 @@
+"""ICHA: adhesive rough contact by interacting and coalescing Hertzian asperities."""
+
+import importlib
+
+_HOME = {
+    "SelfAffineSpectrum": "spectrum",
+    "Surface": "surface",
+    "Material": "material",
+    "Path": "path",
+    "simulate": "simulation",
+    "ConvergenceError": "simulation",
+}
+__all__ = sorted([*_HOME, "__version__"])
+
+
+def __getattr__(name):
+    """Import the public names when they are first asked for, so that a script pays only for what it uses."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("icha")
+    if name in _HOME:
+        return getattr(importlib.import_module(f"icha.{_HOME[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__():
+    """The public names."""
+    return __all__

@@ -1,0 +1,67 @@
+"""Coalescence: overlapping spots become one equivalent spot (Violano & Afferrante, section II; Afferrante et al. 2012).
+
+a_eq^2 = a_i^2 + a_j^2, R_eq = sqrt(R_i^2 + R_j^2), centre in the centroid of the caps' volumes pi a^4/(4 R). The
+height follows from the equilibrium at hand (see `icha.equilibrium`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from icha.elasticity import periodic_difference
+
+
+def overlapping_pairs(position, a, period):
+    """Pairs of spots with r_ij < a_i + a_j.
+
+    Parameters
+    ----------
+    position : (n, 2) centres in m.
+    a : (n,) contact radii in m.
+    period : m.
+
+    Returns
+    -------
+    (k, 2) array of indices, the deepest overlap a_i + a_j - r_ij first; equal depths by position, so that the order
+    of the input does not matter.
+    """
+    if len(a) < 2:
+        return np.empty((0, 2), dtype=int)
+    position = np.mod(position, period)
+    tree = cKDTree(position, boxsize=period)
+    # Twice its radius is as far as the larger spot of a pair needs to look.
+    found = tree.query_ball_point(position, np.minimum(2 * a * (1 + 1e-12), 0.5 * period), return_sorted=True)
+    first = np.repeat(np.arange(len(a)), [len(f) for f in found])
+    second = np.concatenate([np.asarray(f, dtype=int) for f in found])
+    keep = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
+    first, second = first[keep], second[keep]
+    r = np.hypot(*periodic_difference(position[first], position[second], period).T)
+    depth = a[first] + a[second] - r
+    deep = depth > 0
+    first, second, depth = first[deep], second[deep], depth[deep]
+    rank = np.empty(len(a), dtype=int)
+    rank[np.lexsort((position[:, 1], position[:, 0]))] = np.arange(len(a))
+    lower, upper = np.minimum(rank[first], rank[second]), np.maximum(rank[first], rank[second])
+    order = np.lexsort((upper, lower, -depth))
+    return np.stack([first[order], second[order]], axis=1)
+
+
+def disjoint_pairs(pairs):
+    """From pairs in order of precedence, those that can merge at once: every spot at most in one pair."""
+    taken, chosen = set(), []
+    for i, j in pairs.tolist():
+        if i not in taken and j not in taken:
+            taken.update((i, j))
+            chosen.append((i, j))
+    return np.array(chosen, dtype=int).reshape(-1, 2)
+
+
+def equivalent_spots(position_i, a_i, R_i, position_j, a_j, R_j, period):
+    """Centre (k, 2), contact radius and radius of curvature (k,) of the spots that replace pairs i, j, all in m."""
+    volume_i, volume_j = a_i**4 / R_i, a_j**4 / R_j
+    share = volume_j / (volume_i + volume_j)
+    offset = periodic_difference(position_j, position_i, period)
+    centre = np.mod(position_i + share[:, None] * offset, period)
+    centre[centre >= period] = 0.0
+    return centre, np.hypot(a_i, a_j), np.hypot(R_i, R_j)

@@ -1,0 +1,271 @@
+"""The loading path: from first contact down to given separations, loads or areas, all of them hit exactly."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from icha.equilibrium import (
+    Contact,
+    ContactState,
+    Control,
+    NotConverged,
+    area_fraction,
+    equilibrium,
+    hold,
+    mean_pressure,
+    untouched,
+)
+from icha.validation import number, positive
+
+REDUCED_PRESSURE = "reduced_pressure"
+RELATIVE_LOAD = "relative_load"
+AREA_FRACTION = "area_fraction"
+MEAN_SEPARATION = "mean_separation"
+KINDS = (REDUCED_PRESSURE, RELATIVE_LOAD, AREA_FRACTION, MEAN_SEPARATION)
+
+# Beyond these the asperities have long lost their identity and the model no meaning.
+MAX_REDUCED_PRESSURE = 0.2
+MAX_AREA_FRACTION = 0.4
+
+# A step that does not converge is halved down to this fraction of the longest one.
+_SMALLEST_STEP = 2.0**-14
+# Two separations closer than this (in h_rms) bracket a jump, not a root.
+_SAME_SEPARATION = 1e-10
+# How far past the covered area the path looks for a target before it gives up.
+_AREA_MARGIN = 1.5
+
+
+@dataclass(frozen=True)
+class Target:
+    """One stop of a path: the kind of quantity, its value (SI units), and whether it is a snapshot."""
+
+    kind: str
+    value: float
+    snapshot: bool = False
+
+
+@dataclass(frozen=True, init=False)
+class Path:
+    """Stops of a loading path, and the longest step between them.
+
+    Parameters
+    ----------
+    reduced_pressures : p/(E* h'_rms), increasing, in (0, 0.2].
+    area_fractions : A/A0, increasing, in (0, 0.4].
+    mean_separations : u in m, decreasing, positive. Exactly one of these three lists is given.
+    snapshots : pairs (kind, value) of states whose fields and spots are kept, with kind one of "reduced_pressure",
+        "relative_load" (F/(E* A0)), "area_fraction" and "mean_separation" (m). A snapshot is a stop of its own, unless
+        the list holds the same kind and value. None: the last stop of the list.
+    unload : not available yet; must be False.
+    max_step : longest change of the mean separation between two equilibria, in units of h_rms, in (0, 0.5].
+
+    Raises
+    ------
+    ValueError
+        Naming the argument whose value is not allowed.
+    """
+
+    targets: tuple[Target, ...]
+    max_step: float
+
+    def __init__(
+        self,
+        reduced_pressures=None,
+        area_fractions=None,
+        mean_separations=None,
+        *,
+        snapshots=None,
+        unload=False,
+        max_step=0.1,
+    ):
+        """Check the values and build the list of stops."""
+        given = {
+            kind: (name, values)
+            for kind, name, values in (
+                (REDUCED_PRESSURE, "reduced_pressures", reduced_pressures),
+                (AREA_FRACTION, "area_fractions", area_fractions),
+                (MEAN_SEPARATION, "mean_separations", mean_separations),
+            )
+            if values is not None
+        }
+        if len(given) != 1:
+            raise ValueError(
+                "reduced_pressures, area_fractions, mean_separations: exactly one must be given, "
+                f"not {', '.join(name for name, _ in given.values()) or 'none'}"
+            )
+        if unload is not False:
+            raise ValueError(f"unload: {unload!r} is not available in this version; only False is")
+        max_step = positive("max_step", max_step, "h_rms")
+        if max_step > 0.5:
+            raise ValueError(f"max_step: {max_step!r} must not exceed 0.5 (in h_rms)")
+        ((kind, (name, values)),) = given.items()
+        values = _stops(name, kind, values)
+        if snapshots is None:
+            snapshots = [(kind, values[-1])]
+        wanted = []
+        for index, snapshot in enumerate(snapshots):
+            label = f"snapshots[{index}]"
+            try:
+                snapshot_kind, value = snapshot
+            except (TypeError, ValueError):
+                raise ValueError(f"{label}: {snapshot!r} is not a pair (kind, value)") from None
+            if snapshot_kind not in KINDS:
+                raise ValueError(f"{label}: kind {snapshot_kind!r} must be one of {', '.join(KINDS)}")
+            value = _covered(label, snapshot_kind, value)
+            if (snapshot_kind, value) in wanted:
+                raise ValueError(f"{label}: {snapshot_kind} {value!r} is given twice")
+            wanted.append((snapshot_kind, value))
+        targets = [Target(kind, value, (kind, value) in wanted) for value in values]
+        targets += [Target(k, v, True) for k, v in wanted if k != kind or v not in values]
+        object.__setattr__(self, "targets", tuple(targets))
+        object.__setattr__(self, "max_step", max_step)
+
+
+def _covered(name, kind, value):
+    value = positive(name, value, "m" if kind == MEAN_SEPARATION else "1")
+    limit = {REDUCED_PRESSURE: MAX_REDUCED_PRESSURE, AREA_FRACTION: MAX_AREA_FRACTION}.get(kind)
+    if limit is not None and value > limit:
+        raise ValueError(f"{name}: {value!r} lies beyond what the model covers (at most {limit})")
+    return value
+
+
+def _stops(name, kind, values):
+    try:
+        values = list(values)
+    except TypeError:
+        raise ValueError(f"{name}: {values!r} is not a list of numbers") from None
+    if not values:
+        raise ValueError(f"{name}: the list is empty")
+    values = [_covered(f"{name}[{i}]", kind, number(f"{name}[{i}]", v)) for i, v in enumerate(values)]
+    for i, (one, next_one) in enumerate(itertools.pairwise(values)):
+        if not (next_one < one if kind == MEAN_SEPARATION else next_one > one):
+            order = "decreasing" if kind == MEAN_SEPARATION else "increasing"
+            raise ValueError(f"{name}[{i + 1}]: {next_one!r} after {one!r}; the list must be strictly {order}")
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class _Stop:
+    """A target turned into a function of the state that rises along the path through zero at the target."""
+
+    target: Target
+    contact: Contact
+    pressure_scale: float
+
+    def excess(self, state: ContactState) -> float:
+        """Relative excess of the state over the target."""
+        kind, value = self.target.kind, self.target.value
+        if kind == MEAN_SEPARATION:
+            return (value - state.separation) / self.contact.rms_height
+        if kind == AREA_FRACTION:
+            return area_fraction(self.contact, state.spots) / value - 1
+        return mean_pressure(self.contact, state.spots) / (value * self.pressure_scale) - 1
+
+    def reach(self, before: ContactState, beyond: ContactState) -> ContactState:
+        """The state at the target, which lies between two states of the path.
+
+        The contacts of the state beyond are held at the target; if the path from the state before meets the same
+        contacts at that separation, this is the answer. Otherwise the bracket shrinks. When it closes on a jump
+        (an event that carries the quantity past its target), the target is met on the branch after the event, where
+        load control would be.
+        """
+        contact, target = self.contact, self.target
+        if target.kind == MEAN_SEPARATION:
+            return equilibrium(contact, before, target.value)
+        control = (
+            Control("area_fraction", target.value)
+            if target.kind == AREA_FRACTION
+            else Control("pressure", target.value * self.pressure_scale)
+        )
+        for attempt in range(80):
+            width = before.separation - beyond.separation
+            try:
+                held = hold(contact, beyond, control)
+            except NotConverged:
+                held = None
+            if width <= _SAME_SEPARATION * contact.rms_height:
+                if held is None:
+                    raise NotConverged("the target lies in a jump whose far side does not reach back to it")
+                return held
+            inside = held is not None and beyond.separation <= held.separation < before.separation
+            # The secant of the bracket converges fast on a smooth path, its middle surely on a jumping one.
+            u = held.separation if inside and attempt < 12 else beyond.separation + 0.5 * width
+            if u == beyond.separation or u == before.separation:
+                return held
+            trial = equilibrium(contact, before, u)
+            if inside and u == held.separation and trial.same_contacts(held):
+                return held
+            if self.excess(trial) >= 0:
+                beyond = trial
+            else:
+                before = trial
+        raise NotConverged("the search for the target did not end")
+
+
+def load(
+    contact: Contact,
+    path: Path,
+    pressure_unit: float,
+    contact_modulus: float,
+    progress: Callable[[str], None] | None = None,
+) -> Iterator[tuple[Target, ContactState]]:
+    """Follow the loading path and yield every target with its state, in the order in which they are met.
+
+    Parameters
+    ----------
+    contact : the contact problem.
+    path : its stops.
+    pressure_unit : E* h'_rms in Pa, the unit of reduced pressures.
+    contact_modulus : E* in Pa, the unit of relative loads.
+    progress : called with a line of text at every stop.
+
+    Raises
+    ------
+    NotConverged
+        If an equilibrium is not found even with short steps, or a target lies beyond what the model covers.
+    """
+    scale = {REDUCED_PRESSURE: pressure_unit, RELATIVE_LOAD: contact_modulus}
+    waiting = [_Stop(target, contact, scale.get(target.kind, 1.0)) for target in path.targets]
+    total = len(waiting)
+    state = untouched(contact)
+    longest = path.max_step * contact.rms_height
+    step = longest
+    while waiting:
+        try:
+            beyond = equilibrium(contact, state, state.separation - step)
+            passed = [stop for stop in waiting if stop.excess(beyond) >= 0]
+            reached = None
+            # The first of the targets between the two states is the one met at the largest separation.
+            for stop in passed:
+                candidate = (stop, stop.reach(state, beyond))
+                if reached is None or candidate[1].separation > reached[1].separation:
+                    reached = candidate
+        except NotConverged as failure:
+            step /= 2
+            if step < _SMALLEST_STEP * longest:
+                raise NotConverged(
+                    f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, after "
+                    f"{total - len(waiting)} of {total} stops: {failure}"
+                ) from failure
+            continue
+        step = min(longest, 2 * step)
+        if reached is None:
+            state = beyond
+            if area_fraction(contact, state.spots) > _AREA_MARGIN * MAX_AREA_FRACTION:
+                raise NotConverged(
+                    f"the contact area reached {area_fraction(contact, state.spots):.2f} of the nominal one before "
+                    f"{waiting[0].target.kind} = {waiting[0].target.value:g}: adhesion pulls the surfaces together, "
+                    "or the target lies beyond what the model covers"
+                )
+            continue
+        stop, state = reached
+        waiting.remove(stop)
+        if progress is not None:
+            progress(
+                f"stop {total - len(waiting)} of {total}: {stop.target.kind} = {stop.target.value:.6g}, "
+                f"separation {state.separation / contact.rms_height:.4f} h_rms, "
+                f"A/A0 {area_fraction(contact, state.spots):.4e}, {len(state.spots)} spots"
+            )
+        yield stop.target, state

@@ -1,0 +1,299 @@
+"""One loading sweep of one surface and one material, as a labelled dataset."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+from threadpoolctl import threadpool_limits
+
+from icha.asperities import find_summits
+from icha.equilibrium import (
+    Contact,
+    NotConverged,
+    area_fraction,
+    contact_stiffness,
+    mean_pressure,
+)
+from icha.jkr import JKR
+from icha.material import Material
+from icha.observables import GAP_BINS, PRESSURE_BINS, gap_distribution, pressure_distribution
+from icha.path import Path, load
+from icha.surface import Surface
+from icha.validation import integer
+
+# Wu's jump-in formula was verified between these Tabor parameters.
+WU_RANGE = (2.0, 5.0)
+
+REFERENCES = (
+    "G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media with an advanced asperity model; "
+    "L. Afferrante, G. Carbone and G. Demelio, Wear 278-279 (2012) 28-33, doi:10.1016/j.wear.2011.12.013; "
+    "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
+)
+
+# name: (dimensions, units, long name)
+VARIABLES = {
+    "mean_separation": (("step",), "m", "mean separation of the surfaces"),
+    "nominal_pressure": (("step",), "Pa", "force over nominal area"),
+    "contact_area_fraction": (("step",), "1", "real over nominal contact area, A/A0"),
+    "spot_count": (("step",), "1", "number of contact spots"),
+    "contact_stiffness": (("step",), "Pa m-1", "contact stiffness, -dp/du of the present spots"),
+    "residual": (("step",), "1", "largest equilibrium error over h_rms"),
+    "converged": (("step",), "1", "1 where the equilibrium converged"),
+    "branch": (("step",), "1", "branch of the path: loading or unloading"),
+    "reduced_pressure": (("step",), "1", "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"),
+    "reduced_separation": (("step",), "1", "mean separation over rms height"),
+    "step_kind": (("step",), "1", "quantity that this step was asked to reach"),
+    "step_target": (
+        ("step",),
+        "1",
+        "value asked for, in the SI unit of its kind (m for mean_separation, else 1)",
+    ),
+    "jump_in_count": (("step",), "1", "contacts formed so far"),
+    "jump_off_count": (("step",), "1", "contacts broken so far"),
+    "coalescence_count": (("step",), "1", "unions of two spots so far"),
+    "pending_count": (
+        ("step",),
+        "1",
+        "asperities past jump-in left free after breaking contact at the same step",
+    ),
+    "outside_wu_fraction": (("step",), "1", "fraction of single-asperity spots outside 2 <= mu <= 5"),
+    "snapshot_step": (("snapshot",), "1", "step of the snapshot"),
+    "snapshot_kind": (("snapshot",), "1", "quantity that the snapshot was asked to reach"),
+    "snapshot_target": (("snapshot",), "1", "value asked for, in the SI unit of its kind"),
+    "overlap_fraction": (
+        ("snapshot",),
+        "1",
+        "area fraction outside the spots where the computed gap is negative",
+    ),
+    "gap_density": (("snapshot", "gap_bin"), "m-1", "probability density of the gap over the nominal area"),
+    "pressure_density": (
+        ("snapshot", "pressure_bin"),
+        "Pa-1",
+        "probability density of the contact pressure over the nominal area",
+    ),
+    "pressure_bin_mean": (
+        ("snapshot", "pressure_bin"),
+        "Pa",
+        "mean pressure of the area in the bin, 0 where empty",
+    ),
+    "gap_bin_edges": (("gap_edge",), "m", "edges of the gap bins"),
+    "pressure_bin_edges": (("pressure_edge",), "Pa", "edges of the pressure bins"),
+    "spot_snapshot": (("spot",), "1", "snapshot to which the spot belongs"),
+    "spot_x": (("spot",), "m", "x of the spot's centre"),
+    "spot_y": (("spot",), "m", "y of the spot's centre"),
+    "spot_radius": (("spot",), "m", "contact radius"),
+    "spot_force": (("spot",), "N", "contact force, negative in tension"),
+    "spot_curvature_radius": (("spot",), "m", "radius of curvature of the spot's paraboloid"),
+    "spot_members": (("spot",), "1", "number of asperities united in the spot"),
+    "contact_modulus": ((), "Pa", "composite contact modulus E*"),
+    "surface_energy": ((), "J m-2", "energy of adhesion per area"),
+    "interaction_range": ((), "m", "range of the attractive forces"),
+    "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
+    "rms_height": ((), "m", "root mean square height"),
+    "rms_curvature": ((), "m-1", "root mean square curvature of a profile, from the spectrum"),
+    "period": ((), "m", "side of the periodic cell"),
+    "grid": ((), "1", "nodes along a side of the cell"),
+    "seed": ((), "1", "seed of the surface; -1 where it has none"),
+    "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
+    "asperity_count": ((), "1", "number of asperities on the surface"),
+}
+
+
+class ConvergenceError(RuntimeError):
+    """The path could not be followed to its end. `dataset` holds the stops that were reached."""
+
+    def __init__(self, message: str, dataset: xr.Dataset):
+        """Keep the message and what was computed."""
+        super().__init__(message)
+        self.dataset = dataset
+
+    def __reduce__(self):
+        """Allow the error to cross process borders whole."""
+        return type(self), (self.args[0], self.dataset)
+
+
+def simulate(
+    surface: Surface,
+    material: Material,
+    path: Path,
+    *,
+    seed: int = -1,
+    progress: Callable[[str], None] | None = None,
+) -> xr.Dataset:
+    """Load a surface against the half-space along a path.
+
+    Parameters
+    ----------
+    surface, material, path : what is pressed against what, and how far.
+    seed : recorded in the dataset; -1 for a surface without one.
+    progress : called with a line of text at every stop.
+
+    Returns
+    -------
+    xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable carries units and
+    a long name.
+
+    Raises
+    ------
+    ValueError
+        If an argument is of the wrong type or the surface has no summits.
+    ConvergenceError
+        If an equilibrium is not found or a target cannot be reached; its `dataset` holds the stops before.
+    """
+    for name, value, kind in (
+        ("surface", surface, Surface),
+        ("material", material, Material),
+        ("path", path, Path),
+    ):
+        if not isinstance(value, kind):
+            raise ValueError(f"{name}: {value!r} is not an icha.{kind.__name__}")
+    seed = integer("seed", seed, -1)
+    law = JKR(material)
+    steps, snapshots, failure = [], [], None
+    # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
+    with threadpool_limits(1):
+        contact = Contact(law, find_summits(surface), surface.rms_height)
+        unit = material.contact_modulus * surface.rms_slope
+        try:
+            for target, state in load(contact, path, unit, material.contact_modulus, progress):
+                steps.append(_step(contact, target, state, unit))
+                if target.snapshot:
+                    snapshots.append(_snapshot(law, surface, target, state, len(steps) - 1))
+        except NotConverged as error:
+            failure = f"the path ends {error}"
+        dataset = _dataset(surface, material, contact, steps, snapshots, seed)
+    if failure is not None:
+        raise ConvergenceError(failure, dataset) from None
+    return dataset
+
+
+def _step(contact, target, state, unit):
+    spots = state.spots
+    pressure = mean_pressure(contact, spots)
+    single = spots.members == 1
+    mu = contact.law.tabor_parameter(spots.radius_of_curvature[single])
+    outside = np.count_nonzero((mu < WU_RANGE[0]) | (mu > WU_RANGE[1]))
+    adhesive = contact.law.material.surface_energy > 0
+    return {
+        "mean_separation": state.separation,
+        "nominal_pressure": pressure,
+        "contact_area_fraction": area_fraction(contact, spots),
+        "spot_count": len(spots),
+        "contact_stiffness": contact_stiffness(contact, state),
+        "residual": state.residual,
+        "converged": np.int8(1),
+        "branch": "loading",
+        "reduced_pressure": pressure / unit,
+        "reduced_separation": state.separation / contact.rms_height,
+        "step_kind": target.kind,
+        "step_target": target.value,
+        "jump_in_count": state.jump_ins,
+        "jump_off_count": state.jump_offs,
+        "coalescence_count": state.coalescences,
+        "pending_count": state.pending,
+        "outside_wu_fraction": outside / max(len(mu), 1) if adhesive else 0.0,
+    }
+
+
+def _snapshot(law, surface, target, state, step):
+    spots = state.spots
+    gaps = gap_distribution(law, surface, state)
+    pressures = pressure_distribution(law, surface, spots)
+    return {
+        "snapshot_step": step,
+        "snapshot_kind": target.kind,
+        "snapshot_target": target.value,
+        "overlap_fraction": gaps.overlap_fraction,
+        "gap_density": gaps.density,
+        "pressure_density": pressures.density,
+        "pressure_bin_mean": pressures.mean,
+        "spot_x": spots.position[:, 0],
+        "spot_y": spots.position[:, 1],
+        "spot_radius": spots.contact_radius,
+        "spot_force": law.force(spots.contact_radius, spots.radius_of_curvature),
+        "spot_curvature_radius": spots.radius_of_curvature,
+        "spot_members": spots.members,
+    }
+
+
+_INTEGERS = {
+    "spot_count",
+    "jump_in_count",
+    "jump_off_count",
+    "coalescence_count",
+    "pending_count",
+    "snapshot_step",
+    "spot_snapshot",
+    "spot_members",
+}
+_STRINGS = {"branch", "step_kind", "snapshot_kind"}
+
+
+def _dtype(name):
+    if name in _STRINGS:
+        return object
+    if name == "converged":
+        return np.int8
+    return np.int64 if name in _INTEGERS else np.float64
+
+
+def _dataset(surface, material, contact, steps, snapshots, seed):
+    radius = 1 / surface.rms_curvature
+    values = {
+        "gap_bin_edges": GAP_BINS * surface.rms_height,
+        "pressure_bin_edges": PRESSURE_BINS * (material.contact_modulus * surface.rms_slope),
+        "contact_modulus": material.contact_modulus,
+        "surface_energy": material.surface_energy,
+        "interaction_range": material.interaction_range,
+        "rms_slope": surface.rms_slope,
+        "rms_height": surface.rms_height,
+        "rms_curvature": surface.rms_curvature,
+        "period": surface.period,
+        "grid": surface.grid,
+        "seed": seed,
+        "tabor_parameter": float(contact.law.tabor_parameter(radius)),
+        "asperity_count": len(contact.asperities),
+    }
+    bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
+    for name, (dims, _, _) in VARIABLES.items():
+        if name in values:
+            continue
+        if dims == ("spot",):
+            rows = [
+                np.full(len(s["spot_x"]), k) if name == "spot_snapshot" else s[name] for k, s in enumerate(snapshots)
+            ]
+            values[name] = np.concatenate(rows).astype(_dtype(name)) if rows else np.empty(0, _dtype(name))
+            continue
+        rows = [row[name] for row in (steps if dims[0] == "step" else snapshots)]
+        shape = (len(rows), *(bins[d] for d in dims[1:]))
+        values[name] = np.array(rows, dtype=_dtype(name)).reshape(shape)
+    variables = {
+        name: (dims, values[name], {"units": units, "long_name": long_name})
+        for name, (dims, units, long_name) in VARIABLES.items()
+    }
+    adhesion = "with" if material.surface_energy > 0 else "without"
+    coordinates = {
+        "step": ("step", np.arange(len(steps)), {"units": "1", "long_name": "stop along the loading path"}),
+        "snapshot": ("snapshot", np.arange(len(snapshots)), {"units": "1", "long_name": "snapshot"}),
+    }
+    return xr.Dataset(
+        variables,
+        coordinates,
+        attrs={
+            "title": f"Rough contact {adhesion} adhesion, ICHA model",
+            "summary": (
+                "Loading sweep of a periodic rough surface against an elastic half-space by interacting and "
+                "coalescing asperities with JKR adhesion and jump into contact."
+            ),
+            "Conventions": "CF-1.11",
+            "source": f"icha {importlib.metadata.version('icha')}",
+            "campaign": "",
+            "study": "",
+            "config_sha256": "",
+            "license": "",
+            "references": REFERENCES,
+        },
+    )
