@@ -306,7 +306,7 @@ def equilibrium(contact: Contact, state: ContactState, separation: float) -> Con
         changed = False
 
         if adhesive:
-            off = spots.approach < law.jump_off_approach(spots.radius_of_curvature)
+            off = _broken(law, spots)
             if off.any():
                 changed = True
                 jump_offs += int(np.count_nonzero(off))
@@ -349,7 +349,7 @@ def equilibrium(contact: Contact, state: ContactState, separation: float) -> Con
             break
 
     if not adhesive:
-        idle = spots.approach <= 0
+        idle = _broken(law, spots)
         jump_offs += int(np.count_nonzero(idle))
         spots, owner = _remove(spots, owner, idle)
     response = _separation_response(contact, spots, _LINEAR_TOLERANCE)
@@ -359,14 +359,32 @@ def equilibrium(contact: Contact, state: ContactState, separation: float) -> Con
 def hold(contact: Contact, state: ContactState, control: Control) -> ContactState:
     """The equilibrium of the same spots at a given load or area: the separation is an unknown.
 
+    Spots that end past jump-off are dropped.
+
     Raises
     ------
     NotConverged
         If it is not found.
     """
-    spots, separation, residual = balance(contact, state.spots, state.separation, control)
-    response = _separation_response(contact, spots, _LINEAR_TOLERANCE)
-    return replace(state, spots=spots, separation=separation, separation_response=response, residual=residual)
+    spots, owner, separation, jump_offs = state.spots, state.owner, state.separation, state.jump_offs
+    while True:
+        spots, separation, residual = balance(contact, spots, separation, control)
+        off = _broken(contact.law, spots)
+        if not off.any():
+            break
+        spots, owner = _remove(spots, owner, off)
+        jump_offs += int(np.count_nonzero(off))
+        if not len(spots):
+            raise NotConverged(f"all contacts break before {control.quantity} = {control.target:.6g}")
+    return replace(
+        state,
+        spots=spots,
+        owner=owner,
+        separation=separation,
+        separation_response=_separation_response(contact, spots, _LINEAR_TOLERANCE),
+        residual=residual,
+        jump_offs=jump_offs,
+    )
 
 
 def coalesce(contact: Contact, spots: Spots, owner, pairs, separation: float):
@@ -396,6 +414,12 @@ def coalesce(contact: Contact, spots: Spots, owner, pairs, separation: float):
     height = spots.height.copy()
     height[-len(a) :] = separation + approach + w[-len(a) :]
     return replace(spots, height=height), owner
+
+
+def _broken(law, spots):
+    """Whether each spot lies past jump-off, where it has no contact: (m,) of bool."""
+    off = law.jump_off_approach(spots.radius_of_curvature)
+    return spots.approach < off if law.material.surface_energy > 0 else spots.approach <= 0
 
 
 def _remove(spots, owner, gone):

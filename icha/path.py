@@ -25,9 +25,10 @@ AREA_FRACTION = "area_fraction"
 MEAN_SEPARATION = "mean_separation"
 KINDS = (REDUCED_PRESSURE, RELATIVE_LOAD, AREA_FRACTION, MEAN_SEPARATION)
 
-# Beyond these the asperities have long lost their identity and the model no meaning.
-MAX_REDUCED_PRESSURE = 0.2
-MAX_AREA_FRACTION = 0.4
+# Beyond these the spots have lost their identity: soon after, the computed mean planes of a surface without
+# adhesion meet.
+MAX_REDUCED_PRESSURE = 0.15
+MAX_AREA_FRACTION = 0.25
 
 # A step that does not converge is halved down to this fraction of the longest one.
 _SMALLEST_STEP = 2.0**-14
@@ -52,8 +53,8 @@ class Path:
 
     Parameters
     ----------
-    reduced_pressures : p/(E* h'_rms), increasing, in (0, 0.2].
-    area_fractions : A/A0, increasing, in (0, 0.4].
+    reduced_pressures : p/(E* h'_rms), increasing, in (0, 0.15].
+    area_fractions : A/A0, increasing, in (0, 0.25].
     mean_separations : u in m, decreasing, positive. Exactly one of these three lists is given.
     snapshots : pairs (kind, value) of states whose fields and spots are kept, with kind one of "reduced_pressure",
         "relative_load" (F/(E* A0)), "area_fraction" and "mean_separation" (m). A snapshot is a stop of its own, unless
@@ -253,6 +254,11 @@ def load(
         step = min(longest, 2 * step)
         if reached is None:
             state = beyond
+            if state.separation <= 0:
+                raise NotConverged(
+                    f"the mean planes met before {waiting[0].target.kind} = {waiting[0].target.value:g}: "
+                    "the target lies beyond what the model covers"
+                )
             if area_fraction(contact, state.spots) > _AREA_MARGIN * MAX_AREA_FRACTION:
                 raise NotConverged(
                     f"the contact area reached {area_fraction(contact, state.spots):.2f} of the nominal one before "

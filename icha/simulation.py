@@ -20,7 +20,7 @@ from icha.equilibrium import (
 from icha.jkr import JKR
 from icha.material import Material
 from icha.observables import GAP_BINS, PRESSURE_BINS, gap_distribution, pressure_distribution
-from icha.path import Path, load
+from icha.path import MAX_REDUCED_PRESSURE, RELATIVE_LOAD, Path, load
 from icha.surface import Surface
 from icha.validation import integer
 
@@ -139,7 +139,8 @@ def simulate(
     Raises
     ------
     ValueError
-        If an argument is of the wrong type or the surface has no summits.
+        If an argument is of the wrong type, a target lies beyond what the model covers on this surface, or the
+        surface has no summits.
     ConvergenceError
         If an equilibrium is not found or a target cannot be reached; its `dataset` holds the stops before.
     """
@@ -151,6 +152,12 @@ def simulate(
         if not isinstance(value, kind):
             raise ValueError(f"{name}: {value!r} is not an icha.{kind.__name__}")
     seed = integer("seed", seed, -1)
+    for target in path.targets:
+        if target.kind == RELATIVE_LOAD and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
+            raise ValueError(
+                f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} lies beyond "
+                f"what the model covers (a reduced pressure of at most {MAX_REDUCED_PRESSURE})"
+            )
     law = JKR(material)
     steps, snapshots, failure = [], [], None
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
