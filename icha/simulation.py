@@ -155,8 +155,8 @@ def simulate(
     for target in path.targets:
         if target.kind == RELATIVE_LOAD and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
             raise ValueError(
-                f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} lies beyond "
-                f"what the model covers (a reduced pressure of at most {MAX_REDUCED_PRESSURE})"
+                f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} lies "
+                f"beyond what the model covers (a reduced pressure of at most {MAX_REDUCED_PRESSURE})"
             )
     law = JKR(material)
     steps, snapshots, failure = [], [], None
