@@ -1,0 +1,202 @@
+"""Checks of results: what every run must satisfy, whoever computed it.
+
+They are identities and bounds of the physics, evaluated on the dataset alone.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from icha.records import COMPLETE, run_labels, select_run, whole_file
+
+RESIDUAL_LIMIT = 1e-8
+IDENTITY_LIMIT = 1e-8
+TARGET_LIMIT = 1e-8
+# Under load control an event (jump-in, coalescence) may push the surfaces apart by a little, in units of h_rms.
+SEPARATION_RISE_LIMIT = 1e-2
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding: `passed` says whether `value` keeps to `limit`; `subject` is the run it belongs to."""
+
+    name: str
+    value: float
+    limit: float
+    passed: bool
+    description: str
+    subject: str = ""
+
+
+def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
+    """Check a run dataset: finite, converged, on target, monotone, and true to the identities of its distributions.
+
+    Parameters
+    ----------
+    run : a dataset as `icha.simulate` returns it.
+    subject : name of the run in the findings.
+    """
+    checks: list[Check] = []
+
+    def at_most(name, value, limit, description):
+        # A value that is not a number keeps to no limit; it is reported as -1, which no error can be.
+        value = float(value)
+        passed = bool(math.isfinite(value) and value <= limit)
+        checks.append(Check(name, value if math.isfinite(value) else -1.0, limit, passed, description, subject))
+
+    numbers = [v.values for v in run.variables.values() if v.dtype.kind in "fiu"]
+    at_most(
+        "finite",
+        sum(int(np.count_nonzero(~np.isfinite(values))) for values in numbers),
+        0,
+        "number of values that are not finite",
+    )
+    at_most("steps", int(run.sizes["step"] == 0), 0, "1 if the run has no step at all")
+    if run.sizes["step"] == 0:
+        return tuple(checks)
+
+    at_most("residual", run["residual"].max(), RESIDUAL_LIMIT, "largest equilibrium error over h_rms")
+    at_most("converged", int((run["converged"] != 1).sum()), 0, "number of steps that did not converge")
+    at_most("targets", _miss(run), TARGET_LIMIT, "largest relative distance of a step from its target")
+
+    loading = run.isel(step=run["branch"].values == "loading")
+    adhesive = float(run["surface_energy"]) > 0
+    height = float(run["rms_height"])
+    # Two targets of different kinds may be one state but for the accuracy to which it is reached.
+    at_most(
+        "area rises",
+        _fall(loading["contact_area_fraction"]) / (float(loading["contact_area_fraction"].max()) or 1.0),
+        TARGET_LIMIT,
+        "largest fall of A/A0 between loading steps, over its maximum",
+    )
+    separation_controlled = bool((loading["step_kind"] == "mean_separation").all())
+    if not (adhesive and separation_controlled):
+        # Under separation control adhesion may pull the surfaces together: there the pressure is free to fall.
+        scale = float(np.abs(loading["nominal_pressure"]).max()) or 1.0
+        at_most(
+            "pressure rises",
+            _fall(loading["nominal_pressure"]) / scale,
+            TARGET_LIMIT,
+            "largest fall of the nominal pressure between loading steps, over its maximum",
+        )
+    at_most(
+        "separation falls",
+        _fall(-loading["mean_separation"]) / height,
+        SEPARATION_RISE_LIMIT,
+        "largest rise of the mean separation between loading steps, over h_rms (events under load control)",
+    )
+    if not adhesive:
+        at_most(
+            "stiffness",
+            int((run["contact_stiffness"] < 0).sum()),
+            0,
+            "number of steps with a negative contact stiffness, without adhesion",
+        )
+    if run.sizes.get("snapshot", 0):
+        for name, value, description in _identities(run):
+            at_most(name, value, IDENTITY_LIMIT, description)
+    return tuple(checks)
+
+
+def _fall(values):
+    """Largest fall from one value to the next; 0 if there is none."""
+    return float(np.max(-np.diff(values.values), initial=0.0))
+
+
+def _miss(run):
+    """Largest relative distance between what was asked of a step and what it has."""
+    scale = float(run["contact_modulus"])
+    reached = {
+        "reduced_pressure": run["reduced_pressure"].values,
+        "relative_load": run["nominal_pressure"].values / scale,
+        "area_fraction": run["contact_area_fraction"].values,
+        "mean_separation": run["mean_separation"].values,
+    }
+    target = run["step_target"].values
+    value = np.array([reached[str(kind)][k] for k, kind in enumerate(run["step_kind"].values)])
+    return np.max(np.abs(value - target) / np.abs(target))
+
+
+def _identities(run):
+    """Largest errors of the identities between a snapshot's distributions and spots, and its step."""
+    at = run["snapshot_step"].values.astype(int)
+    area = run["contact_area_fraction"].values[at]
+    pressure = run["nominal_pressure"].values[at]
+
+    pressure_content = run["pressure_density"].values * np.diff(run["pressure_bin_edges"].values)
+    load = pressure_content * run["pressure_bin_mean"].values
+    gap_content = run["gap_density"].values * np.diff(run["gap_bin_edges"].values)
+    # With adhesion tension and compression nearly cancel: errors are measured against the sum of both.
+    load_scale = np.maximum(np.abs(load).sum(axis=1), np.finfo(float).tiny)
+
+    cell = float(run["period"]) ** 2
+    snapshot = run["spot_snapshot"].values.astype(int)
+    spot_area = np.bincount(snapshot, np.pi * run["spot_radius"].values ** 2 / cell, len(at))
+    spot_load = np.bincount(snapshot, run["spot_force"].values / cell, len(at))
+
+    yield (
+        "area from P(p)",
+        np.max(np.abs(pressure_content.sum(axis=1) / area - 1)),
+        "integral of P(p) over p against A/A0",
+    )
+    yield (
+        "load from P(p)",
+        np.max(np.abs(load.sum(axis=1) - pressure) / load_scale),
+        "integral of p P(p) over p against F/A0, over the sum of compression and tension",
+    )
+    overlap = run["overlap_fraction"].values
+    yield (
+        "P(u) complete",
+        np.max(np.abs(gap_content.sum(axis=1) + area + overlap - 1)),
+        "integral of P(u) over u, plus A/A0, plus overlap, against 1",
+    )
+    yield "area of spots", np.max(np.abs(spot_area / area - 1)), "sum of the spots' areas against A/A0"
+    yield (
+        "load of spots",
+        np.max(np.abs(spot_load - pressure) / load_scale),
+        "sum of the spots' forces against F/A0, over the sum of compression and tension",
+    )
+
+
+def check_campaign(tree: xr.DataTree) -> tuple[Check, ...]:
+    """Check a campaign dataset: every run there and complete, every variable described, and `check_run` for each."""
+    checks = []
+    for study, node in tree.children.items():
+        status = node["status"].values
+        lacking = int(np.count_nonzero(status != COMPLETE))
+        checks.append(Check("all runs", lacking, 0, lacking == 0, "number of runs incomplete or missing", study))
+        bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in node.to_dataset().variables.values())
+        checks.append(Check("described", bare, 0, bare == 0, "number of variables without units or long name", study))
+    for labels in run_labels(tree):
+        checks.extend(check_run(select_run(tree, labels), str(labels)))
+    return tuple(checks)
+
+
+def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
+    """One check of every name: a failed one before passed ones, then the one with the largest value."""
+    found: dict[str, Check] = {}
+    for check in checks:
+        best = found.get(check.name)
+        if best is None or (not check.passed, check.value) > (not best.passed, best.value):
+            found[check.name] = check
+    return tuple(found.values())
+
+
+def write_checks(checks: Iterable[Check], path: str | os.PathLike) -> None:
+    """Write findings to a JSON file."""
+    rows = [asdict(check) for check in checks]
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_checks(path: str | os.PathLike) -> tuple[Check, ...]:
+    """Read findings from a JSON file."""
+    return tuple(Check(**row) for row in json.loads(Path(path).read_text(encoding="utf-8")))
