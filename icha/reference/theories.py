@@ -46,7 +46,7 @@ def bush_gibson_thomas_area(reduced_pressure):
     return BUSH_GIBSON_THOMAS_SLOPE * np.asarray(reduced_pressure, float)
 
 
-def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, points=400):
+def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, points=401):
     r"""Mean separation over h_rms at reduced pressures of any shape, from the spectrum of the surface.
 
     Yang & Persson (2008): with w(q) = (pi int_{q_L}^q k^3 C(k) dk)^(-1/2) and P = erf(w p/E*),
@@ -61,7 +61,7 @@ def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GA
     reduced_pressure : p*, positive.
     spectrum : `icha.spectrum.SelfAffineSpectrum`; its isotropic continuum, not the lattice of its cell, is meant.
     gamma : their parameter; 0.45 unless told.
-    points : wave numbers of the quadrature on either side of the roll-off.
+    points : wave numbers of the quadrature on either side of the roll-off; odd, for Simpson's rule.
     """
     pressure = np.asarray(reduced_pressure, float)
     if np.any(pressure <= 0):

@@ -1,0 +1,1 @@
+"""The figures: every module turns datasets into one matplotlib figure and carries its caption."""

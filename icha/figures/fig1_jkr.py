@@ -1,0 +1,75 @@
+"""Fig. 1: force and contact radius of one asperity against its approach, with jump into and out of contact."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from icha.figures.style import BLUE, GREY, TWO_COLUMNS, VERMILLION, new_figure, panel_label, styled
+from icha.jkr import JKR
+from icha.material import Material
+
+CAPTION = (
+    "Force F (a) and contact radius a (b) of one asperity against its approach δ by the theory of Johnson, Kendall and "
+    "Roberts, for a Tabor parameter of 3. On loading (solid) the asperity snaps into contact at A, where the gap falls "
+    "to Wu's jump-in distance; on unloading (dashed) it follows the stable branch to C, the jump-off point, and "
+    "detaches. B is the pull-off point under load control. Dotted: unstable branch. Negative forces are tensile."
+)
+
+
+@styled
+def figure(*, tabor_parameter: float = 3.0) -> Figure:
+    """Draw the law in its own units, a in (Δγ R²/E*)^(1/3), δ in (Δγ² R/E*²)^(1/3) and F in Δγ R."""
+    law = JKR(Material(contact_modulus=1.0, surface_energy=1.0, interaction_range=1 / tabor_parameter))
+    R = 1.0
+    jump_in, jump_off = float(law.jump_in_approach(R)), float(law.jump_off_approach(R))
+    a_off, a_in = float(law.jump_off_radius(R)), float(law.contact_radius(jump_in, R))
+    left, right = -3.0, 3.2
+    a_end = float(law.contact_radius(right, R))
+    stable = np.linspace(a_off, a_end, 400)
+    after_jump = np.linspace(a_in, a_end, 400)
+    unstable = np.geomspace(1e-6, a_off, 200)
+    a_pull = float(np.cbrt(9 * np.pi / 8))  # dF/da = 0
+
+    fig = new_figure(TWO_COLUMNS, 2.9)
+    axes = fig.subplots(1, 2)
+    for ax, value in ((axes[0], lambda a: law.force(a, R)), (axes[1], lambda a: a)):
+        ax.axhline(0, color="0.75", lw=0.6, zorder=0)
+        ax.axvline(0, color="0.75", lw=0.6, zorder=0)
+        ax.plot(law.approach(unstable, R), value(unstable), ":", color=GREY, label="unstable")
+        loading_x = np.concatenate([[left, jump_in], law.approach(after_jump, R)])
+        loading_y = np.concatenate([[0, 0], value(after_jump)])
+        unloading_x = np.concatenate([law.approach(stable[::-1], R), [jump_off, left]])
+        unloading_y = np.concatenate([value(stable[::-1]), [0, 0]])
+        ax.plot(loading_x, loading_y, "-", color=BLUE, lw=2.4, alpha=0.45, solid_joinstyle="round", label="loading")
+        ax.plot(unloading_x, unloading_y, "--", color=VERMILLION, dashes=(4, 2), label="unloading")
+        _arrow(ax, jump_in, 0.0, jump_in, value(a_in), BLUE)
+        _arrow(ax, jump_off, value(a_off), jump_off, 0.0, VERMILLION)
+        for point, x, y, shift in (
+            ("A", jump_in, 0.0, (5, 5)),
+            ("B", float(law.approach(a_pull, R)), value(a_pull), (3, -11) if ax is axes[0] else (5, -9)),
+            ("C", jump_off, value(a_off), (-11, -9)),
+        ):
+            ax.plot([x], [y], "o", color="white", mec="black", ms=4.5, zorder=5)
+            ax.annotate(point, (x, y), shift, textcoords="offset points", fontweight="bold")
+        ax.set_xlim(left, right)
+        ax.set_xlabel(r"approach  $\delta\,/\,(\Delta\gamma^2 R/E^{\ast 2})^{1/3}$")
+    axes[0].set_ylabel(r"force  $F/(\Delta\gamma\,R)$")
+    axes[1].set_ylabel(r"contact radius  $a\,/\,(\Delta\gamma R^2/E^{\ast})^{1/3}$")
+    axes[0].set_ylim(-6, 4.5)
+    axes[1].set_ylim(-0.15, 3.0)
+    for x, name in ((jump_in, r"$\Delta_{\mathrm{IN}}$"), (jump_off, r"$\Delta_{\mathrm{OFF}}$")):
+        axes[1].axvline(x, ymin=0.05, ymax=0.86, color=GREY, lw=0.5, zorder=0)
+        axes[1].text(x, 0.88, name, ha="center", va="bottom", transform=axes[1].get_xaxis_transform())
+    handles, names = axes[0].get_legend_handles_labels()
+    axes[0].legend(handles[1:] + handles[:1], names[1:] + names[:1], loc="upper left")
+    for ax, letter in zip(axes, "ab", strict=True):
+        panel_label(ax, letter)
+    return fig
+
+
+def _arrow(ax, x0, y0, x1, y1, colour):
+    """An arrow head half way along a jump."""
+    middle = (x0 + 0.55 * (x1 - x0), y0 + 0.55 * (y1 - y0))
+    start = (x0 + 0.45 * (x1 - x0), y0 + 0.45 * (y1 - y0))
+    ax.annotate("", middle, start, arrowprops={"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0})

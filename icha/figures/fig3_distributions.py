@@ -1,0 +1,150 @@
+"""Fig. 3: how gaps and contact pressures are distributed at one load, with and without adhesion."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from icha.figures.select import find_snapshot, study_runs
+from icha.figures.style import (
+    BLACK,
+    COLOURS,
+    DASHES,
+    MARKERS,
+    TWO_COLUMNS,
+    material_label,
+    new_figure,
+    number,
+    panel_label,
+    styled,
+)
+from icha.reference.theories import persson_pressure_density
+
+CAPTION = (
+    "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure p "
+    "(b), at the load given in the figure; open markers are without adhesion. Gaps are in units of the rms height, "
+    "pressures of E* h'rms. Only contact carries pressure in this model, so the integral of (b) is A/A0 and that of "
+    "(a) is 1 - A/A0 less the overlap fraction; adhesion gives the tensile tail at negative pressures. Line: "
+    "Persson's theory of adhesionless contact."
+)
+
+# Sampled gaps per plotted point: bins with less are joined with their neighbours.
+_LEAST_CELLS = 100
+_KIND_LABELS = {
+    "reduced_pressure": r"$F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$",
+    "relative_load": r"$F/(E^{\ast}A_0)$",
+    "area_fraction": r"$A/A_0$",
+    "mean_separation": r"$\bar{u}$ (m)",
+}
+
+
+@styled
+def figure(
+    campaign: xr.DataTree,
+    *,
+    study: str,
+    kind: str | None = None,
+    target: float | None = None,
+) -> Figure:
+    """Draw the distributions of every material on the first surface, seed and slope of a study.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    study : name of the study.
+    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study or snapshot.
+    """
+    runs = study_runs(campaign, study)
+    if not runs:
+        raise ValueError(f"study {study}: there is no run to draw")
+    first = runs[0][0]
+    chosen = [
+        (labels, run)
+        for labels, run in runs
+        if (labels.surface, labels.seed, labels.rms_slope) == (first.surface, first.seed, first.rms_slope)
+    ]
+    dataset = campaign[study].to_dataset()
+    fig = new_figure(TWO_COLUMNS, 3.1)
+    left, right = fig.subplots(1, 2)
+    lowest, highest, top = -0.3, 0.3, 0.0
+    for k, (labels, run) in enumerate(chosen):
+        at = find_snapshot(run, kind, target)
+        adhesive = float(run["surface_energy"]) > 0
+        colour = COLOURS[(k + 1) % len(COLOURS)]
+        look = {
+            "color": colour,
+            "ls": DASHES[k % len(DASHES)],
+            "marker": MARKERS[k % len(MARKERS)],
+            "mfc": colour if adhesive else "white",
+            "mec": colour,
+            "ms": 3.4 if adhesive else 4.4,
+            "mew": 0.8,
+            "lw": 0.8,
+            "label": material_label(dataset, labels.material),
+            "zorder": 4 if adhesive else 3,
+        }
+        u, density = gap_points(run, at)
+        left.loglog(u, density, **look)
+        p, density = pressure_points(run, at)
+        right.semilogy(p, density, markevery=3, **look)
+        shown = density > 1e-3 * density.max()
+        lowest, highest = min(lowest, p[shown].min()), max(highest, p[shown].max())
+        top = max(top, density.max())
+        step = int(run["snapshot_step"].values[at])
+        load = float(run["reduced_pressure"].values[step])
+    line = np.linspace(0.002, highest, 300)
+    right.semilogy(line, persson_pressure_density(line, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
+
+    left.set_xlabel(r"gap  $u/h_{\mathrm{rms}}$")
+    left.set_ylabel(r"$P(u)\; h_{\mathrm{rms}}$")
+    right.set_xlabel(r"contact pressure  $p/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
+    right.set_ylabel(r"$P(p)\; E^{\ast}h_{\mathrm{rms}}^{\prime}$")
+    right.set_xlim(lowest * 1.05, highest * 1.05)
+    right.set_ylim(top * 5e-5, top * 3)
+    right.axvline(0, color="0.75", lw=0.6, zorder=0)
+    kind_shown, value = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
+    left.text(
+        0.04,
+        0.95,
+        f"{_KIND_LABELS[kind_shown]} = {number(value)}",
+        transform=left.transAxes,
+        va="top",
+    )
+    left.legend(loc="lower left")
+    right.legend(loc="lower right")
+    for ax, letter in ((left, "a"), (right, "b")):
+        panel_label(ax, letter)
+    return fig
+
+
+def gap_points(run: xr.Dataset, snapshot: int) -> tuple[np.ndarray, np.ndarray]:
+    """u/h_rms and P(u) h_rms of one snapshot; thinly filled bins are joined until they hold enough grid cells."""
+    height = float(run["rms_height"])
+    edges = run["gap_bin_edges"].values / height
+    content = run["gap_density"].values[snapshot] * np.diff(edges) * height
+    least = _LEAST_CELLS / float(run["grid"]) ** 2
+    # The first bin, from zero, has no place on a logarithmic axis.
+    points, start, gathered = [], 1, 0.0
+    for k in range(1, len(content)):
+        gathered += content[k]
+        if gathered >= least:
+            points.append((np.sqrt(edges[start] * edges[k + 1]), gathered / (edges[k + 1] - edges[start])))
+            start, gathered = k + 1, 0.0
+    if not points:
+        raise ValueError("the gap distribution is empty")
+    return tuple(np.array(points).T)
+
+
+def pressure_points(run: xr.Dataset, snapshot: int) -> tuple[np.ndarray, np.ndarray]:
+    """p/(E* h'_rms) and P(p) E* h'_rms of the bins of one snapshot that hold anything."""
+    unit = float(run["contact_modulus"]) * float(run["rms_slope"])
+    edges = run["pressure_bin_edges"].values / unit
+    density = run["pressure_density"].values[snapshot] * unit
+    filled = density > 0
+    return (0.5 * (edges[1:] + edges[:-1]))[filled], density[filled]

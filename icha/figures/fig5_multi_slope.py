@@ -1,0 +1,140 @@
+"""Fig. 5: contact area against load for several rms slopes and materials, with measurements where there are any."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from icha.figures.fig2_area_and_gap import AREA_LABEL, PRESSURE_LABEL
+from icha.figures.select import path_steps, study_runs
+from icha.figures.style import (
+    BLACK,
+    COLOURS,
+    DASHES,
+    GREY,
+    MARKERS,
+    TWO_COLUMNS,
+    material_label,
+    new_figure,
+    panel_label,
+    styled,
+)
+
+CAPTION = (
+    "Real contact area over nominal area against the reduced pressure F/(E* h'rms A0) (a) and against F/(E* A0) (b) "
+    "for several rms slopes (shape of the markers) and materials (colour). Without adhesion the curves of one "
+    "topography, scaled to different slopes, are one curve in (a); what adhesion adds depends on the material and "
+    "grows as the slope falls. In (b) the slope orders the curves: at a given load the area falls as the slope rises. "
+    "Measurements, where given, are drawn as lines."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredAreas:
+    """A measured area-load curve: arrays of p/(E* h'rms) and A/A0, and what was measured, as far as it is known."""
+
+    label: str
+    citation: str
+    reduced_pressure: np.ndarray
+    area_fraction: np.ndarray
+    material: str | None = None
+    rms_slope: float | None = None
+
+
+@styled
+def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[MeasuredAreas] = ()) -> Figure:
+    """Draw all runs of a study.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    study : name of the study.
+    measurements : measured curves to lay over; in panel (b) only those whose slope is known.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study or no run in it.
+    """
+    runs = study_runs(campaign, study)
+    if not runs:
+        raise ValueError(f"study {study}: there is no run to draw")
+    dataset = campaign[study].to_dataset()
+    materials = [str(name) for name in dataset["material"].values]
+    # The largest slope comes first and gets circles, as in the paper.
+    slopes = sorted((float(value) for value in dataset["rms_slope"].values), reverse=True)
+    colour = {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(materials)}
+    marker = {slope: MARKERS[k % len(MARKERS)] for k, slope in enumerate(slopes)}
+    # Of curves that lie on each other all stay visible: later materials have smaller markers.
+    size = {name: 7.0 * 0.68**k for k, name in enumerate(materials)}
+
+    fig = new_figure(TWO_COLUMNS, 3.5)
+    left, right = fig.subplots(1, 2, sharey=True)
+    for labels, run in runs:
+        look = {
+            "ls": "none",
+            "marker": marker[labels.rms_slope],
+            "mec": colour[labels.material],
+            "mfc": "none",
+            "mew": 0.9,
+            "ms": size[labels.material],
+        }
+        run = path_steps(run)
+        area = run["contact_area_fraction"].values
+        p = run["reduced_pressure"].values
+        left.loglog(p, area, **look)
+        right.loglog(p * float(run["rms_slope"]), area, **look)
+    for k, measured in enumerate(measurements):
+        look = {
+            "color": colour.get(measured.material, BLACK),
+            "ls": DASHES[k % len(DASHES)],
+            "lw": 1.1,
+            "zorder": 1,
+        }
+        left.plot(measured.reduced_pressure, measured.area_fraction, label=measured.label, **look)
+        if measured.rms_slope is not None:
+            right.plot(measured.reduced_pressure * measured.rms_slope, measured.area_fraction, **look)
+    left.set_xlabel(PRESSURE_LABEL)
+    right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
+    left.set_ylabel(AREA_LABEL)
+
+    slope_handles = [
+        Line2D(
+            [],
+            [],
+            ls="none",
+            marker=marker[s],
+            mec=GREY,
+            mfc="none",
+            ms=6,
+            label=rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {s:g}",
+        )
+        for s in slopes
+    ]
+    material_handles = [
+        Line2D(
+            [],
+            [],
+            ls="none",
+            marker="o",
+            mec=colour[m],
+            mfc="none",
+            mew=1.1,
+            ms=size[m],
+            label=material_label(dataset, m),
+        )
+        for m in materials
+    ]
+    right.legend(handles=slope_handles, loc="lower right")
+    first = left.legend(handles=material_handles, loc="lower right")
+    if measurements:
+        left.add_artist(first)
+        left.legend(loc="upper left", title="measured")
+    for ax, letter in ((left, "a"), (right, "b")):
+        panel_label(ax, letter)
+    return fig

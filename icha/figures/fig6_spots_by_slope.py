@@ -1,0 +1,116 @@
+"""Fig. 6: contact spots of one topography at several rms slopes, at the same load and at the same area."""
+
+from __future__ import annotations
+
+import xarray as xr
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Wedge
+
+from icha.figures.fig4_contact_map import draw_spots
+from icha.figures.select import find_snapshot, periodic_circles, pick, spots_of, study_runs
+from icha.figures.style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    TWO_COLUMNS,
+    VERMILLION,
+    new_figure,
+    number,
+    panel_label,
+    styled,
+    unit_for,
+)
+
+CAPTION = (
+    "Contact spots of one topography scaled to several rms slopes, at the same load F/(E* A0) (a) and at the same "
+    "area A/A0 (b), in their true size. At a given load the steeper surface has less contact, and its spots, drawn on "
+    "top, lie within those of the flatter ones. At a given area the spots nearly coincide; there every "
+    "slope fills a sector of its own."
+)
+
+# From the largest slope to the smallest, as in the paper: blue, green, red.
+_SLOPE_COLOURS = (BLUE, GREEN, VERMILLION, PURPLE, ORANGE, SKY)
+_KINDS = ("relative_load", "area_fraction")
+_TITLES = {"relative_load": r"$F/(E^{\ast}A_0)$", "area_fraction": "$A/A_0$"}
+
+
+@styled
+def figure(
+    campaign: xr.DataTree,
+    *,
+    study: str,
+    surface: str | None = None,
+    seed: int | None = None,
+    material: str | None = None,
+) -> Figure:
+    """Draw the spots of all slopes for one surface, seed and material.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    study : name of the study; its snapshots must include one of kind `relative_load` and one of `area_fraction`.
+    surface, seed, material : what is shown; the study's first, if left out.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study, run or snapshot.
+    """
+    runs = study_runs(campaign, study)
+    if not runs:
+        raise ValueError(f"study {study}: there is no run to draw")
+    surface = pick("surface", surface, [labels.surface for labels, _ in runs])
+    seed = pick("seed", seed, [labels.seed for labels, _ in runs if labels.surface == surface])
+    own = [(labels, run) for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)]
+    material = pick("material", material, [labels.material for labels, _ in own])
+    own = sorted(
+        ((labels.rms_slope, run) for labels, run in own if labels.material == material),
+        key=lambda pair: -pair[0],
+    )
+    colour = {slope: _SLOPE_COLOURS[k % len(_SLOPE_COLOURS)] for k, (slope, _) in enumerate(own)}
+
+    fig = new_figure(TWO_COLUMNS, 4.05)
+    panels = fig.subplots(1, 2, sharey=True)
+    for ax, kind, letter in zip(panels, _KINDS, "ab", strict=True):
+        drawn = []
+        for slope, run in own:
+            at = find_snapshot(run, kind)
+            area = float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at])])
+            drawn.append((area, slope, run, at))
+        # What covers less lies on top.
+        for order, (_, slope, run, at) in enumerate(sorted(drawn, key=lambda each: -each[0])):
+            period = float(run["period"])
+            length, unit = unit_for(period, "m")
+            spots = spots_of(run, at)
+            circles = list(
+                periodic_circles(
+                    spots["spot_x"].values * length,
+                    spots["spot_y"].values * length,
+                    spots["spot_radius"].values * length,
+                    period * length,
+                )
+            )
+            if kind == "relative_load":
+                draw_spots(ax, circles, zorder=2 + order, facecolor=colour[slope], edgecolor="black", lw=0.25)
+            else:
+                # The spots nearly coincide: every slope fills its own sector of the disc, so that all can be seen.
+                share = 360 / len(own)
+                start = 90 + share * list(colour).index(slope)
+                sectors = [Wedge((x, y), r, start, start + share) for x, y, r in circles]
+                ax.add_collection(PatchCollection(sectors, facecolor=colour[slope], edgecolor="black", lw=0.25))
+        ax.set_xlim(0, period * length)
+        ax.set_ylim(0, period * length)
+        ax.set_aspect("equal")
+        ax.set_xlabel(f"x ({unit})")
+        value = float(own[0][1]["snapshot_target"].values[find_snapshot(own[0][1], kind)])
+        panel_label(ax, letter)
+        ax.set_title(f"{_TITLES[kind]} = {number(value)}", loc="right")
+    panels[0].set_ylabel(f"y ({unit})")
+    handles = [
+        Patch(facecolor=colour[slope], label=rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}") for slope, _ in own
+    ]
+    fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return fig

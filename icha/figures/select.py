@@ -1,0 +1,78 @@
+"""Picking what a figure shows out of a campaign dataset, with errors that say what there is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from icha.records import RunLabels, run_labels, select_run
+
+
+def study_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
+    """All runs of a study that are there.
+
+    Raises
+    ------
+    ValueError
+        If the campaign has no such study.
+    """
+    if study not in campaign.children:
+        raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
+    return [(labels, select_run(campaign, labels)) for labels in run_labels(campaign) if labels.study == study]
+
+
+def pick(labels: str, wanted, there: list):
+    """`wanted` if it is there, the first one if nothing is wanted.
+
+    Raises
+    ------
+    ValueError
+        Naming what there is.
+    """
+    if wanted is None:
+        return there[0]
+    if wanted not in there:
+        raise ValueError(f"no {labels} {wanted!r} in this study; there are {', '.join(map(str, there))}")
+    return wanted
+
+
+def path_steps(run: xr.Dataset) -> xr.Dataset:
+    """The stops of the study's list of targets, without those that were added for snapshots of another kind."""
+    kinds = [str(kind) for kind in run["step_kind"].values]
+    main = max(dict.fromkeys(kinds), key=kinds.count, default=None)
+    return run.isel(step=[kind == main for kind in kinds])
+
+
+def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
+    """Position of the snapshot of a kind and target; the first one of the kind, or of all, if nothing more is said.
+
+    Raises
+    ------
+    ValueError
+        If there is none; the message lists the run's snapshots.
+    """
+    kinds = [str(value) for value in run["snapshot_kind"].values]
+    targets = run["snapshot_target"].values
+    for k, (own_kind, own_target) in enumerate(zip(kinds, targets, strict=True)):
+        if kind in (None, own_kind) and (target is None or np.isclose(own_target, target, rtol=1e-9)):
+            return k
+    there = ", ".join(f"{k} {t:g}" for k, t in zip(kinds, targets, strict=True)) or "none"
+    asked = kind or "any kind"
+    raise ValueError(f"no snapshot of {asked}{'' if target is None else f' {target:g}'}; there are: {there}")
+
+
+def spots_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
+    """The spots of one snapshot of a run."""
+    own = [name for name, variable in run.variables.items() if variable.dims == ("spot",)]
+    return run[own].isel(spot=np.flatnonzero(run["spot_snapshot"].values == snapshot))
+
+
+def periodic_circles(x, y, radius, period: float) -> Iterator[tuple[float, float, float]]:
+    """Centre and radius of every circle, and of its images that reach into the cell [0, L)²."""
+    for cx, cy, r in zip(x, y, radius, strict=True):
+        for dx in (-period, 0.0, period):
+            for dy in (-period, 0.0, period):
+                if -r < cx + dx < period + r and -r < cy + dy < period + r:
+                    yield cx + dx, cy + dy, r

@@ -1,0 +1,136 @@
+"""One look for all figures, and files with the same bytes whenever they are drawn from the same data."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from functools import wraps
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from icha.records import whole_file
+
+# Widths of one and of two columns of a journal page, inches.
+ONE_COLUMN = 3.5
+TWO_COLUMNS = 7.1
+
+# M. Okabe and K. Ito, Color Universal Design (2008): told apart with any colour vision.
+BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
+ORANGE, SKY, PURPLE, BLACK = "#E69F00", "#56B4E9", "#CC79A7", "#000000"
+COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)))
+GREY = "0.45"
+
+RC = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 9,
+    "axes.labelsize": 9.5,
+    "axes.linewidth": 0.7,
+    "axes.titlesize": 9.5,
+    "axes.titlepad": 4,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "legend.handlelength": 2.2,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "xtick.minor.width": 0.5,
+    "ytick.minor.width": 0.5,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.5,
+    "figure.dpi": 100,
+    "savefig.dpi": 300,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "icha",
+}
+
+
+def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """Decorate a function that draws a figure: it draws in the style above, whatever the user's settings."""
+
+    @wraps(draw)
+    def drawn(*args, **kwargs):
+        with mpl.rc_context():
+            mpl.rcdefaults()
+            mpl.rcParams.update(RC)
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure that belongs to no window and to no global state; sizes in inches."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.05, h_pad=0.06)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
+    """Write a figure to both formats, without date or name of the software that would change with its version."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(RC)
+        with whole_file(png) as temporary:
+            figure.savefig(temporary, format="png", metadata={"Software": None})
+        with whole_file(pdf) as temporary:
+            nothing = {"CreationDate": None, "Creator": None, "Producer": None}
+            figure.savefig(temporary, format="pdf", metadata=nothing)
+
+
+def panel_label(axes, letter: str) -> None:
+    """Mark a panel as (a), (b), … outside its upper left corner."""
+    axes.set_title(f"({letter})", loc="left", fontweight="bold")
+
+
+def cycle(values: tuple, count: int) -> Iterator:
+    """The first `count` of `values`, from the start again when they run out."""
+    return (values[k % len(values)] for k in range(count))
+
+
+def number(value: float) -> str:
+    """A value in text: `0.01`, `25`, `3.2 × 10⁻⁵` in mathtext."""
+    if value == 0:
+        return "0"
+    exponent = int(np.floor(np.log10(abs(value)) + 1e-12))
+    if -3 <= exponent <= 3:
+        return f"{value:.4g}"
+    mantissa = f"{value / 10.0**exponent:.3g}"
+    power = f"10^{{{exponent}}}"
+    return f"${power}$" if mantissa == "1" else rf"${mantissa}\times{power}$"
+
+
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+def unit_for(value: float, unit: str) -> tuple[float, str]:
+    """Factor and name of the prefixed unit in which `value` (SI) lies between 1 and 1000."""
+    exponent = 0 if value == 0 else int(np.floor(np.log10(abs(value)) / 3 + 1e-12)) * 3
+    exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
+    return 10.0**-exponent, f"{_PREFIXES[exponent]}{unit}"
+
+
+def quantity(value: float, unit: str) -> str:
+    """A value with a prefixed unit, such as `25 MPa`."""
+    factor, name = unit_for(value, unit)
+    return f"{value * factor:.4g} {name}"
+
+
+def material_label(study, material: str) -> str:
+    """What distinguishes a material, for legends: modulus and surface energy, in the same units for a whole study."""
+    parts = []
+    for name, symbol, unit in (("contact_modulus", r"$E^{\ast}$", "Pa"), ("surface_energy", r"$\Delta\gamma$", "J/m²")):
+        value = float(study[name].sel(material=material))
+        factor, prefixed = unit_for(float(study[name].max()), unit)
+        parts.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
+    return ", ".join(parts)
