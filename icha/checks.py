@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from icha.records import COMPLETE, run_labels, select_run, whole_file
+from icha.records import INCOMPLETE, MISSING, RunLabels, run_labels, select_run, whole_file
 
 RESIDUAL_LIMIT = 1e-8
 IDENTITY_LIMIT = 1e-8
@@ -50,7 +50,8 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
         # A value that is not a number keeps to no limit; it is reported as -1, which no error can be.
         value = float(value)
         passed = bool(math.isfinite(value) and value <= limit)
-        checks.append(Check(name, value if math.isfinite(value) else -1.0, limit, passed, description, subject))
+        shown = value if math.isfinite(value) else -1.0
+        checks.append(Check(name, shown, float(limit), passed, description, subject))
 
     numbers = [v.values for v in run.variables.values() if v.dtype.kind in "fiu"]
     at_most(
@@ -166,16 +167,35 @@ def _identities(run):
     )
 
 
-def check_campaign(tree: xr.DataTree) -> tuple[Check, ...]:
-    """Check a campaign dataset: every run there and complete, every variable described, and `check_run` for each."""
+def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
+    """Check a campaign dataset: every run there and complete, every variable described, and `check_run` for each.
+
+    Parameters
+    ----------
+    tree : the campaign dataset.
+    expected : labels of the runs that the campaign asks for; every combination of its labels, if left out.
+    """
     checks = []
+
+    def none_of(name, count, description, subject):
+        checks.append(Check(name, float(count), 0.0, count == 0, description, subject))
+
+    wanted = None if expected is None else {str(RunLabels(*labels)) for labels in expected}
+    present = run_labels(tree)
+    if wanted is not None:
+        lacking = wanted - {str(labels) for labels in present}
+        none_of(
+            "all runs", len(lacking), "number of runs that the campaign asks for and lacks", ", ".join(sorted(lacking))
+        )
     for study, node in tree.children.items():
         status = node["status"].values
-        lacking = int(np.count_nonzero(status != COMPLETE))
-        checks.append(Check("all runs", lacking, 0, lacking == 0, "number of runs incomplete or missing", study))
-        bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in node.to_dataset().variables.values())
-        checks.append(Check("described", bare, 0, bare == 0, "number of variables without units or long name", study))
-    for labels in run_labels(tree):
+        incomplete = status == INCOMPLETE
+        bad = incomplete if wanted is not None else incomplete | (status == MISSING)
+        none_of("complete", np.count_nonzero(bad), "number of runs that end early or are missing", study)
+        variables = node.to_dataset().variables.values()
+        bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in variables)
+        none_of("described", bare, "number of variables without units or long name", study)
+    for labels in present:
         checks.extend(check_run(select_run(tree, labels), str(labels)))
     return tuple(checks)
 

@@ -1,0 +1,289 @@
+"""The report of a campaign: one HTML page that needs nothing else, neither network nor other files.
+
+All of it follows from the campaign's data, except the run statistics: times and memory are measurements and differ
+from one execution to the next. They stand in a section of their own, and without benchmark files there is none.
+"""
+
+from __future__ import annotations
+
+import base64
+import csv
+import importlib.metadata
+import json
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import jinja2
+import numpy as np
+import xarray as xr
+from markupsafe import Markup, escape
+
+from icha.aggregation import at_round_pressures
+from icha.checks import Check, worst
+from icha.figures.style import quantity
+from icha.records import RunLabels, run_labels, select_run, whole_file
+
+PAPER = (
+    "G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media with an advanced asperity model"
+)
+SOFTWARE = ("icha", "numpy", "scipy", "finufft", "xarray", "netCDF4", "matplotlib", "snakemake")
+
+
+@dataclass(frozen=True)
+class ReportFigure:
+    """A figure of the report: its name, caption, and the files that hold it."""
+
+    name: str
+    caption: str
+    png: str | os.PathLike
+    pdf: str | os.PathLike
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """What one job took: wall time in s and peak memory in MB (none where it ended before it was measured)."""
+
+    job: str
+    seconds: float
+    megabytes: float | None
+
+
+def write_report(
+    path: str | os.PathLike,
+    *,
+    campaign: xr.DataTree,
+    figures: Sequence[ReportFigure],
+    checks: Iterable[Check],
+    comparison: xr.DataTree | None = None,
+    surfaces: Iterable[xr.Dataset] = (),
+    benchmarks: Iterable[Benchmark] = (),
+    configuration: str = "",
+    dataset_path: str | os.PathLike | None = None,
+    citations: Sequence[str] = (),
+) -> None:
+    """Write the report.
+
+    Parameters
+    ----------
+    path : the HTML file; links to other files are relative to its folder.
+    campaign : the campaign dataset; its title, summary and licence head the page.
+    figures : in order; the PNGs become part of the page, the PDFs are linked.
+    checks : findings of `icha.checks.check_campaign`.
+    comparison : `icha.aggregation.compare_campaign` of the campaign, if there is one.
+    surfaces : surface files, for the parameters of their spectra.
+    benchmarks : what the jobs took.
+    configuration : text of the configuration as used.
+    dataset_path : the campaign dataset's file, to be linked.
+    citations : further sources to cite, such as those of measurements.
+    """
+    folder = Path(path).parent
+    checks = list(checks)
+    benchmarks = sorted(benchmarks, key=lambda each: each.job)
+
+    def link(target):
+        return Path(os.path.relpath(target, folder)).as_posix()
+
+    pictures = [
+        {
+            "name": figure.name,
+            "caption": figure.caption,
+            "data": base64.b64encode(Path(figure.png).read_bytes()).decode("ascii"),
+            "pdf": link(figure.pdf),
+        }
+        for figure in figures
+    ]
+    page = _template().render(
+        title=campaign.attrs.get("title", "Rough contact campaign"),
+        summary=campaign.attrs.get("summary", ""),
+        attributes=campaign.attrs,
+        figures=pictures,
+        studies=[_study(campaign, name, comparison) for name in campaign.children],
+        surfaces=[_surface(surface) for surface in surfaces],
+        checks=worst(checks),
+        check_count=len(checks),
+        failed=[check for check in checks if not check.passed],
+        benchmarks=benchmarks,
+        total_seconds=sum(each.seconds for each in benchmarks),
+        peak_megabytes=max((each.megabytes for each in benchmarks if each.megabytes is not None), default=None),
+        configuration=configuration,
+        dataset=link(dataset_path) if dataset_path is not None else None,
+        dataset_name=Path(dataset_path).name if dataset_path is not None else None,
+        paper=PAPER,
+        citations=citations,
+        references=_references(campaign),
+        software={name: _version(name) for name in SOFTWARE},
+    )
+    with whole_file(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def read_benchmarks(files: Mapping[str, str | os.PathLike]) -> list[Benchmark]:
+    """Read Snakemake's benchmark files, `.jsonl` or tab-separated, by name of their job; repeats add up.
+
+    Files that are not there (a job that was not run again after an update, say) are left out.
+    """
+    found = []
+    for job, path in files.items():
+        path = Path(path)
+        if not path.exists():
+            continue
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".jsonl":
+            rows = [json.loads(line) for line in text.splitlines() if line.strip()]
+        else:
+            rows = list(csv.DictReader(text.splitlines(), delimiter="\t"))
+        seconds = sum(float(row["s"]) for row in rows)
+        memory = [float(row["max_rss"]) for row in rows if _is_number(row.get("max_rss"))]
+        found.append(Benchmark(job, seconds, max(memory, default=None)))
+    return found
+
+
+def _is_number(text):
+    try:
+        return np.isfinite(float(text))
+    except (TypeError, ValueError):
+        return False
+
+
+def _study(campaign, name, comparison):
+    """What the page says about one study."""
+    dataset = campaign[name].to_dataset()
+    labels = [each for each in run_labels(campaign) if each.study == name]
+    runs = [(each, select_run(campaign, each)) for each in labels]
+    return {
+        "name": name,
+        "count": int(dataset["status"].size),
+        "present": len(runs),
+        "axes": {label: dataset[label].values.tolist() for label in ("surface", "seed", "rms_slope", "material")},
+        "materials": [
+            {
+                "name": material,
+                **{
+                    key: quantity(float(dataset[key].sel(material=material)), unit)
+                    for key, unit in (
+                        ("contact_modulus", "Pa"),
+                        ("surface_energy", "J/m²"),
+                        ("interaction_range", "m"),
+                    )
+                    if np.isfinite(dataset[key].sel(material=material))
+                },
+            }
+            for material in dataset["material"].values.tolist()
+        ],
+        "runs": [_run(each, run) for each, run in runs],
+        "table": _table(runs),
+        "spread": _spread(comparison[name].to_dataset()) if comparison is not None and name in comparison else None,
+    }
+
+
+def _run(labels: RunLabels, run):
+    snapshots = [
+        {
+            "kind": str(run["snapshot_kind"].values[k]),
+            "target": float(run["snapshot_target"].values[k]),
+            "area": float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[k])]),
+            "spots": int(run["spot_count"].values[int(run["snapshot_step"].values[k])]),
+            "overlap": float(run["overlap_fraction"].values[k]),
+        }
+        for k in range(run.sizes["snapshot"])
+    ]
+    return {
+        "labels": labels,
+        "steps": run.sizes["step"],
+        "tabor": float(run["tabor_parameter"]) if float(run["surface_energy"]) > 0 else None,
+        "asperities": int(run["asperity_count"]),
+        "rms_height": quantity(float(run["rms_height"]), "m"),
+        "period": quantity(float(run["period"]), "m"),
+        "grid": int(run["grid"]),
+        "residual": float(run["residual"].max()) if run.sizes["step"] else None,
+        "snapshots": snapshots,
+    }
+
+
+def _table(runs):
+    """Rows of A/A0 and mean separation at round pressures: one of cells for each run."""
+    rows = [(labels, {p: (area, gap) for p, area, gap in at_round_pressures(run)}) for labels, run in runs]
+    pressures = sorted({p for _, cells in rows for p in cells})
+    return {"pressures": pressures, "rows": [(labels, [cells.get(p) for p in pressures]) for labels, cells in rows]}
+
+
+def _spread(comparison):
+    """Largest spread of the area between materials and between slopes, at equal reduced pressure and at equal load."""
+
+    def largest(name):
+        values = comparison[name].values
+        return float(np.nanmax(values)) if np.isfinite(values).any() else None
+
+    names = ("material_spread", "slope_spread", "material_spread_at_load", "slope_spread_at_load")
+    return {name: largest(name) for name in names}
+
+
+def _surface(surface):
+    """Name, seed and parameters of a surface file."""
+    lengths = ("period", "rolloff_wavelength", "short_wavelength", "rms_height")
+    return {
+        "name": surface.attrs.get("surface", ""),
+        "seed": int(surface["seed"]),
+        "grid": int(surface["grid"]),
+        "hurst": float(surface["hurst"]) if "hurst" in surface else None,
+        "rms_slope": float(surface["rms_slope"]),
+        "curvature_radius": quantity(1 / float(surface["rms_curvature"]), "m"),
+        **{name: quantity(float(surface[name]), "m") for name in lengths if name in surface},
+    }
+
+
+def _references(campaign):
+    """Sources that the studies' datasets name, each once."""
+    found = (node.attrs.get("references", "") for node in campaign.children.values())
+    return list(dict.fromkeys(part.strip() for text in found for part in text.split(";") if part.strip()))
+
+
+def _version(name):
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+# Symbols as they stand in captions and attributes, and how a page sets them.
+_SYMBOLS = (
+    (re.compile(r"h(?:&#39;|')_?rms"), "<i>h</i>′<sub>rms</sub>"),
+    (re.compile(r"\bh_rms"), "<i>h</i><sub>rms</sub>"),
+    (re.compile(r"\bE\*"), "<i>E</i><sup>∗</sup>"),
+    (re.compile(r"\bA0\b"), "<i>A</i><sub>0</sub>"),
+)
+
+
+def _symbols(text: str) -> Markup:
+    """Set the symbols of plain text: E*, A0, h'rms."""
+    result = str(escape(text))
+    for pattern, replacement in _SYMBOLS:
+        result = pattern.sub(replacement, result)
+    return Markup(result)
+
+
+def _scientific(value: float | None) -> Markup:
+    """A number with three digits, in powers of ten where it is small or large."""
+    if value is None:
+        return Markup("–")
+    if value == 0:
+        return Markup("0")
+    exponent = int(np.floor(np.log10(abs(value))))
+    if -3 <= exponent < 4:
+        return Markup(escape(f"{value:.{max(0, 2 - exponent)}f}" if exponent < 3 else f"{value:.0f}"))
+    return Markup(f"{value / 10.0**exponent:.2f}&thinsp;×&thinsp;10<sup>{str(exponent).replace('-', '−')}</sup>")
+
+
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("icha", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {"symbols": _symbols, "scientific": _scientific}
+    return environment.get_template("report.html")
