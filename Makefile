@@ -1,0 +1,59 @@
+# Needs git, make and Python >= 3.11 with venv and pip; everything else is installed, locked, into .venv.
+
+PYTHON ?= python3
+CORES ?= 2
+UV_VERSION := 0.13.8
+CONFIG ?=
+
+export PATH := $(CURDIR)/.venv/bin:$(PATH)
+export UV_PYTHON_DOWNLOADS := never
+export UV_PROJECT_ENVIRONMENT := $(CURDIR)/.venv
+export UV_NO_PROGRESS := 1
+unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
+
+.DEFAULT_GOAL := help
+.PHONY: help environment run test lint format schema clean
+
+help:
+	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
+	@echo "make test    run the tests"
+	@echo "make lint    check style of Python code and workflow"
+	@echo "make format  put Python code and workflow into that style"
+	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
+	@echo "make clean   remove results and Snakemake's records (not the environment)"
+
+environment: .venv/.installed
+
+.venv-tools/bin/uv:
+	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "ICHA needs Python 3.11 or newer")'
+	$(PYTHON) -m venv .venv-tools
+	.venv-tools/bin/python -m pip install --quiet uv==$(UV_VERSION)
+
+.venv/.installed: .venv-tools/bin/uv pyproject.toml uv.lock
+	.venv-tools/bin/uv sync --quiet --locked --python $(PYTHON)
+	@touch $@
+
+run: environment
+	snakemake --cores $(CORES) $(if $(CONFIG),--configfile $(CONFIG))
+	@python workflow/scripts/show_results.py $(CONFIG)
+
+test: environment
+	pytest
+
+lint: environment
+	ruff check .
+	ruff format --check .
+	snakefmt --check Snakefile workflow
+	snakemake --lint
+
+format: environment
+	ruff check --fix .
+	ruff format .
+	snakefmt Snakefile workflow
+
+schema: environment
+	python -m icha.configuration
+
+clean:
+	rm -rf .snakemake
+	find results -mindepth 1 -not -name README.md -delete
