@@ -1,0 +1,113 @@
+"""Checks of results pass on true runs and catch each kind of damage."""
+
+import numpy as np
+import pytest
+import small_campaign as small
+
+from icha.checks import Check, check_campaign, check_run, read_checks, worst, write_checks
+from icha.records import RunLabels, campaign_tree
+
+
+def failed(run):
+    return {check.name for check in check_run(run) if not check.passed}
+
+
+@pytest.mark.parametrize("material", ["soft", "hertz"])
+def test_true_runs_pass(material):
+    run = small.run(material=material)
+    checks = check_run(run, "a run")
+    assert failed(run) == set()
+    assert len(checks) >= 12
+    assert {check.subject for check in checks} == {"a run"}
+
+
+def scaled(name, factor, index=...):
+    def damage(run):
+        run[name].values[index] *= factor
+
+    return damage
+
+
+def written(name, value, index=...):
+    def damage(run):
+        run[name].values[index] = value
+
+    return damage
+
+
+DAMAGES = {
+    "residual": written("residual", 1e-6, 2),
+    "converged": written("converged", 0, 1),
+    "targets": scaled("step_target", 1 + 1e-6, 3),
+    "area rises": scaled("contact_area_fraction", 0.3, 4),
+    "pressure rises": scaled("nominal_pressure", 0.1, 4),
+    "separation falls": scaled("mean_separation", 1.5, 4),
+    "area from P(p)": scaled("pressure_density", 1 + 1e-6),
+    "load from P(p)": scaled("pressure_bin_mean", 1 + 1e-6),
+    "P(u) complete": scaled("gap_density", 1 + 1e-6),
+    "area of spots": scaled("spot_radius", 1 + 1e-6, 0),
+    "load of spots": scaled("spot_force", -1, 0),
+    "finite": written("gap_density", np.nan, (0, 5)),
+    "stiffness": written("contact_stiffness", -1.0, 2),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_each_kind_of_damage_is_caught_by_its_check(name):
+    run = small.run(material="hertz").copy(deep=True)
+    DAMAGES[name](run)
+    assert name in failed(run)
+
+
+def test_a_lost_spot_is_caught():
+    run = small.run()
+    assert {"area of spots", "load of spots"} <= failed(run.isel(spot=slice(1, None)))
+
+
+def test_adhesion_may_soften_the_contact():
+    run = small.run(material="soft").copy(deep=True)
+    run["contact_stiffness"].values[0] = -1.0
+    assert "stiffness" not in {check.name for check in check_run(run)}
+
+
+def test_a_run_without_steps_fails():
+    run = small.run().isel(step=slice(0, 0), snapshot=slice(0, 0), spot=slice(0, 0))
+    assert failed(run) == {"steps"}
+
+
+def test_campaign_passes_and_names_its_runs():
+    checks = check_campaign(small.tree())
+    assert all(check.passed for check in checks)
+    assert {str(labels) for labels, _ in small.runs()} <= {check.subject for check in checks}
+
+
+def test_missing_runs_fail_unless_nobody_asked_for_them():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    tree = campaign_tree(runs[:-1], allow_missing=True)
+    assert {check.name for check in check_campaign(tree) if not check.passed} == {"complete"}
+    assert all(check.passed for check in check_campaign(tree, [labels for labels, _ in runs[:-1]]))
+    lacking = [check for check in check_campaign(tree, [labels for labels, _ in runs]) if not check.passed]
+    assert [check.name for check in lacking] == ["all runs"]
+    assert lacking[0].subject == str(RunLabels("slopes", "rough", 1, 0.2, "hertz"))
+
+
+def test_worst_prefers_failures_and_then_large_values():
+    checks = [Check("a", v, 1.0, p, "", s) for v, p, s in ((0.5, True, "x"), (0.1, False, "y"), (0.9, True, "z"))]
+    assert [check.subject for check in worst(checks)] == ["y"]
+    assert [check.subject for check in worst([checks[0], checks[2]])] == ["z"]
+
+
+def test_findings_can_be_kept(tmp_path):
+    checks = check_run(small.run(), "a run")
+    write_checks(checks, tmp_path / "checks.json")
+    assert read_checks(tmp_path / "checks.json") == checks
+    first = (tmp_path / "checks.json").read_bytes()
+    write_checks(checks, tmp_path / "checks.json")
+    assert (tmp_path / "checks.json").read_bytes() == first
+
+
+def test_values_not_finite_can_be_kept_too(tmp_path):
+    run = small.run().copy(deep=True)
+    run["residual"].values[0] = np.nan
+    write_checks(check_run(run), tmp_path / "checks.json")
+    assert {"finite", "residual"} <= {check.name for check in read_checks(tmp_path / "checks.json") if not check.passed}

@@ -1,0 +1,184 @@
+"""Figures can be drawn from small and unusual campaigns, say what is wrong, and have the same bytes every time."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import small_campaign as small
+
+from icha.figures import (
+    fig1_jkr,
+    fig2_area_and_gap,
+    fig3_distributions,
+    fig4_contact_map,
+    fig5_multi_slope,
+    fig6_spots_by_slope,
+)
+from icha.figures.select import find_snapshot, path_steps, periodic_circles
+from icha.figures.style import number, quantity, save, unit_for
+from icha.records import campaign_tree, read_dataset, write_surface
+from icha.reference import reference_dataset
+
+
+@pytest.fixture(scope="module")
+def surface(tmp_path_factory):
+    path = tmp_path_factory.mktemp("surface") / "s.nc"
+    write_surface(path, small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    return read_dataset(path)
+
+
+def draw(name, surface):
+    tree = small.tree()
+    return {
+        "fig1": lambda: fig1_jkr.figure(),
+        "fig2": lambda: fig2_area_and_gap.figure(tree, reference_dataset(small.SPECTRUM), study="slopes"),
+        "fig2_alone": lambda: fig2_area_and_gap.figure(tree, study="single"),
+        "fig3": lambda: fig3_distributions.figure(tree, study="slopes"),
+        "fig3_one": lambda: fig3_distributions.figure(tree, study="single", kind="area_fraction"),
+        "fig4": lambda: fig4_contact_map.figure(tree, surface, study="slopes", rms_slope=0.2, material="hertz"),
+        "fig5": lambda: fig5_multi_slope.figure(tree, study="slopes"),
+        "fig5_one": lambda: fig5_multi_slope.figure(tree, study="single"),
+        "fig6": lambda: fig6_spots_by_slope.figure(tree, study="slopes", material="hertz"),
+        "fig6_one": lambda: fig6_spots_by_slope.figure(tree, study="single", seed=2),
+    }[name]()
+
+
+NAMES = ["fig1", "fig2", "fig2_alone", "fig3", "fig3_one", "fig4", "fig5", "fig5_one", "fig6", "fig6_one"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, name):
+    save(draw(name, surface), tmp_path / "a.png", tmp_path / "a.pdf")
+    with mpl.rc_context({"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "savefig.dpi": 33}):
+        save(draw(name, surface), tmp_path / "b.png", tmp_path / "b.pdf")
+    for kind in ("png", "pdf"):
+        one, two = ((tmp_path / f"{each}.{kind}").read_bytes() for each in "ab")
+        assert one == two
+        assert b"CreationDate" not in one and len(one) > 5000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.pdf", "a.png", "b.pdf", "b.png"]
+
+
+def lines(axes):
+    return [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
+
+
+def test_fig1_passes_through_the_known_points():
+    axes = fig1_jkr.figure(tabor_parameter=3.0).axes[0]
+    marks = {text.get_text(): text.xy for text in axes.texts if text.get_text() in "ABC" and text.get_text()}
+    assert marks["C"] == pytest.approx((-1.608772, -5 * np.pi / 6), abs=1e-5)
+    assert marks["B"] == pytest.approx((-0.773417, -1.5 * np.pi), abs=1e-5)
+    assert marks["A"] == pytest.approx(((1 - 2.641 * 3 ** (3 / 7)) / 3, 0), abs=1e-9)
+
+
+def test_fig2_shows_every_run_and_the_references():
+    figure = fig2_area_and_gap.figure(small.tree(), reference_dataset(small.SPECTRUM), study="slopes")
+    left, right = figure.axes
+    labels = {text.get_text() for text in left.get_legend().get_texts()}
+    assert {"Persson", "Bush, Gibson & Thomas", "GFMD, no adhesion"} <= labels
+    drawn = [line for line in left.get_lines() if line.get_linestyle() == "None" and len(line.get_xdata()) == 4]
+    assert len(drawn) == 4
+    run = small.run(rms_slope=0.2, material="soft")
+    expected = path_steps(run)["contact_area_fraction"].values
+    assert any(np.array_equal(line.get_ydata(), expected) for line in drawn)
+    assert left.get_xscale() == left.get_yscale() == right.get_xscale() == right.get_yscale() == "log"
+
+
+def test_fig3_points_keep_the_probability():
+    run = small.run()
+    for at in range(run.sizes["snapshot"]):
+        edges = run["gap_bin_edges"].values / float(run["rms_height"])
+        u, density = fig3_distributions.gap_points(run, at)
+        assert np.all(np.diff(u) > 0) and np.all(density > 0)
+        assert u[0] > edges[1] and u[-1] < edges[-1]
+        p, density = fig3_distributions.pressure_points(run, at)
+        width = np.diff(run["pressure_bin_edges"].values) / float(run["contact_modulus"] * run["rms_slope"])
+        held = width[run["pressure_density"].values[at] > 0]
+        area = float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at])])
+        assert np.sum(density * held) == pytest.approx(area, rel=1e-9)
+        assert p.min() < 0, "adhesion pulls at the edges"
+    hertz = small.run(material="hertz")
+    assert fig3_distributions.pressure_points(hertz, 0)[0].min() > 0
+
+
+def test_fig4_refuses_the_surface_of_another_run(tmp_path, surface):
+    write_surface(tmp_path / "s.nc", small.surface(2), name="rough", seed=2)
+    with pytest.raises(ValueError, match="the surface given has seed 2"):
+        fig4_contact_map.figure(small.tree(), read_dataset(tmp_path / "s.nc"), study="slopes")
+    with pytest.raises(ValueError, match="another period or grid"):
+        fig4_contact_map.figure(small.tree(), surface.assign(period=surface["period"] * 2), study="slopes")
+
+
+def test_circles_continue_across_borders():
+    circles = list(periodic_circles([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0))
+    assert sorted((round(x, 9), round(y, 9)) for x, y, _ in circles) == [
+        (0.02, -0.03),
+        (0.02, 0.97),
+        (0.5, 0.5),
+        (1.02, -0.03),
+        (1.02, 0.97),
+    ]
+
+
+def test_fig5_lays_measurements_over_the_curves():
+    measured = fig5_multi_slope.MeasuredAreas(
+        "Someone, 2020", "A paper.", np.array([1e-3, 1e-2, 2e-2]), np.array([2e-3, 2e-2, 4e-2]), "soft", 0.2
+    )
+    without_slope = fig5_multi_slope.MeasuredAreas(
+        "Another", "A paper.", np.array([1e-3, 1e-2, 2e-2]), np.array([3e-3, 3e-2, 5e-2])
+    )
+    left, right = fig5_multi_slope.figure(small.tree(), study="slopes", measurements=[measured, without_slope]).axes
+    found = {line.get_label(): line for line in left.get_lines() if not line.get_label().startswith("_")}
+    assert set(found) == {"Someone, 2020", "Another"}
+    np.testing.assert_array_equal(found["Another"].get_ydata(), without_slope.area_fraction)
+    shifted = [line for line in right.get_lines() if len(line.get_xdata()) == 3]
+    assert len(shifted) == 1
+    np.testing.assert_allclose(shifted[0].get_xdata(), measured.reduced_pressure * 0.2)
+
+
+def test_fig5_slope_orders_the_curves_at_equal_load():
+    right = fig5_multi_slope.figure(small.tree(), study="slopes").axes[1]
+    by_marker = {}
+    for line in lines(right):
+        by_marker.setdefault(line.get_marker(), []).append((line.get_xdata(), line.get_ydata()))
+    assert set(by_marker) == {"o", "s"}
+    (steep, _), (flat, _) = by_marker["o"][0], by_marker["s"][0]
+    np.testing.assert_allclose(flat, 0.2 * steep, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "module", [fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig6_spots_by_slope], ids=lambda m: m.__name__
+)
+def test_unknown_studies_are_named(module):
+    with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, single"):
+        module.figure(small.tree(), study="nothing")
+
+
+def test_what_is_not_there_is_named_with_what_is():
+    with pytest.raises(ValueError, match="no material 'steel' in this study; there are soft"):
+        fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
+    with pytest.raises(ValueError, match=r"no snapshot of reduced_pressure 0\.01; there are: relative_load 0\.002"):
+        find_snapshot(small.run(), "reduced_pressure", 0.01)
+
+
+def test_incomplete_campaigns_are_drawn_with_what_they_have():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    tree = campaign_tree(runs[:-1], allow_missing=True)
+    assert len(lines(fig5_multi_slope.figure(tree, study="slopes").axes[0])) == 3
+
+
+@pytest.mark.parametrize(
+    "module",
+    [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope],
+    ids=lambda module: module.__name__,
+)
+def test_captions_are_sentences(module):
+    assert len(module.CAPTION) > 100 and module.CAPTION.endswith(".")
+
+
+def test_units_as_people_write_them():
+    assert quantity(25e6, "Pa") == "25 MPa"
+    assert quantity(0.05, "J/m²") == "50 mJ/m²"
+    assert quantity(2.071e-9, "m") == "2.071 nm"
+    assert quantity(0.0, "J/m²") == "0 J/m²"
+    assert unit_for(100e-6, "m")[1] == "µm" and unit_for(0.1, "m")[1] == "mm"
+    assert unit_for(1e-3, "m") == (pytest.approx(1e3), "mm")
+    assert number(0.01) == "0.01" and number(1e-5) == "$10^{-5}$" and number(3.2e-5) == r"$3.2\times10^{-5}$"

@@ -1,0 +1,220 @@
+"""Datasets are whole, byte-stable, free of values that are not finite, and complete."""
+
+import netCDF4
+import numpy as np
+import pytest
+import small_campaign as small
+import xarray as xr
+
+from icha.records import (
+    RunLabels,
+    campaign_tree,
+    read_campaign,
+    read_dataset,
+    read_run,
+    read_surface,
+    run_labels,
+    select_run,
+    write_dataset,
+    write_surface,
+)
+
+
+def simple(values=(1.0, 2.0)):
+    return xr.Dataset({"length": ("n", np.array(values), {"units": "m", "long_name": "length"})})
+
+
+def test_a_run_comes_back_as_it_was(tmp_path):
+    run = small.run()
+    write_dataset(run, tmp_path / "deep" / "run.nc")
+    xr.testing.assert_identical(read_run(tmp_path / "deep" / "run.nc"), run)
+
+
+@pytest.mark.parametrize("what", ["run", "tree", "surface"])
+def test_the_same_values_give_the_same_bytes(tmp_path, what):
+    for name in ("one.nc", "two.nc"):
+        if what == "surface":
+            write_surface(tmp_path / name, small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+        else:
+            write_dataset(small.run() if what == "run" else small.tree(), tmp_path / name)
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+
+
+def test_a_dataset_read_and_written_keeps_its_bytes(tmp_path):
+    write_dataset(small.tree(), tmp_path / "one.nc")
+    write_dataset(read_campaign(tmp_path / "one.nc"), tmp_path / "two.nc")
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_values_not_finite_are_refused_by_name_and_leave_no_file(tmp_path, bad):
+    with pytest.raises(ValueError, match=r"x\.nc.*'length'.*1 of 2.*n=1"):
+        write_dataset(simple((1.0, bad)), tmp_path / "x.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_variable_without_units_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="'bare' has no units"):
+        write_dataset(xr.Dataset({"bare": ("n", [1.0])}), tmp_path / "x.nc")
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    path = tmp_path / "x.nc"
+    write_dataset(simple(), path)
+    before = path.read_bytes()
+    with pytest.raises(ValueError):
+        write_dataset(simple((np.nan, 1.0)), path)
+    unwritable = simple()
+    unwritable.attrs["object"] = {"netCDF": "has no dictionaries"}
+    with pytest.raises(TypeError):
+        write_dataset(unwritable, path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"nonsense", lambda b: b""])
+def test_damaged_files_are_named(tmp_path, damage):
+    path = tmp_path / "run.nc"
+    write_dataset(small.run(), path)
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(ValueError, match=r"run\.nc"):
+        read_run(path)
+
+
+def test_files_that_are_something_else_are_named(tmp_path):
+    write_dataset(simple(), tmp_path / "x.nc")
+    with pytest.raises(ValueError, match="not a run dataset"):
+        read_run(tmp_path / "x.nc")
+    with pytest.raises(ValueError, match="not a surface file"):
+        read_surface(tmp_path / "x.nc")
+    with pytest.raises(ValueError, match="no such file"):
+        read_dataset(tmp_path / "y.nc")
+
+
+def test_surface_round_trip_keeps_heights_and_axes(tmp_path):
+    surface = small.surface()
+    write_surface(tmp_path / "s.nc", surface, name="rough", seed=1, spectrum=small.SPECTRUM)
+    again = read_surface(tmp_path / "s.nc")
+    # A surface removes its mean, which is zero but for rounding.
+    np.testing.assert_allclose(again.heights, surface.heights, rtol=0, atol=1e-14 * surface.rms_height)
+    assert again.period == surface.period
+    dataset = read_dataset(tmp_path / "s.nc")
+    assert dataset["height"].dims == ("y", "x")
+    assert float(dataset["hurst"]) == 0.8
+    np.testing.assert_allclose(float(dataset["rms_slope"]), 1.0, rtol=1e-12)
+
+
+def test_no_fill_values_and_no_coordinate_in_pascal(tmp_path):
+    write_dataset(small.tree(), tmp_path / "c.nc")
+    with netCDF4.Dataset(tmp_path / "c.nc") as file:
+        for group in file.groups.values():
+            for name, variable in group.variables.items():
+                assert "_FillValue" not in variable.ncattrs(), name
+                assert {"units", "long_name"} <= set(variable.ncattrs()), name
+                assert not (name in group.dimensions and variable.units == "Pa")
+            assert group["step"].dtype.kind == "i"
+
+
+def test_campaign_opens_labelled_and_holds_every_run(tmp_path):
+    write_dataset(small.tree(), tmp_path / "c.nc")
+    tree = xr.open_datatree(tmp_path / "c.nc")
+    study = tree["slopes"]
+    assert study["contact_area_fraction"].dims == ("surface", "seed", "rms_slope", "material", "step")
+    assert list(study["rms_slope"].values) == [0.2, 1.0]
+    assert list(study["material"].values) == ["soft", "hertz"]
+    assert study["contact_modulus"].dims == ("material",)
+    assert float(study["surface_energy"].sel(material="hertz")) == 0
+    assert list(tree["single"]["seed"].values) == [1, 2]
+    assert set(run_labels(tree)) == {labels for labels, _ in small.runs()}
+
+
+def test_every_run_can_be_taken_out_unchanged():
+    tree = small.tree()
+    for labels, run in small.runs():
+        taken = select_run(tree, labels)
+        assert set(run.variables) - set(taken.variables) == set()
+        # Slopes meet their snapshots in different orders; the campaign gives them one.
+        order = [int(np.flatnonzero(run["snapshot_target"] == t)[0]) for t in taken["snapshot_target"]]
+        for name, variable in run.data_vars.items():
+            if "spot" in variable.dims or name in ("seed", "rms_slope"):
+                continue
+            expected = variable.isel(snapshot=order) if "snapshot" in variable.dims else variable
+            np.testing.assert_array_equal(taken[name].values, expected.values, err_msg=f"{labels} {name}")
+        for own, theirs in enumerate(order):
+            for name in ("spot_x", "spot_radius", "spot_force"):
+                np.testing.assert_array_equal(
+                    taken[name].values[taken["spot_snapshot"].values == own],
+                    run[name].values[run["spot_snapshot"].values == theirs],
+                )
+
+
+def test_snapshots_met_in_another_order_are_put_together():
+    orders = {tuple(run["snapshot_kind"].values) for labels, run in small.runs() if labels.study == "slopes"}
+    assert len(orders) == 2, "the small campaign must hold both orders for the test above to mean anything"
+
+
+def test_missing_runs_are_an_error_that_lists_them():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
+    with pytest.raises(ValueError, match=r"slopes/rough/seed1/slope0\.2/hertz \(missing\)"):
+        campaign_tree(runs)
+
+
+def test_missing_runs_are_marked_where_they_are_allowed(tmp_path):
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
+    write_dataset(campaign_tree(runs, allow_missing=True), tmp_path / "c.nc")
+    tree = read_campaign(tmp_path / "c.nc")
+    status = tree["slopes"]["status"]
+    assert status.attrs["flag_meanings"] == "complete incomplete missing"
+    assert int(status.sel(surface="rough", seed=1, rms_slope=0.2, material="hertz")) == 2
+    assert int((status == 0).sum()) == 3
+    area = tree["slopes"]["contact_area_fraction"]
+    assert int(np.isnan(area).sum()) == area.sizes["step"]
+    with pytest.raises(ValueError, match="this run is missing"):
+        select_run(tree, RunLabels("slopes", "rough", 1, 0.2, "hertz"))
+    kept = select_run(tree, runs[0][0])
+    np.testing.assert_array_equal(kept["spot_count"].values, runs[0][1]["spot_count"].values)
+
+
+def test_runs_that_end_early_keep_what_they_have(tmp_path):
+    (labels, run), *others = [(each, run) for each, run in small.runs() if each.study == "slopes"]
+    short = run.isel(step=slice(0, 3), snapshot=slice(0, 1), spot=np.flatnonzero(run["spot_snapshot"] == 0))
+    with pytest.raises(ValueError, match="incomplete"):
+        campaign_tree([(labels, short), *others])
+    write_dataset(campaign_tree([(labels, short), *others], allow_missing=True), tmp_path / "c.nc")
+    taken = select_run(read_campaign(tmp_path / "c.nc"), labels)
+    assert taken.sizes["step"] == 3 and taken.sizes["snapshot"] == 1
+    np.testing.assert_array_equal(taken["nominal_pressure"].values, short["nominal_pressure"].values)
+
+
+def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing(tmp_path):
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
+    holed = runs[0][1].copy(deep=True)
+    holed["contact_area_fraction"][1] = np.nan
+    tree = campaign_tree([(runs[0][0], holed), *runs[1:]], allow_missing=True)
+    with pytest.raises(ValueError, match="contact_area_fraction"):
+        write_dataset(tree, tmp_path / "c.nc")
+
+
+def test_labels_that_contradict_the_dataset_are_refused():
+    labels, run = small.runs()[0]
+    with pytest.raises(ValueError, match="rms_slope is 1"):
+        campaign_tree([(labels._replace(rms_slope=0.7), run)])
+    with pytest.raises(ValueError, match="seed is 1"):
+        campaign_tree([(labels._replace(seed=4), run)])
+    with pytest.raises(ValueError, match="given twice"):
+        campaign_tree([(labels, run), (labels, run)])
+
+
+def test_runs_of_other_materials_under_one_name_are_refused():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "single"]
+    (one, first), (two, second) = runs
+    second = second.assign(contact_modulus=second["contact_modulus"] * 2)
+    with pytest.raises(ValueError, match="contact_modulus differs"):
+        campaign_tree([(one, first), (two, second)])
+
+
+def test_selecting_what_is_not_there_says_what_is():
+    with pytest.raises(ValueError, match="there are slopes, single"):
+        select_run(small.tree(), ("other", "rough", 1, 1.0, "soft"))
+    with pytest.raises(ValueError, match=r"no rms_slope 0\.3; there are 0\.2, 1"):
+        select_run(small.tree(), ("slopes", "rough", 1, 0.3, "soft"))

@@ -1,0 +1,163 @@
+"""The report is one page without outside parts, shows failures, and changes with the data only."""
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+import small_campaign as small
+
+from icha.aggregation import at_round_pressures, compare_campaign, compare_runs, interpolated
+from icha.checks import Check, check_campaign
+from icha.figures import fig1_jkr
+from icha.figures.select import path_steps
+from icha.figures.style import save
+from icha.records import campaign_tree, read_campaign, read_dataset, write_dataset, write_surface
+from icha.report import Benchmark, ReportFigure, read_benchmarks, write_report
+
+
+class Page(HTMLParser):
+    """Collects what a page refers to, and sees that tags are closed."""
+
+    VOID = frozenset({"meta", "link", "img", "br"})
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.targets, self.ids = [], [], set()
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name in ("href", "src"):
+                self.targets.append(value)
+            if name == "id":
+                self.ids.add(value)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture
+def write(tmp_path):
+    save(fig1_jkr.figure(), tmp_path / "figures" / "fig1_jkr.png", tmp_path / "figures" / "fig1_jkr.pdf")
+    write_surface(tmp_path / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    picture = ReportFigure(
+        "fig1_jkr", fig1_jkr.CAPTION, tmp_path / "figures" / "fig1_jkr.png", tmp_path / "figures" / "fig1_jkr.pdf"
+    )
+
+    def written(name="report.html", **changes):
+        arguments = {
+            "campaign": small.tree(),
+            "figures": [picture],
+            "checks": check_campaign(small.tree()),
+            "comparison": compare_campaign(small.tree()),
+            "surfaces": [read_dataset(tmp_path / "s.nc")],
+            "configuration": "name: small\ntext: <script>alert('no')</script>\n",
+            "dataset_path": tmp_path / "dataset" / "small.nc",
+        }
+        write_report(tmp_path / name, **(arguments | changes))
+        return (tmp_path / name).read_text(encoding="utf-8")
+
+    return written
+
+
+def test_page_needs_nothing_from_outside(write, tmp_path):
+    page = Page(write())
+    for target in page.targets:
+        assert target.startswith(("data:", "#")) or target in ("figures/fig1_jkr.pdf", "dataset/small.nc")
+        if target.startswith("#"):
+            assert target[1:] in page.ids
+    assert "://" not in re.sub(r"base64,[^\"]*", "", write())
+    assert str(tmp_path) not in write()
+
+
+def test_page_shows_parameters_results_and_checks(write):
+    text = write()
+    for part in ("Small campaign", "25 MPa", "50 mJ/m²", "2.071 nm", "all 84 passed", "100 µm", "CC0-1.0"):
+        assert part in text, part
+    assert "<script>" not in text and "&lt;script&gt;" in text
+    area = dict((p, a) for p, a, _ in at_round_pressures(small.run(rms_slope=0.2, material="hertz")))[1e-2]
+    assert f"{area:.4f}" in text
+
+
+def test_failures_are_loud(write):
+    failed = Check("residual", 1e-3, 1e-8, False, "largest equilibrium error over h_rms", "slopes/rough")
+    text = write(checks=[*check_campaign(small.tree()), failed])
+    assert "1 of 85 failed" in text and "✗ failed" in text and "slopes/rough" in text
+    not_finite = Check("residual", -1.0, 1e-8, False, "largest equilibrium error over h_rms", "slopes/rough")
+    assert "not finite" in write(checks=[not_finite])
+
+
+def test_same_bytes_twice_and_statistics_apart(write):
+    assert write("a.html") == write("b.html")
+    quick, slow = (write(benchmarks=[Benchmark("runs/a", seconds, 100.0)]) for seconds in (1.0, 2.0))
+    assert quick != slow
+    assert quick.split('<h2 id="statistics">')[0] == slow.split('<h2 id="statistics">')[0]
+    assert quick.split('<h2 id="data">')[1] == slow.split('<h2 id="data">')[1]
+    assert 'id="statistics"' not in write()
+
+
+def test_incomplete_campaigns_are_reported(write):
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    tree = campaign_tree(runs[:-1], allow_missing=True, attrs={"title": "Half"})
+    text = write(campaign=tree, checks=check_campaign(tree), comparison=compare_campaign(tree))
+    assert "3 of 4" in text and "1 of" in text and "nan" not in re.sub(r"base64,[^\"]*", "", text).lower().split()
+    Page(text)
+
+
+def test_benchmark_files_of_both_kinds(tmp_path):
+    (tmp_path / "a.tsv").write_text("s\th:m:s\tmax_rss\n1.5\t0:00:01\t120.5\n2.5\t0:00:02\t-\n")
+    (tmp_path / "b.jsonl").write_text('{"s": 0.25, "max_rss": null}\n')
+    found = read_benchmarks({"a": tmp_path / "a.tsv", "b": tmp_path / "b.jsonl", "not there": tmp_path / "c.tsv"})
+    assert found == [Benchmark("a", 4.0, 120.5), Benchmark("b", 0.25, None)]
+
+
+def test_interpolation_is_exact_at_the_stops_and_monotone_between():
+    run = small.run()
+    load, area = run["reduced_pressure"].values, run["contact_area_fraction"].values
+    np.testing.assert_allclose(interpolated(load, area, load, logarithmic=True), area, rtol=1e-12)
+    fine = interpolated(load, area, np.geomspace(load[0], load[-1], 200), logarithmic=True)
+    assert np.all(np.diff(fine) > 0)
+    np.testing.assert_allclose(
+        interpolated([1e-3, 1e-2, 1e-1], [2e-3, 2e-2, 2e-1], [3e-3, 5e-2], logarithmic=True), [6e-3, 0.1], rtol=1e-12
+    )
+    with pytest.raises(ValueError, match="outside"):
+        interpolated(load, area, [2 * load[-1]], logarithmic=True)
+
+
+def test_comparison_of_slopes_without_adhesion_shows_no_spread():
+    runs = [(labels, run) for labels, run in small.runs() if labels.material == "hertz"]
+    comparison = compare_runs(campaign_tree(runs)["slopes"].to_dataset())
+    # Stops differ between the slopes, so the curves agree to the interpolation's accuracy only ...
+    assert float(comparison["slope_spread"].max()) < 0.03
+    # ... but at the stops they share, the areas are the same.
+    first, second = (run for _, run in runs)
+    areas = [path_steps(run)["contact_area_fraction"].values for run in (first, second)]
+    np.testing.assert_allclose(areas[0], areas[1], rtol=1e-6)
+    assert float(comparison["slope_spread_at_load"].min()) > 1
+
+
+def test_comparison_can_be_kept(tmp_path):
+    for name in ("a.nc", "b.nc"):
+        write_dataset(compare_campaign(small.tree()), tmp_path / name)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+    single = read_campaign(tmp_path / "a.nc")["single"]
+    areas = single["contact_area_fraction"].values
+    np.testing.assert_allclose(single["area_mean"].values, areas.mean(axis=1))
+    np.testing.assert_allclose(single["area_deviation"].values, areas.std(axis=1))
+    assert float(single["material_spread"].max()) == 0
+
+
+def test_studies_without_a_common_load_are_compared_where_they_can_be(tmp_path):
+    labels, run = next((labels, run) for labels, run in small.runs() if labels.study == "slopes")
+    steep = run.isel(step=run["reduced_pressure"].values > 5e-3)
+    flat = small.run(rms_slope=0.2).isel(step=slice(0, steep.sizes["step"]))
+    keep = {"snapshot": slice(0, 0), "spot": slice(0, 0)}
+    tree = campaign_tree([(labels, steep.isel(keep)), (labels._replace(rms_slope=0.2), flat.isel(keep))])
+    comparison = compare_campaign(tree)
+    assert comparison["slopes"].sizes["relative_load"] == 0
+    write_dataset(comparison, tmp_path / "c.nc")
+    assert read_campaign(tmp_path / "c.nc")["slopes"].sizes["relative_load"] == 0

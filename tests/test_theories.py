@@ -1,0 +1,133 @@
+"""Theories against their own limits, against quadrature of the published formula, and against measured truth."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import icha
+from icha.records import write_dataset
+from icha.reference import reference_dataset, theories
+from icha.reference.literature import literature
+
+P = np.array([1e-6, 1e-4, 1e-2, 0.1, 0.5])
+
+
+def spectrum(rolloff=20e-6, short=1.5625e-6, hurst=0.8):
+    return icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=rolloff, short_wavelength=short, hurst=hurst)
+
+
+def test_small_pressures_give_the_linear_laws():
+    tiny = 1e-8
+    assert theories.persson_area(tiny) / tiny == pytest.approx(math.sqrt(8 / math.pi), rel=1e-9)
+    assert theories.PERSSON_SLOPE == pytest.approx(1.596, abs=5e-4)
+    assert theories.BUSH_GIBSON_THOMAS_SLOPE == pytest.approx(2.507, abs=5e-4)
+    np.testing.assert_allclose(theories.bush_gibson_thomas_area(P) / P, math.sqrt(2 * math.pi))
+
+
+def test_persson_area_grows_to_full_contact():
+    area = theories.persson_area(np.linspace(0, 4, 50))
+    assert area[0] == 0 and area[-1] == pytest.approx(1, abs=1e-12)
+    assert np.all(np.diff(area[:30]) > 0)
+
+
+@pytest.mark.parametrize("p", [0.01, 0.1, 0.5])
+def test_persson_pressures_carry_the_area_and_the_load(p):
+    area, _ = quad(lambda s: float(theories.persson_pressure_density(s, p)), 0, 10)
+    load, _ = quad(lambda s: s * float(theories.persson_pressure_density(s, p)), 0, 10)
+    assert area == pytest.approx(float(theories.persson_area(p)), rel=1e-9)
+    assert load == pytest.approx(p, rel=1e-9)
+    assert theories.persson_pressure_density(-0.1, p) == 0
+
+
+@pytest.mark.parametrize(("hurst", "p"), [(0.8, 1e-2), (0.5, 5e-2)])
+def test_mean_separation_is_the_published_double_integral(hurst, p):
+    q0, q1, gamma = 5.0, 40.0, theories.YANG_PERSSON_GAMMA
+
+    def psd(q):
+        return min(1.0, (q / q0) ** (-2 * (1 + hurst)))
+
+    def moment(n, q):
+        return quad(lambda k: k**n * psd(k), 1, q, points=[q0] if q > q0 else None)[0]
+
+    pressure = p * math.sqrt(2 * math.pi * moment(3, q1))
+
+    def inner(q):
+        w = (math.pi * moment(3, q)) ** -0.5
+        if w * pressure > 8:
+            return 0.0
+
+        def integrand(s):
+            t = w * math.exp(s)
+            return (gamma + 3 * (1 - gamma) * math.erf(t) ** 2) * math.exp(-(t**2))
+
+        return w * quad(integrand, math.log(pressure), math.log(8 / w), limit=200)[0]
+
+    def outer(x):  # q = 1 + x^2 takes out the singularity at q_L
+        return (1 + x * x) ** 2 * psd(1 + x * x) * inner(1 + x * x) * 2 * x
+
+    total = quad(outer, 1e-6, 2, epsrel=1e-6)[0] + quad(outer, 2, math.sqrt(q1 - 1), epsrel=1e-6)[0]
+    expected = math.sqrt(math.pi) * total / math.sqrt(2 * math.pi * moment(1, q1))
+    own = theories.persson_mean_separation(p, spectrum(short=100e-6 / q1, hurst=hurst))
+    assert float(own) == pytest.approx(expected, rel=1e-4)
+
+
+def test_mean_separation_is_near_boundary_elements():
+    # FFT boundary elements on one surface of this spectrum, contact resolved on 2048 x 2048 points.
+    p = np.array([1e-3, 3.16e-3, 1e-2, 3.16e-2, 0.1])
+    measured = np.array([2.51, 2.11, 1.62, 1.07, 0.52])
+    theory = theories.persson_mean_separation(p, spectrum())
+    # A finite surface has a highest summit, so the theory of the infinite one lies above at small loads.
+    assert np.all(theory > measured)
+    np.testing.assert_allclose(theory[2:], measured[2:], rtol=0.1)
+    np.testing.assert_allclose(theory[:2], measured[:2], rtol=0.2)
+
+
+def test_mean_separation_falls_logarithmically_at_small_loads():
+    p = np.geomspace(1e-7, 1e-5, 5)
+    steps = np.diff(theories.persson_mean_separation(p, spectrum()))
+    np.testing.assert_allclose(steps, steps[0], rtol=2e-2)
+    # p ~ exp(-u/u0) with u0 near 0.4-0.5 h_rms (Persson, Phys. Rev. Lett. 99 (2007) 125502).
+    assert -steps[0] / np.log(p[1] / p[0]) == pytest.approx(0.45, abs=0.1)
+
+
+def test_mean_separation_is_continuous_where_the_plateau_ends():
+    without = theories.persson_mean_separation(P, spectrum(rolloff=100e-6, hurst=1.0))
+    nearly = theories.persson_mean_separation(P, spectrum(rolloff=99.99e-6, hurst=0.9999))
+    np.testing.assert_allclose(without, nearly, rtol=2e-3)
+
+
+def test_pressure_must_be_positive():
+    with pytest.raises(ValueError, match="reduced_pressure"):
+        theories.persson_mean_separation([0.0, 0.1], spectrum())
+
+
+def test_literature_is_cited_and_consistent():
+    gfmd = literature("gfmd_area")
+    assert len(gfmd["reduced_pressure"]) == len(gfmd["area_fraction"]) == 5
+    for name in ("gfmd_area", "contact_mechanics_challenge"):
+        assert literature(name)["citation"] and literature(name)["doi"]
+    # Published simulations lie between Persson and Bush, Gibson & Thomas at small areas.
+    p, area = np.array(gfmd["reduced_pressure"][:3]), np.array(gfmd["area_fraction"][:3])
+    assert np.all(theories.persson_area(p) < area) and np.all(area < theories.bush_gibson_thomas_area(p))
+    with pytest.raises(ValueError, match="there are gfmd_area"):
+        literature("other")
+
+
+def test_challenge_reference_pressure_and_tabor_parameter():
+    cmc = literature("contact_mechanics_challenge")
+    assert cmc["reference_pressure_Pa"] == pytest.approx(0.01 * cmc["contact_modulus_Pa"] * cmc["rms_slope"])
+    length = cmc["surface_energy_J_m2"] / cmc["contact_modulus_Pa"]
+    mu = (length**2 * cmc["rms_curvature_radius_m"]) ** (1 / 3) / cmc["interaction_range_m"]
+    assert mu == pytest.approx(cmc["tabor_parameter"], rel=0.01)
+
+
+def test_reference_dataset_is_complete_and_byte_stable(tmp_path):
+    for name in ("a.nc", "b.nc"):
+        write_dataset(reference_dataset(spectrum()), tmp_path / name)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+    dataset = reference_dataset(spectrum())
+    assert float(dataset["bush_gibson_thomas_area_fraction"].max()) <= 0.1
+    assert all("references" in dataset[name].attrs for name in ("persson_area_fraction", "gfmd_area_fraction"))
+    assert "persson_reduced_separation" not in reference_dataset()
