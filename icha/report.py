@@ -1,7 +1,7 @@
 """The report of a campaign: one HTML page that needs nothing else, neither network nor other files.
 
-All of it follows from the campaign's data, except the run statistics: times and memory are measurements and differ
-from one execution to the next. They stand in a section of their own, and without benchmark files there is none.
+All of it follows from the campaign's data, so the same data give the same bytes. Times and memory are measurements
+that differ from one execution to the next: they stand in a table of their own, to which the page links.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def write_report(
     checks: Iterable[Check],
     comparison: xr.DataTree | None = None,
     surfaces: Iterable[xr.Dataset] = (),
-    benchmarks: Iterable[Benchmark] = (),
+    times_path: str | os.PathLike | None = None,
     configuration: str = "",
     dataset_path: str | os.PathLike | None = None,
     citations: Sequence[str] = (),
@@ -74,14 +74,13 @@ def write_report(
     checks : findings of `icha.checks.check_campaign`.
     comparison : `icha.aggregation.compare_campaign` of the campaign, if there is one.
     surfaces : surface files, for the parameters of their spectra.
-    benchmarks : what the jobs took.
+    times_path : the table of what the jobs took, to be linked.
     configuration : text of the configuration as used.
     dataset_path : the campaign dataset's file, to be linked.
     citations : further sources to cite, such as those of measurements.
     """
     folder = Path(path).parent
     checks = list(checks)
-    benchmarks = sorted(benchmarks, key=lambda each: each.job)
 
     def link(target):
         return Path(os.path.relpath(target, folder)).as_posix()
@@ -105,9 +104,7 @@ def write_report(
         checks=worst(checks),
         check_count=len(checks),
         failed=[check for check in checks if not check.passed],
-        benchmarks=benchmarks,
-        total_seconds=sum(each.seconds for each in benchmarks),
-        peak_megabytes=max((each.megabytes for each in benchmarks if each.megabytes is not None), default=None),
+        times=link(times_path) if times_path is not None else None,
         configuration=configuration,
         dataset=link(dataset_path) if dataset_path is not None else None,
         dataset_name=Path(dataset_path).name if dataset_path is not None else None,
@@ -199,6 +196,12 @@ def _run(labels: RunLabels, run):
         "period": quantity(float(run["period"]), "m"),
         "grid": int(run["grid"]),
         "residual": float(run["residual"].max()) if run.sizes["step"] else None,
+        "events": {
+            name: int(run[name].values[-1])
+            for name in ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count")
+            if run.sizes["step"]
+        },
+        "beyond_wu": float(run["outside_wu_fraction"].values[-1]) if run.sizes["step"] else None,
         "snapshots": snapshots,
     }
 

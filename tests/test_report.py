@@ -91,13 +91,11 @@ def test_failures_are_loud(write):
     assert "not finite" in write(checks=[not_finite])
 
 
-def test_same_bytes_twice_and_statistics_apart(write):
-    assert write("a.html") == write("b.html")
-    quick, slow = (write(benchmarks=[Benchmark("runs/a", seconds, 100.0)]) for seconds in (1.0, 2.0))
-    assert quick != slow
-    assert quick.split('<h2 id="statistics">')[0] == slow.split('<h2 id="statistics">')[0]
-    assert quick.split('<h2 id="data">')[1] == slow.split('<h2 id="data">')[1]
-    assert 'id="statistics"' not in write()
+def test_same_bytes_twice_and_times_only_linked(write, tmp_path):
+    text = write("a.html", times_path=tmp_path / "run_times.tsv")
+    assert text == write("b.html", times_path=tmp_path / "run_times.tsv")
+    assert "run_times.tsv" in Page(text).targets
+    assert "run_times.tsv" not in write()
 
 
 def test_incomplete_campaigns_are_reported(write):

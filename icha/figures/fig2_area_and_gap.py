@@ -54,10 +54,10 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     materials = [str(name) for name in dataset["material"].values]
     lines = list(dict.fromkeys((labels.surface, labels.rms_slope) for labels, _ in runs))
 
-    fig = new_figure(TWO_COLUMNS, 3.3)
+    fig = new_figure(TWO_COLUMNS, 3.3 + (0.1 * len(lines) * len(materials) if len(lines) * len(materials) > 3 else 0))
     left, right = fig.subplots(1, 2)
     pressures, areas, gaps = [], [], []
-    named = set()
+    named, shown = set(), set()
     for labels, run in runs:
         adhesive = float(run["surface_energy"]) > 0
         style = materials.index(labels.material)
@@ -66,8 +66,11 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
             marker = MARKERS[style % len(MARKERS)]
         key = (labels.material, labels.surface, labels.rms_slope)
         name = material_label(dataset, labels.material)
-        if len(lines) > 1:
-            name += rf", {labels.surface}, $h_{{\mathrm{{rms}}}}^{{\prime}}$ = {labels.rms_slope:g}"
+        # Only what differs within the study is named.
+        if len({surface for surface, _ in lines}) > 1:
+            name += f", {labels.surface}"
+        if len({slope for _, slope in lines}) > 1:
+            name += rf", $h_{{\mathrm{{rms}}}}^{{\prime}}$ = {labels.rms_slope:g}"
         look = {
             "ls": "none",
             "marker": marker,
@@ -80,6 +83,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
             "ms": 3.8 if adhesive else 5.6,
         }
         named.add(key)
+        shown.add(name)
         run = path_steps(run)
         p = run["reduced_pressure"].values
         left.loglog(p, run["contact_area_fraction"].values, **look)
@@ -106,8 +110,18 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         panel_label(ax, letter)
     left.set_ylabel(AREA_LABEL)
     right.set_ylabel(r"mean separation  $\bar{u}/h_{\mathrm{rms}}$")
-    left.legend(loc="lower right")
-    right.legend(loc="lower left")
+    if len(named) <= 3:
+        left.legend(loc="lower right")
+        right.legend(loc="lower left")
+    else:
+        # Too many for the panels: the runs go below, the references stay.
+        handles, names = left.get_legend_handles_labels()
+        runs_shown = [(handle, name) for handle, name in zip(handles, names, strict=True) if name in shown]
+        fig.legend(*zip(*runs_shown, strict=True), loc="outside lower center", ncols=2)
+        for ax, corner in ((left, "lower right"), (right, "lower left")):
+            others = [pair for pair in zip(*ax.get_legend_handles_labels(), strict=True) if pair[1] not in shown]
+            if others:
+                ax.legend(*zip(*others, strict=True), loc=corner)
     return fig
 
 
