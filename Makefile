@@ -34,6 +34,7 @@ environment: .venv/.installed
 	@touch $@
 
 run: environment
+	$(if $(CONFIG),@python -m icha.configuration $(CONFIG))
 	snakemake --cores $(CORES) $(if $(CONFIG),--configfile $(CONFIG))
 	@python workflow/scripts/show_results.py $(CONFIG)
 
@@ -52,7 +53,7 @@ format: environment
 	snakefmt Snakefile workflow
 
 schema: environment
-	python -m icha.configuration
+	python -m icha.configuration.schema
 
 clean:
 	rm -rf .snakemake

@@ -1,0 +1,74 @@
+# ICHA: adhesive rough contact by interacting and coalescing asperities.
+# One configuration file is one campaign: config/config.yaml, or that of --configfile. See config/README.md.
+
+from snakemake.utils import min_version
+
+min_version("9.9")
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/surfaces.smk"
+include: "workflow/rules/runs.smk"
+include: "workflow/rules/references.smk"
+include: "workflow/rules/dataset.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
+include: "workflow/rules/publish.smk"
+
+
+localrules:
+    all,
+    surfaces,
+    runs,
+    references,
+    dataset,
+    figures,
+    report,
+    publish,
+
+
+rule all:
+    default_target: True
+    input:
+        CONFIG_USED,
+        FIGURES,
+        DATASET,
+        CHECKS,
+        REPORT,
+
+
+rule surfaces:
+    input:
+        SURFACES,
+
+
+rule runs:
+    input:
+        RUNS,
+
+
+rule references:
+    input:
+        REFERENCES,
+
+
+rule dataset:
+    input:
+        DATASET,
+        COMPARISON,
+        CHECKS,
+
+
+rule figures:
+    input:
+        FIGURES,
+
+
+rule report:
+    input:
+        REPORT,
+
+
+rule publish:
+    input:
+        DEPOSIT,

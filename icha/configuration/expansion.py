@@ -1,0 +1,108 @@
+"""Studies written out into runs."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from dataclasses import dataclass
+
+from icha.configuration.model import Campaign, SelfAffineSurface
+
+
+@dataclass(frozen=True)
+class RunCase:
+    """One loading sweep: which topography, at which rms slope, against which material."""
+
+    study: str
+    surface: str
+    seed: int
+    rms_slope: float
+    material: str
+
+    @property
+    def slope_label(self) -> str:
+        """The rms slope as it stands in file names: the shortest text that reads back as the same number."""
+        return number_label(self.rms_slope)
+
+    @property
+    def path(self) -> str:
+        """Where the run's dataset stands among the runs, without the ending."""
+        return f"{self.study}/{self.surface}/seed{self.seed}/slope{self.slope_label}/{self.material}"
+
+
+def number_label(value: float) -> str:
+    """The shortest text that reads back as `value`: 0.2 is `0.2`, 1.0 is `1`."""
+    return repr(float(value)).removesuffix(".0")
+
+
+def run_cases(campaign: Campaign) -> list[RunCase]:
+    """All runs of a campaign, study by study, in the order of the configuration's lists."""
+    return [
+        RunCase(label, surface, seed, slope, material)
+        for label, study in campaign.studies.items()
+        for surface in study.surfaces
+        for seed, slope, material in itertools.product(
+            surface_seeds(campaign, label, surface), study.rms_slopes, study.materials
+        )
+    ]
+
+
+def surface_seeds(campaign: Campaign, study: str, surface: str) -> list[int]:
+    """Seeds of a surface in a study; a surface that is read from a file has one realisation, numbered 0."""
+    random = isinstance(campaign.surfaces[surface], SelfAffineSurface)
+    return campaign.studies[study].seeds if random else [0]
+
+
+def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
+    """The topographies of a campaign, as (surface, seed), each once though many runs share it."""
+    return list(dict.fromkeys((case.surface, case.seed) for case in run_cases(campaign)))
+
+
+def run_settings(campaign: Campaign, case: RunCase) -> dict:
+    """Everything that determines a run's numbers, in SI units: arguments of the model's own objects."""
+    study = campaign.studies[case.study]
+    targets = study.targets.model_dump(exclude_none=True)
+    snapshots = None if study.snapshots is None else [snapshot.target for snapshot in study.snapshots]
+    return {
+        "material": campaign.materials[case.material].model_dump(),
+        "path": targets | {"snapshots": snapshots, "max_step": study.max_step},
+        "rms_slope": case.rms_slope,
+        "seed": case.seed,
+    }
+
+
+def surface_settings(campaign: Campaign, name: str) -> dict:
+    """Everything that determines a topography but its seed and its file, in SI units."""
+    surface = campaign.surfaces[name]
+    if isinstance(surface, SelfAffineSurface):
+        return surface.model_dump()
+    return {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.metres_per_unit}
+
+
+def measurement_settings(campaign: Campaign, study: str) -> list[dict]:
+    """The measurements that belong to a study, as a figure needs them, but for their files."""
+    return [
+        {
+            "label": measurement.label,
+            "citation": measurement.citation,
+            "columns": measurement.columns,
+            "load_unit": _load_unit(campaign, measurement),
+            "material": measurement.material,
+            "rms_slope": measurement.rms_slope,
+        }
+        for measurement in campaign.measurements.values()
+        if measurement.study == study
+    ]
+
+
+def _load_unit(campaign, measurement) -> float:
+    """What a measured load is divided by to become p/(E* h'rms)."""
+    if not measurement.load_is_pressure:
+        return 1.0
+    return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
+
+
+def sha256_of(settings) -> str:
+    """Checksum of settings, whatever their order or the units that they were written in."""
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()

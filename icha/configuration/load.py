@@ -1,0 +1,237 @@
+"""From the text of a configuration file to a campaign, or to a list of everything that is wrong with it."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from icha.configuration.height_map import read_height_map
+from icha.configuration.measurement import read_columns
+from icha.configuration.model import NAME_PATTERN, Campaign, FileSurface
+
+
+class ConfigurationError(ValueError):
+    """A configuration that cannot be run; the message lists file, key, value and what is allowed, line by line."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A valid campaign and where it came from.
+
+    `text` is the merged configuration as its author wrote it, units included; `campaign` is what it means, in SI
+    units and with the paths of its files resolved.
+    """
+
+    campaign: Campaign
+    text: str
+
+
+def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | None = None) -> Configuration:
+    """Read and check a configuration file.
+
+    Parameters
+    ----------
+    path : YAML file.
+    overrides : values that replace those of the file, key by key, as given by `snakemake --config`.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming every key that is wrong.
+    """
+    path = Path(path)
+    from_file = read_yaml(path)
+    content = merged(from_file, overrides or {})
+
+    def fail(problems: Iterable[tuple[tuple, Any, str]]):
+        lines = [_line(_origin(path, from_file, overrides or {}, problem[0]), *problem) for problem in problems]
+        if lines:
+            raise ConfigurationError("\n".join(lines))
+
+    try:
+        campaign = Campaign.model_validate(content)
+    except ValidationError as error:
+        fail(_problem(details, content) for details in error.errors())
+    fail(campaign.problems())
+    campaign = campaign.with_files_beside(path.parent)
+    fail(_files_that_cannot_be_read(campaign))
+    return Configuration(campaign, yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110))
+
+
+def read_yaml(path: Path) -> dict:
+    """Read a YAML file that holds a mapping and no key twice.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file is missing, empty, not YAML, or holds anything else.
+    """
+    try:
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise ConfigurationError(f"{path}: {reason}; allowed: a readable YAML file") from None
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        what = getattr(error, "problem", None) or "not YAML"
+        raise ConfigurationError(f"{path}{where}: {what}; allowed: a YAML mapping with every key once") from None
+    if not isinstance(content, dict):
+        what = "empty" if content is None else f"a {type(content).__name__}"
+        raise ConfigurationError(f"{path}: the file is {what}; allowed: a YAML mapping of keys to values")
+    return content
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML in which a key that is given twice is an error, not the last one's secret win."""
+
+    def construct_mapping(self, node, deep=False):
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, str | int | float):
+                raise yaml.constructor.ConstructorError(None, None, "a key is no text", key_node.start_mark)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is given twice", key_node.start_mark)
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def merged(content: Mapping, overrides: Mapping) -> dict:
+    """`content` with the values of `overrides` in their places; lists are replaced whole."""
+    result = deepcopy(dict(content))
+    for key, value in overrides.items():
+        inside = result.get(key)
+        both = isinstance(inside, Mapping) and isinstance(value, Mapping)
+        result[key] = merged(inside, value) if both else deepcopy(value)
+    return result
+
+
+def _origin(path: Path, from_file: Mapping, overrides: Mapping, location: tuple) -> str:
+    """Who gave the value at `location`, or failed to give it: the file, or the command line's overrides."""
+
+    def holds(content, keys):
+        for key in keys:
+            if not isinstance(content, Mapping):
+                return True
+            if key not in content:
+                return False
+            content = content[key]
+        return True
+
+    given = bool(location) and holds(overrides, location)
+    return "--config" if given or not holds(from_file, location[:-1]) else str(path)
+
+
+def _line(origin: str, location: tuple, value: Any, reason: str) -> str:
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+    shown = "" if value is _NOTHING else f" {_short(value)}"
+    return f"{origin}: {key or 'top level'}:{shown} {reason}"
+
+
+_NOTHING = object()
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _problem(details: Mapping, content: Mapping) -> tuple[tuple, Any, str]:
+    """One error of pydantic as (location, value, reason and what is allowed), in this project's words."""
+    location = _without_tags(details["loc"], content)
+    value, kind, context = details["input"], details["type"], details.get("ctx", {})
+    if location[-1:] == ("[key]",):
+        location = location[:-1]
+    if kind == "value_error":
+        reason = str(context["error"])
+        # A model's own error concerns all its keys; the reason names them.
+        return location, _NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
+    if kind == "extra_forbidden":
+        allowed = sorted(set(_keys(location[:-1], content)))
+        near = difflib.get_close_matches(str(location[-1]), allowed, 1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        return location, _NOTHING, f"unknown key{hint}; allowed: {', '.join(allowed)}"
+    if kind == "missing":
+        section = _model(location[:-1], content)
+        field = section.model_fields.get(location[-1]) if section else None
+        return location, _NOTHING, f"the key is missing; needed: {field.description if field else 'a value'}"
+    if kind in ("union_tag_not_found", "union_tag_invalid"):
+        given = value.get("kind", _NOTHING) if isinstance(value, Mapping) else value
+        return (*location, "kind"), given, "is no kind of surface; allowed: self_affine, file"
+    if kind == "string_pattern_mismatch" and context.get("pattern") == NAME_PATTERN:
+        return location, value, "is not a name; allowed: lower-case letters, digits, '_' and '-'"
+    if kind in ("too_short", "string_too_short"):
+        return location, value, "is empty; allowed: at least one entry"
+    if kind == "literal_error":
+        return location, value, f"is not a choice; allowed: {context['expected']}"
+    wrong_type = {
+        "list_type": "is not a list; allowed: a list, such as [a, b]",
+        "dict_type": "is not a mapping; allowed: names with their sections",
+        "model_type": "is not a section; allowed: a mapping of keys to values",
+        "model_attributes_type": "is not a section; allowed: a mapping of keys to values",
+        "string_type": "is not text; allowed: text (in quotes if it looks like a number)",
+    }
+    return location, value, wrong_type.get(kind, f"{details['msg'].lower()}")
+
+
+def _without_tags(location: tuple, content: Any) -> tuple:
+    """The location without what pydantic adds to it: the kind of a surface (its section holds no such key)."""
+    if len(location) > 2 and location[0] == "surfaces" and location[2] in ("self_affine", "file"):
+        location = (*location[:2], *location[3:])
+    return location
+
+
+def _model(location: tuple, content: Any) -> type[BaseModel] | None:
+    """The model of the section at `location`."""
+    from icha.configuration import model
+
+    sections = {
+        "materials": model.Material,
+        "studies": model.Study,
+        "measurements": model.Measurement,
+        "authors": model.Author,
+    }
+    if not location:
+        return Campaign
+    if location[0] == "surfaces" and len(location) == 2:
+        kind = content["surfaces"][location[1]].get("kind")
+        return FileSurface if kind == "file" else model.SelfAffineSurface
+    if location == ("figures",):
+        return model.Figures
+    if len(location) == 2 and location[0] == "figures":
+        return get_args(model.Figures.model_fields[location[1]].annotation)[0]
+    if len(location) == 2:
+        return sections.get(location[0])
+    if location[0] == "studies":
+        return model.Targets if location[2] == "targets" else model.Snapshot
+    if location[0] == "figures":
+        return model.Snapshot
+    return model.Column if location[0] == "measurements" else None
+
+
+def _keys(location: tuple, content: Any) -> list[str]:
+    section = _model(location, content)
+    return list(section.model_fields) if section else []
+
+
+def _files_that_cannot_be_read(campaign: Campaign) -> Iterable[tuple[tuple, Any, str]]:
+    for name, surface in campaign.surfaces.items():
+        if isinstance(surface, FileSurface):
+            try:
+                read_height_map(surface.path, surface.metres_per_unit)
+            except ValueError as error:
+                yield ("surfaces", name, "path"), surface.path, str(error)
+    for name, measurement in campaign.measurements.items():
+        try:
+            read_columns(measurement.path, measurement.columns)
+        except ValueError as error:
+            yield ("measurements", name, "path"), measurement.path, str(error)

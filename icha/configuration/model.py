@@ -1,0 +1,548 @@
+"""What a campaign is: surfaces, materials, and the studies that press one against the other.
+
+Values are kept in SI units. The text of a configuration file becomes these objects in
+`icha.configuration.load`, which also words the errors; the JSON schema is generated from them.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path as FilePath
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
+
+from icha.configuration.units import PATTERN, PHYSICAL_NAMES, conversion_factor, to_number, to_si
+
+# What the model covers: beyond these the asperities have lost their identity. `icha.path` holds the same numbers
+# (a test compares them); importing it here would load the whole solver to read a configuration.
+MAX_REDUCED_PRESSURE = 0.15
+MAX_AREA_FRACTION = 0.4
+MAX_STEP = 0.5
+
+NAME_PATTERN = r"^[a-z0-9_-]+$"
+# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
+_ROUNDING = 1e-9
+
+
+def _quantity(si_unit, example, minimum=None):
+    """Type of a value that is written with its unit and kept as a float in `si_unit`."""
+    allowed = f"{PHYSICAL_NAMES[si_unit]} with its unit"
+    allowed += {None: ", greater than 0", 0: ", 0 or greater"}[minimum] + f", such as {example!r}"
+
+    def read(value: Any) -> float:
+        try:
+            result = to_si(value, si_unit)
+        except ValueError as error:
+            raise ValueError(f"{error}; allowed: {allowed}") from None
+        if result < 0 or (result == 0 and minimum is None):
+            raise ValueError(f"is too small; allowed: {allowed}")
+        return result
+
+    schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
+    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
+
+
+def _number(allowed, *, above=None, least=None, most=None):
+    """Type of a pure number within bounds; `1e-3`, which YAML takes for text, is one."""
+
+    def read(value: Any) -> float:
+        try:
+            result = to_number(value)
+        except ValueError as error:
+            raise ValueError(f"{error}; allowed: {allowed}") from None
+        if (
+            (above is not None and result <= above)
+            or (least is not None and result < least)
+            or (most is not None and result > most)
+        ):
+            raise ValueError(f"is out of range; allowed: {allowed}")
+        return result
+
+    bounds = {"exclusiveMinimum": above, "minimum": least, "maximum": most}
+    schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
+    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
+
+
+def _integer(least):
+    def read(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or value < least or value > 2**31 - 1:
+            raise ValueError(f"is not an integer of at least {least}; allowed: {least}, {least + 1}, …")
+        return value
+
+    schema = {"type": "integer", "minimum": least}
+    return Annotated[int, BeforeValidator(read), WithJsonSchema(schema)]
+
+
+def _distinct(values):
+    for index, value in enumerate(values):
+        if value in values[:index]:
+            raise ValueError(f"{value!r} is given twice; allowed: every entry once")
+    return values
+
+
+def _increasing(values):
+    for before, after in pairwise(values):
+        if not after > before:
+            raise ValueError(f"{after:g} comes after {before:g}; allowed: values in increasing order")
+    return values
+
+
+def _decreasing(values):
+    for before, after in pairwise(values):
+        if not after < before:
+            raise ValueError(f"{after:g} m comes after {before:g} m; allowed: values in decreasing order")
+    return values
+
+
+def _exactly_one(section):
+    given = sorted(name for name in section.model_fields_set if getattr(section, name) is not None)
+    if len(given) != 1:
+        names = ", ".join(type(section).model_fields)
+        raise ValueError(f"{' and '.join(given) or 'nothing'} is given; allowed: exactly one of {names}")
+    return section
+
+
+Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=80)]
+Text = Annotated[str, Field(strict=True, min_length=1)]
+Length = _quantity("m", "100 um")
+Modulus = _quantity("Pa", "25 MPa")
+SurfaceEnergy = _quantity("J/m^2", "50 mJ/m^2", minimum=0)
+ReducedPressure = _number(
+    f"a number in (0, {MAX_REDUCED_PRESSURE}], which the model covers", above=0, most=MAX_REDUCED_PRESSURE
+)
+AreaFraction = _number(f"a number in (0, {MAX_AREA_FRACTION}], which the model covers", above=0, most=MAX_AREA_FRACTION)
+Positive = _number("a number greater than 0", above=0)
+
+
+class Section(BaseModel):
+    """A part of the configuration: immutable, and without room for keys that nobody reads."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SelfAffineSurface(Section):
+    """A random periodic surface, self-affine with roll-off, made by spectral synthesis."""
+
+    kind: Literal["self_affine"] = Field(description="Surface made from a self-affine spectrum.")
+    period: Length = Field(description="Side L of the periodic cell.")
+    rolloff_wavelength: Length = Field(
+        description="Roll-off wavelength 2π/q0: the spectrum is flat for longer waves. At most the period."
+    )
+    short_wavelength: Length = Field(
+        description="Short cut-off 2π/q1: there are no shorter waves. Less than the roll-off wavelength; at least 2 "
+        "grid cells (an error below), better 4 (a warning below) or 8."
+    )
+    hurst: _number("a number in (0, 1]", above=0, most=1) = Field(description="Hurst exponent H, in (0, 1].")
+    grid: _integer(8) = Field(description="Grid points along a side.")
+    amplitudes: Literal["fixed", "gaussian"] = Field(
+        default="fixed",
+        description="Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and "
+        "slope, or `gaussian`, drawn at random about it.",
+    )
+
+    @property
+    def cells_per_short_wave(self) -> float:
+        """Grid cells per shortest wavelength."""
+        return self.grid * self.short_wavelength / self.period
+
+    @field_validator("rolloff_wavelength")
+    @classmethod
+    def _q0_not_below_ql(cls, value, info):
+        period = info.data.get("period")
+        if period is not None and value > period * (1 + _ROUNDING):
+            raise ValueError(f"is longer than the period (q0 < qL); allowed: at most {period:g} m")
+        return value
+
+    @field_validator("short_wavelength")
+    @classmethod
+    def _q1_above_q0(cls, value, info):
+        rolloff = info.data.get("rolloff_wavelength")
+        if rolloff is not None and value >= rolloff * (1 - _ROUNDING):
+            raise ValueError(
+                f"is not shorter than the roll-off wavelength (q1 <= q0); allowed: less than {rolloff:g} m"
+            )
+        return value
+
+    @field_validator("grid")
+    @classmethod
+    def _grid_holds_the_spectrum(cls, value, info):
+        period, short = info.data.get("period"), info.data.get("short_wavelength")
+        if period is None or short is None:
+            return value
+        if value * short / period < 2 * (1 - _ROUNDING):
+            least = math.ceil(2 * period / short * (1 - _ROUNDING))
+            raise ValueError(
+                f"gives {value * short / period:.3g} grid cells per shortest wavelength, 2 are the least; "
+                f"allowed: at least {least}, advisable: {2 * least} or more"
+            )
+        return value
+
+
+class FileSurface(Section):
+    """A periodic height map from a file, for example a surface that others have published."""
+
+    kind: Literal["file"] = Field(description="Surface read from a file.")
+    path: Text = Field(
+        description="File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a "
+        "variable `height`. Relative to the configuration file. Heights point towards the elastic body."
+    )
+    height_unit: Annotated[str, Field(strict=True)] = Field(
+        description="Unit of the heights in the file, such as `um`. All studies scale the heights to their rms slopes."
+    )
+    period: Length = Field(description="Side L of the periodic cell.")
+
+    @field_validator("height_unit")
+    @classmethod
+    def _is_a_length(cls, value):
+        try:
+            conversion_factor(value, "m")
+        except ValueError as error:
+            raise ValueError(f"{error}; allowed: a unit of length, such as 'um'") from None
+        return value
+
+    @property
+    def metres_per_unit(self) -> float:
+        """The unit of the heights, in m."""
+        return float(conversion_factor(self.height_unit, "m"))
+
+
+AnySurface = Annotated[SelfAffineSurface | FileSurface, Field(discriminator="kind")]
+
+
+class Material(Section):
+    """Elastic half-space and interface."""
+
+    contact_modulus: Modulus = Field(description="Composite elastic modulus E*.")
+    surface_energy: SurfaceEnergy = Field(description="Energy of adhesion Δγ per area; `0 J/m^2` is adhesionless.")
+    interaction_range: Length = Field(
+        description="Range of the attraction, which sets the separation at which asperities jump into contact."
+    )
+
+
+def _stops(kind, in_order):
+    return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
+
+
+class Targets(Section):
+    """The stops of the loading path: exactly one of the three lists."""
+
+    reduced_pressures: _stops(ReducedPressure, _increasing) | None = Field(
+        default=None, description=f"Reduced pressures p/(E* h'rms), increasing, up to {MAX_REDUCED_PRESSURE}."
+    )
+    area_fractions: _stops(AreaFraction, _increasing) | None = Field(
+        default=None, description=f"Contact area fractions A/A0, increasing, up to {MAX_AREA_FRACTION}."
+    )
+    mean_separations: _stops(Length, _decreasing) | None = Field(
+        default=None, description="Mean separations with their unit, decreasing."
+    )
+
+    _check = model_validator(mode="after")(_exactly_one)
+
+
+class Snapshot(Section):
+    """A state of which spots, gap and pressure distributions are kept: exactly one of the four keys."""
+
+    reduced_pressure: ReducedPressure | None = Field(default=None, description="At this p/(E* h'rms).")
+    relative_load: Positive | None = Field(
+        default=None, description="At this p/E* = F/(E* A0), the same load for surfaces of different slope."
+    )
+    area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
+    mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
+
+    _check = model_validator(mode="after")(_exactly_one)
+
+    @property
+    def target(self) -> tuple[str, float]:
+        """Kind and value (SI units) of the state."""
+        ((kind, value),) = self.model_dump(exclude_none=True).items()
+        return kind, value
+
+
+def _names(description):
+    return Annotated[list[Name], Field(min_length=1, description=description), AfterValidator(_distinct)]
+
+
+class Study(Section):
+    """Every surface, seed, slope and material of the lists, each with each, along one loading path."""
+
+    surfaces: _names("Names of surfaces.")
+    seeds: Annotated[list[_integer(0)], Field(min_length=1), AfterValidator(_distinct)] = Field(
+        default=[1], description="Seeds of the random phases. Surfaces read from a file have none and are used once."
+    )
+    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(_distinct)] = Field(
+        description="Rms slopes h'rms to which each topography's heights are scaled."
+    )
+    materials: _names("Names of materials.")
+    targets: Targets = Field(description="Stops of the loading path.")
+    snapshots: Annotated[list[Snapshot], AfterValidator(_distinct)] | None = Field(
+        default=None,
+        description="States of which spots and distributions are kept; each is hit exactly. Left out: the last target.",
+    )
+    max_step: _number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
+        default=0.1, description="Longest change of mean separation between two equilibria, in units of h_rms."
+    )
+
+    @field_validator("snapshots")
+    @classmethod
+    def _loads_are_covered(cls, snapshots, info):
+        for index, snapshot in enumerate(snapshots or []):
+            for slope in info.data.get("rms_slopes") or []:
+                if (snapshot.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
+                    most = MAX_REDUCED_PRESSURE * min(info.data["rms_slopes"])
+                    raise ValueError(
+                        f"entry {index}: relative load {snapshot.relative_load:g} at rms slope {slope:g} is a reduced "
+                        f"pressure of {snapshot.relative_load / slope:g}; allowed: relative loads up to {most:g}"
+                    )
+        return snapshots
+
+
+class Column(Section):
+    """A column of a table of measurements."""
+
+    column: Text = Field(description="Heading of the column.")
+    unit: Annotated[str, Field(strict=True)] = Field(
+        description="Unit of its numbers: `1` or `percent` for ratios, a unit of pressure for nominal pressures."
+    )
+
+
+class Measurement(Section):
+    """Measured contact areas, drawn over the figure of the study that they belong to."""
+
+    path: Text = Field(description="CSV file with a line of headings. Relative to the configuration file.")
+    label: Text = Field(description="What the legend calls it.")
+    citation: Text = Field(description="Where the numbers come from; printed in the report.")
+    study: Name = Field(description="Name of the study that it is compared with.")
+    load: Column = Field(
+        description="Load: reduced pressures p/(E* h'rms) (unit `1`) or nominal pressures (unit `kPa`, …), which need "
+        "material and rms_slope."
+    )
+    area: Column = Field(description="Contact area fraction A/A0 (unit `1` or `percent`).")
+    material: Name | None = Field(default=None, description="Material that was measured; a load in Pa needs it.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope that was measured; a load in Pa needs it.")
+
+    @field_validator("load")
+    @classmethod
+    def _load_is_ratio_or_pressure(cls, value):
+        for si_unit in ("1", "Pa"):
+            try:
+                conversion_factor(value.unit, si_unit)
+                return value
+            except ValueError:
+                pass
+        raise ValueError(f"unit {value.unit!r}; allowed: '1' or a unit of pressure, such as 'kPa'")
+
+    @field_validator("area")
+    @classmethod
+    def _area_is_ratio(cls, value):
+        try:
+            conversion_factor(value.unit, "1")
+        except ValueError as error:
+            raise ValueError(f"unit: {error}; allowed: '1' or 'percent'") from None
+        return value
+
+    @property
+    def load_is_pressure(self) -> bool:
+        """Whether the load column holds nominal pressures."""
+        try:
+            conversion_factor(self.load.unit, "1")
+        except ValueError:
+            return True
+        return False
+
+    @property
+    def columns(self) -> dict[str, float]:
+        """Headings of the columns of load and area, and the factors that turn them into SI units."""
+        load = conversion_factor(self.load.unit, "Pa" if self.load_is_pressure else "1")
+        area = conversion_factor(self.area.unit, "1")
+        return {self.load.column: float(load), self.area.column: float(area)}
+
+    @field_validator("area")
+    @classmethod
+    def _columns_differ(cls, value, info):
+        if "load" in info.data and info.data["load"].column == value.column:
+            raise ValueError(f"column {value.column!r} is the load's; allowed: another one")
+        return value
+
+    @model_validator(mode="after")
+    def _pressure_can_be_reduced(self):
+        if self.load_is_pressure and (self.material is None or self.rms_slope is None):
+            raise ValueError(
+                f"load in {self.load.unit!r} without material and rms_slope; allowed: both given, or loads of unit '1'"
+            )
+        return self
+
+
+class JKRFigure(Section):
+    """The force-approach curve of one asperity."""
+
+    tabor_parameter: Positive = Field(default=3.0, description="Tabor parameter, which sets the jump-in distance.")
+
+
+class StudyFigure(Section):
+    """A figure of all runs of a study."""
+
+    study: Name = Field(description="Name of the study that is drawn.")
+
+
+class SnapshotFigure(StudyFigure):
+    """A figure of one snapshot of a study."""
+
+    snapshot: Snapshot | None = Field(
+        default=None, description="Which of the study's snapshots. Left out: the first one."
+    )
+
+
+class MapFigure(SnapshotFigure):
+    """A figure of one snapshot of one run; what is left out is the study's first."""
+
+    surface: Name | None = Field(default=None, description="Surface that is shown.")
+    seed: _integer(0) | None = Field(default=None, description="Seed that is shown.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
+    material: Name | None = Field(
+        default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
+    )
+
+
+class SlopesFigure(StudyFigure):
+    """A figure of the spots of all slopes, at the same load and at the same area."""
+
+    surface: Name | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
+    seed: _integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+    material: Name | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
+
+
+class Figures(Section):
+    """The figures of the campaign; those that are left out are not drawn."""
+
+    fig1_jkr: JKRFigure | None = Field(default=None, description="Force and radius of one asperity against approach.")
+    fig2_area_and_gap: StudyFigure | None = Field(
+        default=None, description="Contact area and mean separation against load, with theories."
+    )
+    fig3_distributions: SnapshotFigure | None = Field(
+        default=None, description="Distributions of gap and pressure of every material, on the study's first surface."
+    )
+    fig4_contact_map: MapFigure | None = Field(default=None, description="Contact spots over the topography.")
+    fig5_multi_slope: StudyFigure | None = Field(
+        default=None, description="Contact area against load for all slopes and materials, with measurements."
+    )
+    fig6_spots_by_slope: SlopesFigure | None = Field(
+        default=None,
+        description="Contact spots of all slopes at the same load and at the same area. The study needs snapshots of "
+        "kinds relative_load and area_fraction.",
+    )
+
+    def drawn(self) -> dict[str, Section]:
+        """The figures that are drawn, by name."""
+        return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
+
+
+class Author(Section):
+    """A person who answers for the campaign."""
+
+    name: Text = Field(description="Full name.")
+    orcid: Annotated[str, Field(strict=True, pattern=r"^\d{4}-\d{4}-\d{4}-\d{3}[\dX]$")] | None = Field(
+        default=None, description="ORCID, such as `0000-0002-1825-0097`."
+    )
+    affiliation: Text | None = Field(default=None, description="Institution.")
+
+
+class Campaign(Section):
+    """A campaign: everything that one configuration file asks for."""
+
+    name: Name = Field(description="Name of the campaign; results go to `results/<name>/`.")
+    title: Text = Field(description="One line that says what the campaign is.")
+    summary: Text = Field(description="A few sentences for readers of the datasets and of the report.")
+    license: Text = Field(description="Licence of the data, as an SPDX identifier such as `CC-BY-4.0`.")
+    authors: list[Author] = Field(default=[], description="Authors of the data, for the deposit.")
+    surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)] = Field(
+        description="Surfaces by name: `kind: self_affine` or `kind: file`."
+    )
+    materials: Annotated[dict[Name, Material], Field(min_length=1)] = Field(description="Materials by name.")
+    studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
+    measurements: dict[Name, Measurement] = Field(
+        default={}, description="Measurements by name, overlaid on figure 5. None are shipped with ICHA."
+    )
+    figures: Figures = Field(default=Figures(), description="Figures and what they show.")
+
+    def problems(self) -> list[tuple[tuple, Any, str]]:
+        """Names that lead nowhere, as (location, value, what is allowed)."""
+        found = []
+
+        def known(location, name, names):
+            if name not in names:
+                found.append((location, name, f"is not defined; allowed: {', '.join(names)}"))
+
+        for label, study in self.studies.items():
+            for kind, names in (("surfaces", self.surfaces), ("materials", self.materials)):
+                for index, name in enumerate(getattr(study, kind)):
+                    known(("studies", label, kind, index), name, names)
+        for label, measurement in self.measurements.items():
+            known(("measurements", label, "study"), measurement.study, self.studies)
+            if measurement.material is not None:
+                known(("measurements", label, "material"), measurement.material, self.materials)
+        for label, figure in self.figures.drawn().items():
+            if not hasattr(figure, "study"):
+                continue
+            known(("figures", label, "study"), figure.study, self.studies)
+            if figure.study in self.studies:
+                found += self._figure_problems(("figures", label), figure, self.studies[figure.study])
+        return found
+
+    def _figure_problems(self, location, figure, study):
+        for key, there in (
+            ("surface", study.surfaces),
+            ("material", study.materials),
+            ("rms_slope", study.rms_slopes),
+        ):
+            value = getattr(figure, key, None)
+            if value is not None and value not in there:
+                allowed = ", ".join(map(str, there))
+                yield (*location, key), value, f"is not in study {figure.study!r}; allowed: {allowed}"
+        kinds = [snapshot.target[0] for snapshot in study.snapshots or []]
+        if isinstance(figure, SlopesFigure):
+            for kind in ("relative_load", "area_fraction"):
+                if kind not in kinds:
+                    reason = f"has no snapshot of kind {kind}; allowed: a study with one"
+                    yield (*location, "study"), figure.study, reason
+        snapshot = getattr(figure, "snapshot", None)
+        if snapshot is not None and snapshot not in (study.snapshots or []):
+            there = ", ".join(f"{kind} {value:g}" for kind, value in (s.target for s in study.snapshots or []))
+            kind, value = snapshot.target
+            yield (
+                (*location, "snapshot"),
+                f"{kind} {value:g}",
+                f"is no snapshot of study {figure.study!r}; allowed: {there or 'none, for the study names none'}",
+            )
+
+    def warnings(self) -> list[str]:
+        """What is allowed but not advisable."""
+        return [
+            f"surfaces.{name}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per shortest "
+            f"wavelength; 4 are the least advisable, 8 recommended"
+            for name, surface in self.surfaces.items()
+            if isinstance(surface, SelfAffineSurface) and surface.cells_per_short_wave < 4 * (1 - _ROUNDING)
+        ]
+
+    def with_files_beside(self, folder: FilePath) -> Campaign:
+        """The same campaign with the paths of its files taken relative to `folder`."""
+
+        def placed(section):
+            return section.model_copy(update={"path": str(folder / section.path)})
+
+        return self.model_copy(
+            update={
+                "surfaces": {n: placed(s) if isinstance(s, FileSurface) else s for n, s in self.surfaces.items()},
+                "measurements": {name: placed(m) for name, m in self.measurements.items()},
+            }
+        )

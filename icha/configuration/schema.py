@@ -1,0 +1,73 @@
+"""The JSON schema of configuration files and the tables of their keys, generated from the model.
+
+`python -m icha.configuration.schema` writes both where they belong.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from icha.configuration.model import Campaign
+
+SCHEMA = Path("workflow/schemas/config.schema.json")
+README = Path("config/README.md")
+MARK = "<!-- generated from the model: make schema -->\n"
+
+
+def json_schema() -> str:
+    """The schema, as editors use it to check and complete a configuration."""
+    schema = Campaign.model_json_schema()
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+def key_tables() -> str:
+    """Every key with its description and default, one Markdown table a section."""
+    schema = Campaign.model_json_schema()
+    sections = {"Campaign": schema} | schema["$defs"]
+    return "\n".join(_table(_HEADINGS[name], sections[name]) for name in _HEADINGS)
+
+
+_HEADINGS = {
+    "Campaign": "Top level",
+    "SelfAffineSurface": "`surfaces.<name>` with `kind: self_affine`",
+    "FileSurface": "`surfaces.<name>` with `kind: file`",
+    "Material": "`materials.<name>`",
+    "Study": "`studies.<name>`",
+    "Targets": "`studies.<name>.targets`",
+    "Snapshot": "`studies.<name>.snapshots`, each",
+    "Measurement": "`measurements.<name>`",
+    "Column": "`measurements.<name>.load` and `.area`",
+    "Figures": "`figures`",
+    "JKRFigure": "`figures.fig1_jkr`",
+    "StudyFigure": "`figures.fig2_area_and_gap`, `figures.fig5_multi_slope`",
+    "SnapshotFigure": "`figures.fig3_distributions`",
+    "MapFigure": "`figures.fig4_contact_map`",
+    "SlopesFigure": "`figures.fig6_spots_by_slope`",
+    "Author": "`authors`, each",
+}
+
+
+def _table(heading: str, section: dict) -> str:
+    required = section.get("required", [])
+    lines = [f"### {heading}", "", section.get("description", ""), "", "| key | default | meaning |", "|---|---|---|"]
+    for key, value in section["properties"].items():
+        if key in required:
+            default = "needed"
+        elif value.get("default") is None:
+            default = "none"
+        else:
+            default = f"`{json.dumps(value['default'])}`"
+        lines.append(f"| `{key}` | {default} | {value['description']} |")
+    return "\n".join([*lines, ""])
+
+
+def readme_with_tables(text: str) -> str:
+    """`text` with all that follows the mark replaced by the tables."""
+    return text.split(MARK)[0] + MARK + "\n" + key_tables()
+
+
+if __name__ == "__main__":
+    SCHEMA.write_text(json_schema(), encoding="utf-8")
+    README.write_text(readme_with_tables(README.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,104 @@
+"""Quantities as people write them, `25 MPa` or `50 mJ/m^2`, turned into floats in SI units."""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+from functools import cache, lru_cache
+
+# A number as people write it. PyYAML hands `1.0e6` and `1e-3` over as text, so text must be accepted.
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
+_UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*")
+
+# The quantities of a configuration, by the SI unit in which the model gets them.
+PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "1": "ratio"}
+
+PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
+
+
+@cache
+def _registry():
+    # Imported late and kept: building the registry takes longer than reading a whole configuration.
+    # Decimals keep `100 um` exactly 1e-4 m, whatever way it is written.
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
+@lru_cache(maxsize=1024)
+def conversion_factor(unit: str, si_unit: str) -> Decimal:
+    """Exact factor from `unit` to `si_unit`.
+
+    Raises
+    ------
+    ValueError
+        If `unit` is no unit that pint knows, or one of another dimension.
+    """
+    import pint
+
+    if unit == si_unit == "1":
+        return Decimal(1)
+    registry = _registry()
+    if not _UNIT.fullmatch(unit):
+        raise ValueError(f"{unit!r} is not a unit")
+    try:
+        quantity = registry.Quantity(Decimal(1), registry.parse_units(unit))
+        return quantity.to("" if si_unit == "1" else si_unit).magnitude
+    except pint.UndefinedUnitError:
+        raise ValueError(f"{unit!r} is not a known unit") from None
+    except pint.DimensionalityError:
+        raise ValueError(f"{unit!r} is not a unit of {PHYSICAL_NAMES[si_unit]}") from None
+    except Exception:  # pint raises a dozen kinds of errors for text that is not a unit
+        raise ValueError(f"{unit!r} is not a unit") from None
+
+
+def to_si(value, si_unit: str) -> float:
+    """Read a quantity with its unit, such as `25 MPa`, as a float in `si_unit`.
+
+    Raises
+    ------
+    ValueError
+        If the unit is missing, unknown or of another dimension, or the value is not a finite number.
+    """
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise ValueError("is not a number with a unit")
+    if not isinstance(value, str):
+        raise ValueError("the unit is missing")
+    match = _QUANTITY.fullmatch(value)
+    if not match:
+        raise ValueError("is not a number with a unit")
+    magnitude, unit = match.groups()
+    if not unit:
+        raise ValueError("the unit is missing")
+    return finite(Decimal(magnitude) * conversion_factor(unit, si_unit))
+
+
+def to_number(value) -> float:
+    """Read a plain number; text such as `1e-3`, which YAML does not take for a number, is one.
+
+    Raises
+    ------
+    ValueError
+        If it is not a finite number, or has a unit.
+    """
+    if isinstance(value, str):
+        if not re.fullmatch(rf"\s*{_NUMBER}\s*", value):
+            what = "is a pure number and takes no unit" if _QUANTITY.fullmatch(value) else "is not a number"
+            raise ValueError(what)
+        return finite(Decimal(value.strip()))
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError("is not a number")
+    return finite(value)
+
+
+def finite(value) -> float:
+    """Return `value` as a float; raise ValueError unless it is finite."""
+    try:
+        value = float(value)
+    except OverflowError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise ValueError("is not finite")
+    return value

@@ -1,0 +1,427 @@
+"""Configuration files: what they mean, and that every mistake is named before anything runs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from icha.configuration import model
+from icha.configuration.expansion import (
+    measurement_settings,
+    number_label,
+    run_cases,
+    run_settings,
+    sha256_of,
+    surface_cases,
+    surface_settings,
+)
+from icha.configuration.load import ConfigurationError, load_configuration
+from icha.configuration.schema import json_schema, readme_with_tables
+from icha.configuration.units import to_number, to_si
+
+REPOSITORY = Path(__file__).parents[1]
+SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])
+
+GOOD = """
+name: demo
+title: A title
+summary: A summary
+license: CC-BY-4.0
+surfaces:
+  rough:
+    kind: self_affine
+    period: 100 um
+    rolloff_wavelength: 20 um
+    short_wavelength: 10 um
+    hurst: 0.8
+    grid: 80
+materials:
+  soft:
+    contact_modulus: 25 MPa
+    surface_energy: 50 mJ/m^2
+    interaction_range: 2.071 nm
+studies:
+  one:
+    surfaces: [rough]
+    seeds: [1, 2]
+    rms_slopes: [0.2, 1.0]
+    materials: [soft]
+    targets:
+      reduced_pressures: [1e-3, 0.01]
+    snapshots:
+      - area_fraction: 0.02
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Load GOOD with values changed at dotted keys (`None` as a value deletes the key)."""
+
+    def loaded(changes=None, overrides=None, text=GOOD):
+        content = yaml.safe_load(text)
+        for key, value in (changes or {}).items():
+            *path, last = key.split(".")
+            inside = content
+            for part in path:
+                inside = inside[int(part) if isinstance(inside, list) else part]
+            if value is None:
+                del inside[last]
+            else:
+                inside[int(last) if isinstance(inside, list) else last] = value
+        file = tmp_path / "campaign.yaml"
+        file.write_text(yaml.safe_dump(content, sort_keys=False))
+        return load_configuration(file, overrides)
+
+    return loaded
+
+
+def test_quantities_are_exact_si_values():
+    assert to_si("100 um", "m") == 1e-4
+    assert to_si("100 µm", "m") == 1e-4
+    assert to_si("0.1 mm", "m") == 1e-4
+    assert to_si("25MPa", "Pa") == 25e6
+    assert to_si("1.0e6 Pa", "Pa") == 1e6
+    assert to_si("50 mJ/m^2", "J/m^2") == to_si("50 mN/m", "J/m^2") == 0.05
+    assert to_si("2.071 nm", "m") == 2.071e-9
+
+
+def test_numbers_that_yaml_reads_as_text_are_numbers():
+    assert yaml.safe_load("1e-3") == "1e-3"
+    assert to_number("1e-3") == 1e-3
+    assert to_number("1.0e6") == 1e6
+    assert to_number(3) == 3.0
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_campaigns_are_valid(path):
+    campaign = load_configuration(path).campaign
+    assert run_cases(campaign)
+    assert not campaign.warnings()
+    assert path.name == "config.yaml" or campaign.name == path.stem
+
+
+def test_the_papers_campaign():
+    campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
+    assert campaign.name == "paper"
+    cases = run_cases(campaign)
+    assert len(cases) == 2 + 9
+    assert len({case.path for case in cases}) == 11
+    assert surface_cases(campaign) == [("challenge", 1), ("mcghee", 1)]
+    challenge, mcghee = campaign.surfaces["challenge"], campaign.surfaces["mcghee"]
+    assert mcghee.period == 1000 * challenge.period == 0.1
+    assert challenge.cells_per_short_wave == pytest.approx(8)
+    ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][2:]
+    assert ratios == pytest.approx([8.333e-9, 4.0e-9, 1.905e-9], rel=1e-3)
+
+
+def test_a_study_is_a_product_of_its_lists(load):
+    campaign = load().campaign
+    assert [case.path for case in run_cases(campaign)] == [
+        "one/rough/seed1/slope0.2/soft",
+        "one/rough/seed1/slope1/soft",
+        "one/rough/seed2/slope0.2/soft",
+        "one/rough/seed2/slope1/soft",
+    ]
+    settings = run_settings(campaign, run_cases(campaign)[0])
+    assert settings["material"] == {"contact_modulus": 25e6, "surface_energy": 0.05, "interaction_range": 2.071e-9}
+    assert settings["path"] == {
+        "reduced_pressures": [1e-3, 0.01],
+        "snapshots": [("area_fraction", 0.02)],
+        "max_step": 0.1,
+    }
+
+
+def test_settings_depend_on_values_not_on_how_they_are_written(load):
+    def checksum(campaign):
+        return sha256_of([run_settings(campaign, run_cases(campaign)[0]), surface_settings(campaign, "rough")])
+
+    first = checksum(load().campaign)
+    assert checksum(load({"materials.soft.contact_modulus": "25000 kPa", "title": "Other"}).campaign) == first
+    assert checksum(load({"materials.soft.contact_modulus": "26 MPa"}).campaign) != first
+
+
+@pytest.mark.parametrize("value", [0.1, 0.1 + 0.2, 1.0, 1e-5, 12.5, 100.0])
+def test_slopes_in_paths_read_back(value):
+    assert float(number_label(value)) == value
+    assert "/" not in number_label(value) and " " not in number_label(value)
+
+
+def test_campaigns_are_immutable(load):
+    with pytest.raises(ValueError, match="frozen"):
+        load().campaign.materials["soft"].contact_modulus = 1.0
+
+
+BAD = {
+    # key, value, what the message must say of it
+    "unknown key": ("materials.soft.modulus", "25 MPa", "materials.soft.modulus: unknown key"),
+    "unknown key at the top": ("titel", "x", "titel: unknown key (did you mean 'title'?)"),
+    "unknown key of a surface": ("surfaces.rough.hrust", 0.8, "surfaces.rough.hrust: unknown key"),
+    "missing key": ("materials.soft.surface_energy", None, "materials.soft.surface_energy: the key is missing"),
+    "missing unit": ("materials.soft.contact_modulus", 25e6, "the unit is missing; allowed: pressure with its unit"),
+    "missing unit in text": ("surfaces.rough.period", "100", "surfaces.rough.period: '100' the unit is missing"),
+    "unknown unit": ("surfaces.rough.period", "100 umm", "'umm' is not a known unit"),
+    "wrong dimension": ("materials.soft.surface_energy", "50 mJ/m^3", "is not a unit of energy per area"),
+    "unit on a number": ("surfaces.rough.hurst", "0.8 m", "is a pure number and takes no unit"),
+    "negative modulus": ("materials.soft.contact_modulus", "-25 MPa", "'-25 MPa' is too small"),
+    "zero modulus": ("materials.soft.contact_modulus", "0 MPa", "greater than 0"),
+    "negative surface energy": ("materials.soft.surface_energy", "-1 mJ/m^2", "0 or greater"),
+    "zero range": ("materials.soft.interaction_range", "0 nm", "greater than 0"),
+    "infinite length": ("surfaces.rough.period", "1e999 m", "is not finite"),
+    "not a number of metres": ("surfaces.rough.period", "nan m", "is not a number with a unit"),
+    "boolean quantity": ("surfaces.rough.period", True, "is not a number with a unit"),
+    "Hurst exponent 0": ("surfaces.rough.hurst", 0, "(0, 1]"),
+    "Hurst exponent above 1": ("surfaces.rough.hurst", 1.2, "surfaces.rough.hurst: 1.2 is out of range"),
+    "boolean Hurst exponent": ("surfaces.rough.hurst", True, "surfaces.rough.hurst: True is not a number"),
+    "NaN": ("surfaces.rough.hurst", float("nan"), "is not finite"),
+    "cut-off below two cells": ("surfaces.rough.grid", 19, "1.9 grid cells per shortest wavelength"),
+    "grid is no integer": ("surfaces.rough.grid", 80.0, "is not an integer"),
+    "boolean grid": ("surfaces.rough.grid", True, "is not an integer"),
+    "q0 below qL": ("surfaces.rough.rolloff_wavelength", "101 um", "longer than the period (q0 < qL)"),
+    "q1 at q0": ("surfaces.rough.short_wavelength", "20 um", "not shorter than the roll-off wavelength (q1 <= q0)"),
+    "unknown kind of surface": ("surfaces.rough.kind", "fractal", "allowed: self_affine, file"),
+    "unknown amplitudes": ("surfaces.rough.amplitudes", "random", "'fixed' or 'gaussian'"),
+    "no surfaces": ("surfaces", {}, "surfaces: {} is empty"),
+    "surfaces no mapping": ("surfaces", [1], "is not a mapping"),
+    "section no mapping": ("surfaces.rough", 3, "surfaces.rough"),
+    "empty list of materials": ("studies.one.materials", [], "studies.one.materials: [] is empty"),
+    "empty list of seeds": ("studies.one.seeds", [], "is empty"),
+    "empty list of targets": ("studies.one.targets", {"area_fractions": []}, "is empty"),
+    "name of the campaign": ("name", "My Campaign", "is not a name; allowed: lower-case letters, digits"),
+    "name of a material": ("materials.Soft", {}, "materials.Soft: 'Soft' is not a name"),
+    "number as a name": ("name", 7, "name: 7 is not text"),
+    "material twice": ("studies.one.materials", ["soft", "soft"], "'soft' is given twice"),
+    "seed twice": ("studies.one.seeds", [1, 1], "1 is given twice"),
+    "slope twice": ("studies.one.rms_slopes", [1.0, "1e0"], "1.0 is given twice"),
+    "snapshot twice": ("studies.one.snapshots", [{"area_fraction": 0.02}, {"area_fraction": "2e-2"}], "given twice"),
+    "unknown surface": ("studies.one.surfaces", ["rouhg"], "'rouhg' is not defined; allowed: rough"),
+    "unknown material": ("studies.one.materials", ["hard"], "'hard' is not defined; allowed: soft"),
+    "negative seed": ("studies.one.seeds", [-1], "studies.one.seeds[0]: -1 is not an integer of at least 0"),
+    "zero slope": ("studies.one.rms_slopes", [0], "studies.one.rms_slopes[0]: 0 is out of range"),
+    "infinite slope": ("studies.one.rms_slopes", [float("inf")], "is not finite"),
+    "list that is none": ("studies.one.seeds", 1, "is not a list"),
+    "no targets": ("studies.one.targets", {}, "nothing is given; allowed: exactly one"),
+    "two lists of targets": (
+        "studies.one.targets",
+        {"area_fractions": [0.1], "reduced_pressures": [0.1]},
+        "area_fractions and reduced_pressures is given; allowed: exactly one",
+    ),
+    "pressures not increasing": ("studies.one.targets.reduced_pressures", [0.01, 0.01], "in increasing order"),
+    "areas not increasing": ("studies.one.targets", {"area_fractions": [0.1, 0.05]}, "0.05 comes after 0.1"),
+    "separations not decreasing": (
+        "studies.one.targets",
+        {"mean_separations": ["1 um", "2 um"]},
+        "in decreasing order",
+    ),
+    "separation without unit": ("studies.one.targets", {"mean_separations": [1e-6]}, "the unit is missing"),
+    "negative separation": ("studies.one.targets", {"mean_separations": ["-1 um"]}, "greater than 0"),
+    "pressure beyond the model": ("studies.one.targets.reduced_pressures", [0.3], "(0, 0.15], which the model covers"),
+    "area beyond the model": ("studies.one.targets", {"area_fractions": [0.5]}, "(0, 0.4], which the model covers"),
+    "zero target": ("studies.one.targets.reduced_pressures", [0, 0.1], "is out of range"),
+    "unknown snapshot": ("studies.one.snapshots", [{"area": 0.1}], "studies.one.snapshots[0].area: unknown key"),
+    "snapshot of two kinds": (
+        "studies.one.snapshots",
+        [{"area_fraction": 0.1, "relative_load": 0.1}],
+        "exactly one of reduced_pressure, relative_load",
+    ),
+    "load beyond the model": ("studies.one.snapshots", [{"relative_load": 0.1}], "a reduced pressure of 0.5"),
+    "step too long": ("studies.one.max_step", 0.6, "(0, 0.5]"),
+    "figure of no study": ("figures", {"fig2_area_and_gap": {"study": "two"}}, "'two' is not defined; allowed: one"),
+    "unknown figure": ("figures", {"fig7": {}}, "figures.fig7: unknown key"),
+    "figure without its snapshots": (
+        "figures",
+        {"fig6_spots_by_slope": {"study": "one"}},
+        "has no snapshot of kind relative_load",
+    ),
+    "figure of another snapshot": (
+        "figures",
+        {"fig3_distributions": {"study": "one", "snapshot": {"area_fraction": 0.1}}},
+        "'area_fraction 0.1' is no snapshot of study 'one'; allowed: area_fraction 0.02",
+    ),
+    "missing surface file": (
+        "surfaces.rough",
+        {"kind": "file", "path": "none.npy", "height_unit": "um", "period": "1 mm"},
+        "no such file",
+    ),
+    "height unit": (
+        "surfaces.rough",
+        {"kind": "file", "path": "none.npy", "height_unit": "kg", "period": "1 mm"},
+        "allowed: a unit of length",
+    ),
+    "ORCID": ("authors", [{"name": "A", "orcid": "1"}], "authors[0].orcid"),
+}
+
+
+@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
+def test_mistakes_are_named(case, load, tmp_path):
+    key, value, message = BAD[case]
+    with pytest.raises(ConfigurationError) as error:
+        load({key: value})
+    lines = str(error.value).splitlines()
+    assert any(message in line and line.startswith(f"{tmp_path}/campaign.yaml: ") for line in lines), lines
+    assert all("allowed: " in line or "needed: " in line or case == "ORCID" for line in lines), lines
+
+
+def test_all_mistakes_are_named_at_once(load):
+    with pytest.raises(ConfigurationError) as error:
+        load({"name": "A B", "surfaces.rough.hurst": 2, "materials.soft.surface_energy": "1 m", "extra": 1})
+    assert len(str(error.value).splitlines()) == 4
+
+
+def test_overrides_are_checked_and_named(load, tmp_path):
+    assert load(overrides={"surfaces": {"rough": {"hurst": 0.5}}}).campaign.surfaces["rough"].hurst == 0.5
+    with pytest.raises(ConfigurationError) as error:
+        load({"title": 1}, overrides={"surfaces": {"rough": {"hurst": 5}}})
+    assert sorted(line.split(": ")[0] for line in str(error.value).splitlines()) == [
+        "--config",
+        f"{tmp_path}/campaign.yaml",
+    ]
+
+
+def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
+    configuration = load(overrides={"surfaces": {"rough": {"hurst": 0.5}}})
+    again = tmp_path / "used.yaml"
+    again.write_text(configuration.text)
+    assert load_configuration(again) == configuration
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "the file is empty"),
+        (b"- 1\n", "the file is a list"),
+        (b"a: [1\n", "allowed: a YAML mapping"),
+        (b"a: 1\nb: 1\na: 2\n", "line 3: key 'a' is given twice"),
+        (b"m:\n  x: {k: 1, k: 2}\n", "line 2: key 'k' is given twice"),
+        (b"\xff\xfe\x00", "not a text file"),
+        (b"a: !!python/object:os.system {}\n", "allowed: a YAML mapping"),
+    ],
+)
+def test_files_that_are_no_configuration(content, message, tmp_path):
+    file = tmp_path / "campaign.yaml"
+    file.write_bytes(content)
+    with pytest.raises(ConfigurationError, match=message) as error:
+        load_configuration(file)
+    assert str(error.value).startswith(str(file))
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(ConfigurationError, match="No such file"):
+        load_configuration(tmp_path / "none.yaml")
+
+
+def test_few_cells_are_a_warning(load):
+    assert not load().campaign.warnings()
+    (warning,) = load({"surfaces.rough.grid": 30}).campaign.warnings()
+    assert "surfaces.rough.grid: 30 gives 3 grid cells" in warning
+    assert load({"surfaces.rough.grid": 20}).campaign.warnings()
+
+
+def _file_surface(path):
+    return {"kind": "file", "path": str(path), "height_unit": "um", "period": "1 mm"}
+
+
+@pytest.mark.parametrize(
+    ("heights", "message"),
+    [
+        (np.full((16, 16), np.nan), "256 of 256 heights that are not finite"),
+        (np.where(np.eye(16) > 0, np.inf, 1.0), "16 of 256 heights that are not finite"),
+        (np.ones((16, 15)), r"shape \(16, 15\)"),
+        (np.ones((16, 16, 2)), r"shape \(16, 16, 2\)"),
+        (np.ones((4, 4)), r"shape \(4, 4\)"),
+        (np.ones((16, 16)), "all the same"),
+        (np.full((16, 16), "a"), "not real numbers"),
+    ],
+)
+def test_surface_files_are_read_before_anything_runs(heights, message, load, tmp_path):
+    np.save(tmp_path / "heights.npy", heights)
+    with pytest.raises(ConfigurationError, match=f"surfaces.rough.path: .*{message}"):
+        load({"surfaces.rough": _file_surface("heights.npy")})
+
+
+def test_damaged_surface_files(load, tmp_path):
+    for name in ("heights.npy", "heights.nc", "heights.txt"):
+        (tmp_path / name).write_bytes(b"nothing of the kind")
+        with pytest.raises(ConfigurationError, match="cannot be read"):
+            load({"surfaces.rough": _file_surface(name)})
+
+
+def test_a_surface_file_is_one_realisation_beside_the_configuration(load, tmp_path):
+    np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
+    campaign = load({"surfaces.rough": _file_surface("heights.npy")}).campaign
+    assert surface_cases(campaign) == [("rough", 0)]
+    assert campaign.surfaces["rough"].path == str(tmp_path / "heights.npy")
+    assert surface_settings(campaign, "rough") == {"kind": "file", "period": 1e-3, "metres_per_unit": 1e-6}
+
+
+def _measurement(**changes):
+    return {
+        "path": "points.csv",
+        "label": "measured",
+        "citation": "someone",
+        "study": "one",
+        "load": {"column": "p", "unit": "kPa"},
+        "area": {"column": "a", "unit": "percent"},
+        "material": "soft",
+        "rms_slope": 0.5,
+    } | changes
+
+
+def test_measurements(load, tmp_path):
+    (tmp_path / "points.csv").write_text("p, a\n10, 1\n20, 2.5\n")
+    campaign = load({"measurements": {"lab": _measurement()}}).campaign
+    (settings,) = measurement_settings(campaign, "one")
+    assert settings["columns"] == {"p": 1e3, "a": 0.01}
+    assert settings["load_unit"] == 25e6 * 0.5
+
+
+@pytest.mark.parametrize(
+    ("table", "changes", "message"),
+    [
+        ("p,a\n", {}, "holds no values"),
+        ("p,b\n1,2\n", {}, "has no column 'a'; allowed: p, b"),
+        ("p,a\n1,2\n3,x\n", {}, "column 'a', row 2: 'x'"),
+        ("p,a\n1,nan\n", {}, "numbers greater than 0"),
+        ("p,a\n1,-2\n", {}, "numbers greater than 0"),
+        ("p,a\n1,2\n", {"path": "none.csv"}, "cannot be read"),
+        ("p,a\n1,2\n", {"study": "two"}, "'two' is not defined"),
+        ("p,a\n1,2\n", {"material": "hard"}, "'hard' is not defined"),
+        ("p,a\n1,2\n", {"rms_slope": None}, "without material and rms_slope"),
+        ("p,a\n1,2\n", {"load": {"column": "p", "unit": "kg"}}, "a unit of pressure"),
+        ("p,a\n1,2\n", {"area": {"column": "a", "unit": "m"}}, "allowed: '1' or 'percent'"),
+        ("p,a\n1,2\n", {"area": {"column": "p", "unit": "1"}}, "allowed: another one"),
+    ],
+)
+def test_measurements_that_cannot_be_drawn(table, changes, message, load, tmp_path):
+    (tmp_path / "points.csv").write_text(table)
+    with pytest.raises(ConfigurationError, match=r"measurements\.lab") as error:
+        load({"measurements": {"lab": _measurement(**changes)}})
+    assert message in str(error.value)
+
+
+def test_limits_are_those_of_the_path():
+    from icha import path
+
+    assert model.MAX_REDUCED_PRESSURE == path.MAX_REDUCED_PRESSURE
+    assert model.MAX_AREA_FRACTION == path.MAX_AREA_FRACTION
+    with pytest.raises(ValueError, match="max_step"):
+        path.Path([0.1], max_step=model.MAX_STEP * 1.01)
+    assert path.Path([0.1], max_step=model.MAX_STEP).max_step == model.MAX_STEP
+
+
+def test_schema_and_tables_are_those_of_the_model():
+    advice = "out of date: run `make schema`"
+    assert (REPOSITORY / "workflow/schemas/config.schema.json").read_text(encoding="utf-8") == json_schema(), advice
+    readme = (REPOSITORY / "config/README.md").read_text(encoding="utf-8")
+    assert readme == readme_with_tables(readme), advice
+
+
+def test_every_key_is_described():
+    def sections(kind):
+        yield kind
+        for child in kind.__subclasses__():
+            yield from sections(child)
+
+    for section in sections(model.Section):
+        for key, field in section.model_fields.items():
+            assert field.description, f"{section.__name__}.{key}"

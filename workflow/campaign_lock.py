@@ -1,0 +1,32 @@
+"""One run of a campaign at a time in a working directory.
+
+Snakemake's own lock is a file, which stays behind when the program is killed; every later call then asks for an
+`--unlock` that nobody dares to give. This lock belongs to the process and ends with it, however it ends.
+"""
+
+import fcntl
+import os
+from pathlib import Path
+
+_held = []
+
+
+def hold_lock(path: str) -> None:
+    """Hold the lock `path` until this process ends; end it now, with a message, if another one holds it."""
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    # Opened so that starting jobs do not inherit it: what they leave behind must not keep the lock.
+    file = open(path, "a+", encoding="ascii")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.seek(0)
+        other = file.read().strip()
+        raise SystemExit(
+            f"Process {other} is running this campaign in this directory; wait for it to end, or end it first."
+        ) from None
+    except OSError:
+        return  # a file system without locks: nothing to hold
+    file.truncate(0)
+    file.write(f"{os.getpid()}\n")
+    file.flush()
+    _held.append(file)

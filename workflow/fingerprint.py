@@ -1,0 +1,134 @@
+"""Fingerprints of code: what a job computes depends on its script and on the modules that the script imports.
+
+Snakemake's own trigger looks at the time stamp of the script, and at nothing behind it. A fingerprint is taken
+from the syntax trees, so comments, docstrings, formatting, touched files and fresh clones change nothing, and an
+edit of a module changes exactly the jobs that use it.
+"""
+
+import ast
+import hashlib
+import importlib.util
+from functools import cache
+from pathlib import Path
+
+PACKAGE = "icha"
+
+
+def code_fingerprint(script: str | Path, *modules: str) -> str:
+    """Fingerprint of a script, of what it imports from the package or from beside itself, and so on.
+
+    `modules` are those that the script imports by a name it is told only when it runs. Packages on the way to a
+    module are not part of it; data files are, if they lie beside a module whose text names them.
+    """
+    found: dict[Path, None] = {}
+    pending = [Path(script), *(_module_file(name) for name in modules)]
+    while pending:
+        file = pending.pop()
+        if file not in found:
+            found[file] = None
+            pending += _imports(file)
+    digest = hashlib.sha256()
+    for name in sorted(_name(file) for file in found):
+        digest.update(name.encode())
+    for file in sorted(found, key=_name):
+        digest.update(_digest(file))
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _package_folder() -> Path:
+    # The package that jobs will import, wherever it is installed.
+    return Path(importlib.util.find_spec(PACKAGE).submodule_search_locations[0])
+
+
+def _name(file: Path) -> str:
+    folder = _package_folder()
+    return str(file.relative_to(folder.parent)) if file.is_relative_to(folder) else file.name
+
+
+@cache
+def _tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_bytes(), file.name)
+
+
+@cache
+def _digest(file: Path) -> bytes:
+    digest = hashlib.sha256(repr(_canonical(_tree(file))).encode())
+    for data in _data_files(file):
+        digest.update(data.name.encode() + hashlib.sha256(data.read_bytes()).digest())
+    return digest.digest()
+
+
+def _canonical(node):
+    """A syntax tree without positions, docstrings and empty fields (which differ between versions of Python)."""
+    if isinstance(node, ast.AST):
+        fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
+        if ast.get_docstring(node, clean=False) is not None if isinstance(node, _DOCUMENTED) else False:
+            fields = ((name, value[1:] if name == "body" else value) for name, value in fields)
+        return type(node).__name__, *((name, _canonical(value)) for name, value in fields if name != "kind")
+    if isinstance(node, list):
+        return [_canonical(item) for item in node]
+    return repr(node)
+
+
+_DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@cache
+def _imports(file: Path) -> list[Path]:
+    files = []
+    for node in ast.walk(_tree(file)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                files.append(_resolve(file, alias.name, None))
+        elif isinstance(node, ast.ImportFrom):
+            module = _absolute(file, node)
+            files += [_resolve(file, module, alias.name) for alias in node.names]
+    return sorted({found for found in files if found is not None})
+
+
+def _absolute(file: Path, node: ast.ImportFrom) -> str:
+    if not node.level:
+        return node.module
+    package = file.relative_to(_package_folder().parent).parts[: -node.level]
+    return ".".join([*package, *([node.module] if node.module else [])])
+
+
+def _resolve(file: Path, module: str, name: str | None) -> Path | None:
+    if module.split(".")[0] != PACKAGE:
+        beside = file.parent / f"{module}.py"
+        return beside if beside.is_file() and not file.is_relative_to(_package_folder()) else None
+    if name is not None:
+        submodule = _module_file(f"{module}.{name}", missing_ok=True)
+        if submodule is not None:
+            return submodule
+    if module == PACKAGE:
+        if name in ("__version__", None):
+            return None
+        raise ValueError(f"{file}: import {name!r} from the module that defines it, so that changes there are seen")
+    return _module_file(module)
+
+
+def _module_file(name: str, missing_ok: bool = False) -> Path | None:
+    place = _package_folder().joinpath(*name.split(".")[1:])
+    for file in (place.with_suffix(".py"), place / "__init__.py"):
+        if file.is_file():
+            return file
+    if missing_ok:
+        return None
+    raise ValueError(f"no module {name!r} in {_package_folder()}")
+
+
+def _data_files(file: Path) -> list[Path]:
+    """Files in the module's folder that its text names by their path from there, or by that of their folder."""
+    found = set()
+    for node in ast.walk(_tree(file)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and 0 < len(node.value) < 80:
+            if not all(c.isalnum() or c in "._-/" for c in node.value):
+                continue
+            place = file.parent / node.value
+            if place.is_file() and place.suffix != ".py":
+                found.add(place)
+            elif place.is_dir() and place.parent == file.parent and not node.value.startswith((".", "_")):
+                found |= {data for data in place.iterdir() if data.is_file() and data.suffix not in (".py", ".pyc")}
+    return sorted(found)

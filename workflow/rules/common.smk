@@ -1,0 +1,123 @@
+# What all rules share: the campaign, the names of its results, and the fingerprints of the code.
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(workflow.basedir, "workflow")))
+
+from campaign_lock import hold_lock
+from command_line import campaign_configuration
+from fingerprint import code_fingerprint
+
+from icha.configuration.expansion import (
+    measurement_settings,
+    run_cases,
+    run_settings,
+    sha256_of,
+    surface_cases,
+    surface_settings,
+)
+
+CONFIGURATION = campaign_configuration(workflow)
+CAMPAIGN = CONFIGURATION.campaign
+CASES = {f"{case.path}.nc": case for case in run_cases(CAMPAIGN)}
+LABELS = [(case.study, case.surface, case.seed, case.rms_slope, case.material) for case in CASES.values()]
+
+RESULTS = f"results/{CAMPAIGN.name}"
+LOGS = f"{RESULTS}/logs"
+BENCHMARKS = f"{RESULTS}/benchmarks"
+CONFIG_USED = f"{RESULTS}/config.used.yaml"
+SURFACES = [f"{RESULTS}/surfaces/{name}/seed{seed}.nc" for name, seed in surface_cases(CAMPAIGN)]
+RUNS = [f"{RESULTS}/runs/{path}" for path in CASES]
+REFERENCES = [f"{RESULTS}/references/{name}.nc" for name in dict.fromkeys(name for name, _ in surface_cases(CAMPAIGN))]
+DATASET = f"{RESULTS}/dataset/{CAMPAIGN.name}.nc"
+COMPARISON = f"{RESULTS}/aggregated/{CAMPAIGN.name}.nc"
+CHECKS = f"{RESULTS}/checks.json"
+FIGURES = [f"{RESULTS}/figures/{name}.{ending}" for name in CAMPAIGN.figures.drawn() for ending in ("png", "pdf")]
+REPORT = f"{RESULTS}/report.html"
+RUN_TIMES = f"{RESULTS}/run_times.tsv"
+DEPOSIT = f"{RESULTS}/publish/SHA256SUMS"
+
+# Attributes of every dataset of the campaign.
+ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": CAMPAIGN.license}
+
+
+wildcard_constraints:
+    name="[a-z0-9_-]+",
+    study="[a-z0-9_-]+",
+    surface="[a-z0-9_-]+",
+    seed=r"\d+",
+    slope=r"[0-9.e+-]+",
+    material="[a-z0-9_-]+",
+
+
+def code_of(script, *modules):
+    """Fingerprint of a script of workflow/scripts and of what it imports, as a parameter of its rule."""
+    return code_fingerprint(Path(workflow.basedir, "workflow/scripts", script), *modules)
+
+
+def height_map(wildcards):
+    """The file of a surface of `kind: file`."""
+    surface = CAMPAIGN.surfaces[wildcards.surface]
+    return {"height_map": surface.path} if surface.kind == "file" else {}
+
+
+def memory_of(surface):
+    """Megabytes that a surface and its sweeps need: some arrays of its size, and the program."""
+    points = getattr(CAMPAIGN.surfaces[surface], "grid", 2048) ** 2
+    return 600 + 20 * 8 * points // 10**6
+
+
+def case_of(wildcards):
+    return CASES["{study}/{surface}/seed{seed}/slope{slope}/{material}.nc".format(**wildcards)]
+
+
+def settings_of(wildcards):
+    return run_settings(CAMPAIGN, case_of(wildcards))
+
+
+def figure_data(name):
+    """Files that a figure needs besides the campaign dataset, by the names of its arguments."""
+    options = CAMPAIGN.figures.drawn()[name]
+    if name == "fig1_jkr":
+        return {}
+    data = {"campaign": DATASET}
+    study = CAMPAIGN.studies[options.study]
+    if name == "fig2_area_and_gap":
+        data["references"] = f"{RESULTS}/references/{study.surfaces[0]}.nc"
+    if name == "fig4_contact_map":
+        case = next(
+            case
+            for case in CASES.values()
+            if case.study == options.study
+            and options.surface in (None, case.surface)
+            and options.seed in (None, case.seed)
+        )
+        data["surface"] = f"{RESULTS}/surfaces/{case.surface}/seed{case.seed}.nc"
+    if name == "fig5_multi_slope":
+        files = [m.path for m in CAMPAIGN.measurements.values() if m.study == options.study]
+        if files:
+            data["measurements"] = files
+    return data
+
+
+def figure_options(name):
+    """Arguments of a figure other than data."""
+    options = CAMPAIGN.figures.drawn()[name].model_dump(exclude={"snapshot"}, exclude_none=True)
+    snapshot = getattr(CAMPAIGN.figures.drawn()[name], "snapshot", None)
+    if snapshot is not None:
+        options["kind"], options["target"] = snapshot.target
+    if name == "fig4_contact_map" and "surface" in options:
+        options["surface_name"] = options.pop("surface")
+    return options
+
+
+def measurements_of(name):
+    """What is to be known of the measurements that are laid over a figure; their files are its input."""
+    if name != "fig5_multi_slope":
+        return []
+    return measurement_settings(CAMPAIGN, CAMPAIGN.figures.drawn()[name].study)
+
+
+onstart:
+    hold_lock(f".snakemake/{CAMPAIGN.name}.lock")

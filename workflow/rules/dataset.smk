@@ -1,0 +1,99 @@
+# config.used.yaml: what was asked for; dataset/<campaign>.nc: all runs in one file, a group per study; aggregated/<campaign>.nc: the runs of every
+# study at common loads; checks.json: what every result must satisfy.
+
+
+rule configuration:
+    output:
+        CONFIG_USED,
+    log:
+        f"{LOGS}/configuration.log",
+    benchmark:
+        f"{BENCHMARKS}/configuration.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=200,
+        runtime=2,
+    params:
+        text=CONFIGURATION.text,
+        code=code_of("write_configuration.py"),
+    message:
+        "Writing the configuration as used"
+    script:
+        "../scripts/write_configuration.py"
+
+
+rule campaign_dataset:
+    input:
+        runs=RUNS,
+        configuration=CONFIG_USED,
+    output:
+        DATASET,
+    log:
+        f"{LOGS}/dataset.log",
+    benchmark:
+        f"{BENCHMARKS}/dataset.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        labels=LABELS,
+        size=len(RUNS),
+        attributes=ATTRIBUTES | {"title": CAMPAIGN.title, "summary": CAMPAIGN.summary},
+        code=code_of("make_dataset.py"),
+    message:
+        "Campaign dataset of {params.size} runs"
+    script:
+        "../scripts/make_dataset.py"
+
+
+rule comparison:
+    input:
+        DATASET,
+    output:
+        COMPARISON,
+    log:
+        f"{LOGS}/aggregated.log",
+    benchmark:
+        f"{BENCHMARKS}/aggregated.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        attributes=ATTRIBUTES,
+        code=code_of("compare_runs.py"),
+    message:
+        "Comparison of the runs"
+    script:
+        "../scripts/compare_runs.py"
+
+
+rule checks:
+    input:
+        DATASET,
+    output:
+        CHECKS,
+    log:
+        f"{LOGS}/checks.log",
+    benchmark:
+        f"{BENCHMARKS}/checks.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        labels=LABELS,
+        code=code_of("check_results.py"),
+    message:
+        "Checks of the results"
+    script:
+        "../scripts/check_results.py"

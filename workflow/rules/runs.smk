@@ -1,0 +1,31 @@
+# runs/<study>/<surface>/seed<k>/slope<g>/<material>.nc: one loading sweep each.
+
+
+rule run:
+    input:
+        surface=f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+    output:
+        f"{RESULTS}/runs/{{study}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.nc",
+    log:
+        f"{LOGS}/runs/{{study}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.log",
+    benchmark:
+        f"{BENCHMARKS}/runs/{{study}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=lambda wildcards: memory_of(wildcards.surface),
+        runtime=240,
+    params:
+        settings=settings_of,
+        attributes=lambda wildcards: ATTRIBUTES
+        | {
+            "study": wildcards.study,
+            "config_sha256": sha256_of([settings_of(wildcards), surface_settings(CAMPAIGN, wildcards.surface)]),
+        },
+        code=code_of("run_sweep.py"),
+    message:
+        "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
+        "{wildcards.material}"
+    script:
+        "../scripts/run_sweep.py"

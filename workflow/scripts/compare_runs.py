@@ -1,0 +1,16 @@
+"""Compare the runs of every study at common loads."""
+
+from job import logged
+
+from icha.aggregation import compare_campaign
+from icha.records import read_campaign, write_dataset
+
+
+def compare_runs(dataset, output, *, attributes):
+    """Write the comparison of the campaign dataset to `output`."""
+    write_dataset(compare_campaign(read_campaign(dataset), attrs=attributes), output)
+
+
+if "snakemake" in globals():
+    with logged(snakemake.log[0]):
+        compare_runs(snakemake.input[0], snakemake.output[0], attributes=snakemake.params.attributes)

@@ -1,0 +1,45 @@
+"""Draw one figure from the campaign dataset."""
+
+import importlib
+
+from job import logged
+
+from icha.configuration.measurement import read_columns
+from icha.figures.style import save
+from icha.records import read_campaign, read_dataset
+
+READERS = {"campaign": read_campaign, "references": read_dataset, "surface": read_dataset}
+
+
+def draw_figure(name, png, pdf, *, data, options, measurements=()):
+    """Draw the figure of the module `icha.figures.<name>` and write it to `png` and `pdf`.
+
+    `data` are the files of its arguments, `measurements` pairs of a file and what is to be known of it.
+    """
+    module = importlib.import_module(f"icha.figures.{name}")
+    arguments = {argument: READERS[argument](path) for argument, path in data.items()}
+    if measurements:
+        options = options | {"measurements": [_measured(module.MeasuredAreas, *pair) for pair in measurements]}
+    save(module.figure(**arguments, **options), png, pdf)
+
+
+def _measured(kind, file, settings):
+    load, area = read_columns(file, settings["columns"])
+    known = {key: settings[key] for key in ("label", "citation", "material", "rms_slope")}
+    return kind(reduced_pressure=load / settings["load_unit"], area_fraction=area, **known)
+
+
+if "snakemake" in globals():
+    with logged(snakemake.log[0]):
+        inputs = dict(snakemake.input.items())
+        measured = inputs.pop("measurements", [])
+        draw_figure(
+            snakemake.wildcards.name,
+            snakemake.output.png,
+            snakemake.output.pdf,
+            data=inputs,
+            options=snakemake.params.options,
+            measurements=list(
+                zip([measured] if isinstance(measured, str) else measured, snakemake.params.measurements, strict=True)
+            ),
+        )

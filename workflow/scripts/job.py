@@ -1,0 +1,32 @@
+"""What the scripts of all jobs share: where they write what they have to say, and how they fail."""
+
+import os
+import sys
+import traceback
+from contextlib import contextmanager
+
+
+@contextmanager
+def logged(log):
+    """Send all output to the file `log`; an error ends the job with its message there.
+
+    The errors that users can mend say all in their message. The traceback of any other one is for the developers
+    and is kept beside the log.
+    """
+    with open(log, "w", encoding="utf-8", buffering=1) as file:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+        try:
+            yield
+        except Exception as error:
+            # Not imported before it is needed: most jobs do without the solver.
+            simulation = sys.modules.get("icha.simulation")
+            expected = (ValueError, OSError, *([simulation.ConvergenceError] if simulation else []))
+            print(f"Error: {error}" if isinstance(error, expected) else f"Error: {error!r}, which was not expected")
+            if not isinstance(error, expected):
+                with open(f"{log}.traceback", "w", encoding="utf-8") as details:
+                    traceback.print_exc(file=details)
+                print(f"Details for the developers: {log}.traceback")
+            sys.exit(1)

@@ -1,0 +1,33 @@
+"""Make a topography, by spectral synthesis or from a file, and write it at rms slope 1."""
+
+from job import logged
+
+from icha.configuration.height_map import read_height_map
+from icha.records import write_surface
+from icha.spectrum import SelfAffineSpectrum
+from icha.surface import Surface
+
+SPECTRUM = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
+
+
+def make_surface(output, *, name, seed, settings, height_map=None, attributes):
+    """Write the surface `name` to `output`; `settings` are those of the configuration, in SI units."""
+    spectrum = None
+    if settings["kind"] == "self_affine":
+        spectrum = SelfAffineSpectrum(**{key: settings[key] for key in SPECTRUM})
+        surface = spectrum.realise(settings["grid"], seed, amplitudes=settings["amplitudes"])
+    else:
+        surface = Surface(read_height_map(height_map, settings["metres_per_unit"]), settings["period"])
+    write_surface(output, surface.scaled_to_rms_slope(1.0), name=name, seed=seed, spectrum=spectrum, attrs=attributes)
+
+
+if "snakemake" in globals():
+    with logged(snakemake.log[0]):
+        make_surface(
+            snakemake.output[0],
+            name=snakemake.wildcards.surface,
+            seed=int(snakemake.wildcards.seed),
+            settings=snakemake.params.settings,
+            height_map=snakemake.input.get("height_map"),
+            attributes=snakemake.params.attributes,
+        )

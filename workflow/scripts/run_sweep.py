@@ -1,0 +1,26 @@
+"""Press one surface against one material along a loading path."""
+
+from job import logged
+
+from icha.material import Material
+from icha.path import Path
+from icha.records import read_surface, write_dataset
+from icha.simulation import simulate
+
+
+def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, progress):
+    """Load the surface of the file `surface`, scaled to `rms_slope`, and write the run dataset to `output`."""
+    scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
+    dataset = simulate(scaled, Material(**material), Path(**path), seed=seed, progress=progress)
+    write_dataset(dataset.assign_attrs(attributes), output)
+
+
+if "snakemake" in globals():
+    with logged(snakemake.log[0]):
+        run_sweep(
+            snakemake.input.surface,
+            snakemake.output[0],
+            **snakemake.params.settings,
+            attributes=snakemake.params.attributes,
+            progress=lambda line: print(line, flush=True),
+        )
