@@ -178,7 +178,7 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
     checks = []
 
     def none_of(name, count, description, subject):
-        checks.append(Check(name, float(count), 0.0, count == 0, description, subject))
+        checks.append(Check(name, float(count), 0.0, bool(count == 0), description, subject))
 
     wanted = None if expected is None else {str(RunLabels(*labels)) for labels in expected}
     present = run_labels(tree)

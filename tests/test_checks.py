@@ -98,7 +98,7 @@ def test_worst_prefers_failures_and_then_large_values():
 
 
 def test_findings_can_be_kept(tmp_path):
-    checks = check_run(small.run(), "a run")
+    checks = check_campaign(small.tree())
     write_checks(checks, tmp_path / "checks.json")
     assert read_checks(tmp_path / "checks.json") == checks
     first = (tmp_path / "checks.json").read_bytes()
