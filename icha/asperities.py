@@ -7,12 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.ndimage
 from scipy.interpolate import NdBSpline
+from scipy.spatial import cKDTree
 
 from icha.surface import Surface
 
 # A quintic spline reproduces a parabola exactly, depends on far nodes only weakly (0.43 per cell), and at eight
 # cells per wavelength has the second derivatives of a sine to 4e-4.
 _DEGREE = 5
+# Value, slope and curvature of the quintic spline at a node, from the coefficients of the five nodes around.
+_VALUE = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120
+_SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24
+_CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6
+
+_MAX_NEWTON_STEPS = 30
+# In cells: the last step of a converged search, how far from its node it may end, and when two ends are the same.
+_CONVERGED = 1e-9
+_FARTHEST = 1.5
+_SAME_SUMMIT = 1e-3
+# Less curvature than this part of the surface's mean is rounding on a plateau.
+_FLAT = 1e-6
+# Rows of the grid examined at a time, which bounds the memory.
+_ROWS = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,93 +50,102 @@ class Asperities:
         return len(self.height)
 
 
-def grid_summits(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes not lower than their eight periodic neighbours, as (row, column) indices in row-major order.
+def find_summits(surface: Surface) -> Asperities:
+    """All summits of a surface: the maxima, with negative-definite curvature, of a quintic spline through its nodes.
 
-    Of equal neighbours only the first in row-major order counts, so that a summit half-way between two nodes is
-    found once.
-    """
-    summit = np.ones(heights.shape, dtype=bool)
-    for axis_shift in ((-1, -1), (-1, 0), (-1, 1), (0, -1)):
-        summit &= heights > np.roll(heights, tuple(-s for s in axis_shift), axis=(0, 1))
-        summit &= heights >= np.roll(heights, axis_shift, axis=(0, 1))
-    return np.nonzero(summit)
-
-
-def find_summits(surface: Surface, newton_steps: int = 12) -> Asperities:
-    """All summits of a surface, refined within their own grid cell.
-
-    A summit is a node not lower than its eight periodic neighbours. Its position is moved by Newton's method on a
-    quintic spline through the nodes; near-degenerate curvatures would throw it far away, so that it never leaves
-    its own cell, and a move that does not raise the height is taken back. Summits without a negative-definite
-    curvature are dropped.
+    Comparing every node with its neighbours misses and misplaces elongated summits: on a crest oblique to the grid
+    the highest node can lie cells away from the summit, or there is none, and the contact area then depends on the
+    grid by some per cent. Instead Newton's method starts from every node whose own parabola has its top in a cell
+    next to it, and only a start that converges nearby counts, since near-degenerate curvatures throw the others far
+    away.
 
     Returns
     -------
-    Asperities, ordered as their nodes are.
+    Asperities, ordered as the nodes from which they were found.
 
     Raises
     ------
     ValueError
         If the surface has no summit with negative-definite curvature.
     """
-    spacing = surface.spacing
-    row, column = grid_summits(surface.heights)
-    node = np.stack([row, column], axis=1).astype(float)
-    spline = _periodic_spline(surface.heights)
+    grid, spacing = surface.grid, surface.spacing
+    coefficients = scipy.ndimage.spline_filter(surface.heights, order=_DEGREE, output=np.float64, mode="grid-wrap")
+    node, flat = _nodes_near_summits(coefficients)
+    spline = _periodic_spline(coefficients)
 
-    def derivatives(at):
-        gradient = np.stack([spline(at, nu=(1, 0)), spline(at, nu=(0, 1))], axis=1)
-        hessian = np.stack([spline(at, nu=nu) for nu in ((2, 0), (1, 1), (0, 2))], axis=1)
-        return gradient, hessian
-
-    at = node.copy()
-    for _ in range(newton_steps):
-        gradient, (hyy, hyx, hxx) = _unpack(derivatives(at))
-        determinant = hyy * hxx - hyx**2
-        concave = (determinant > 0) & (hyy + hxx < 0)
-        safe = np.where(concave, determinant, 1.0)
-        step = (
-            np.stack(
-                [hxx * gradient[:, 0] - hyx * gradient[:, 1], hyy * gradient[:, 1] - hyx * gradient[:, 0]],
-                axis=1,
-            )
-            / -safe[:, None]
-        )
-        step[~concave] = 0.0
-        moved = np.clip(at + step, node - 0.5, node + 0.5)
-        if np.array_equal(moved, at):
-            break
-        at = moved
-    # Where a clipped step went downhill, the node itself is the better summit.
-    lower = spline(at) < spline(node)
-    at[lower] = node[lower]
-
-    _, (hyy, hyx, hxx) = _unpack(derivatives(at))
-    determinant = hyy * hxx - hyx**2
-    concave = (determinant > 0) & (hyy + hxx < 0)
-    if not concave.any():
+    at, converged = node.copy(), np.zeros(len(node), dtype=bool)
+    moving = np.arange(len(node))
+    for _ in range(_MAX_NEWTON_STEPS):
+        here = np.mod(at[moving], grid)
+        gradient = [spline(here, nu=nu) for nu in ((1, 0), (0, 1))]
+        concave, _, step = _newton_step(*gradient, *_hessian(spline, here), flat)
+        at[moving] += np.clip(step, -0.5, 0.5)
+        near = concave & (np.max(np.abs(at[moving] - node[moving]), axis=1) <= _FARTHEST)
+        small = np.max(np.abs(step), axis=1) <= _CONVERGED
+        converged[moving] = near & small
+        moving = moving[near & ~small]
+    at = np.mod(at[converged], grid)
+    at[at >= grid] = 0.0
+    # Several nodes lead to one summit: the first stands for it.
+    twice = np.sort(cKDTree(at, boxsize=grid).query_pairs(_SAME_SUMMIT, output_type="ndarray"), axis=1)
+    at = np.delete(at, twice[:, 1], axis=0)
+    hyy, hyx, hxx = _hessian(spline, at)
+    curvature = hyy * hxx - hyx**2
+    if not len(at):
         raise ValueError("heights: the surface has no summit with negative-definite curvature")
-    at = at[concave]
-    position = np.mod(at[:, ::-1] * spacing, surface.period)
+    position = at[:, ::-1] * spacing
     position[position >= surface.period] = 0.0
     return Asperities(
         position=position,
         height=spline(at),
-        radius=spacing**2 / np.sqrt(determinant[concave]),
+        radius=spacing**2 / np.sqrt(curvature),
         period=surface.period,
     )
 
 
-def _unpack(derivatives):
-    gradient, hessian = derivatives
-    return gradient, hessian.T
+def _nodes_near_summits(coefficients):
+    """Nodes (k, 2) from which Newton's step to a maximum is at most a cell, and the curvature that counts as flat.
+
+    Curvatures are in metres per squared cell.
+    """
+    grid = len(coefficients)
+    found, trace = [], 0.0
+    for first in range(0, grid, _ROWS):
+        rows = np.arange(first, min(first + _ROWS, grid))
+        block = coefficients[np.arange(rows[0] - 2, rows[-1] + 3) % grid]
+
+        def derivative(along_y, along_x, block=block):
+            partial = scipy.ndimage.correlate1d(block, along_y, axis=0)[2:-2]
+            return scipy.ndimage.correlate1d(partial, along_x, axis=1, mode="wrap")
+
+        hessian = derivative(_CURVATURE, _VALUE), derivative(_SLOPE, _SLOPE), derivative(_VALUE, _CURVATURE)
+        concave, determinant, step = _newton_step(derivative(_SLOPE, _VALUE), derivative(_VALUE, _SLOPE), *hessian, 0.0)
+        trace += float(np.sum(np.abs(hessian[0] + hessian[2])))
+        close = np.argwhere(concave & (np.max(np.abs(step), axis=-1) <= 1))
+        found.append(np.column_stack([close + np.array([first, 0]), determinant[tuple(close.T)]]))
+    found = np.concatenate(found)
+    flat = _FLAT * trace / grid**2
+    return found[found[:, 2] > flat**2, :2], flat
 
 
-def _periodic_spline(heights: np.ndarray) -> NdBSpline:
-    """The quintic spline through periodic heights, as a function of (row, column), valid within half a cell around."""
+def _hessian(spline, at):
+    """Second derivatives yy, yx and xx of the spline at points (n, 2)."""
+    return [spline(at, nu=nu) for nu in ((2, 0), (1, 1), (0, 2))]
+
+
+def _newton_step(gy, gx, hyy, hyx, hxx, flat):
+    """Whether the Hessian is negative definite, its determinant, and Newton's step (..., 2), zero where it is not."""
+    determinant = hyy * hxx - hyx**2
+    concave = (determinant > flat**2) & (hyy + hxx < 0)
+    safe = np.where(concave, -determinant, 1.0)
+    step = np.stack([(hxx * gy - hyx * gx) / safe, (hyy * gx - hyx * gy) / safe], axis=-1)
+    step[~concave] = 0.0
+    return concave, determinant, step
+
+
+def _periodic_spline(coefficients: np.ndarray) -> NdBSpline:
+    """The quintic spline of given periodic coefficients, as a function of (row, column) in [0, n)."""
     margin = _DEGREE
-    coefficients = scipy.ndimage.spline_filter(heights, order=_DEGREE, output=np.float64, mode="grid-wrap")
     coefficients = np.pad(coefficients, margin, mode="wrap")
     # Coefficient i belongs to the basis function centred on node i - margin.
     knots = np.arange(coefficients.shape[0] + _DEGREE + 1, dtype=float) - margin - (_DEGREE + 1) / 2
