@@ -76,13 +76,14 @@ def figure(
     fig = new_figure(TWO_COLUMNS, 3.35)
     left, right = fig.subplots(1, 2)
     scale = float(np.abs(heights).max()) * height
-    # Nodes are the centres of the picture's cells.
+    # Nodes are the centres of the picture's cells; the first row and column come again at the far border.
     half = 0.5 * side / heights.shape[0]
+    heights = np.pad(heights, (0, 1), mode="wrap")
     for ax in (left, right):
         image = ax.imshow(
             heights * height,
             origin="lower",
-            extent=(-half, side - half, -half, side - half),
+            extent=(-half, side + half, -half, side + half),
             cmap="cividis",
             vmin=-scale,
             vmax=scale,
