@@ -112,6 +112,7 @@ class JKR:
 
         Outside (r >= a) eq. (5), inside a^2/(2R) (2 - r^2/a^2) - sqrt(2 pi a gamma/E*). Zero for a = 0.
         """
+        r, a = np.asarray(r, float), np.asarray(a, float)
         with np.errstate(divide="ignore", invalid="ignore"):
             s = r / a
             outside = s > 1
