@@ -97,7 +97,7 @@ class JKR:
     def jump_in_approach(self, R):
         """Approach at which contact forms, (1 - 2.641 mu^(3/7)) epsilon, eq. (3), in m; negative: still a gap.
 
-        Below mu of about 1.03 it would lie below jump-off, where no JKR state exists, and for very small mu above
+        Below mu of about 1.06 it would lie below jump-off, where no JKR state exists, and for very small mu above
         zero: it is kept between the jump-off approach and zero. Zero without adhesion.
         """
         if self.material.surface_energy == 0:
