@@ -39,7 +39,7 @@ run: environment
 	@python workflow/scripts/show_results.py $(CONFIG)
 
 test: environment
-	pytest
+	pytest -n $(CORES) --dist loadgroup
 
 lint: environment
 	ruff check .

@@ -8,11 +8,12 @@ import yaml
 
 from icha.configuration import model
 from icha.configuration.expansion import (
+    campaign_sha256,
     measurement_settings,
     number_label,
     run_cases,
     run_settings,
-    sha256_of,
+    run_sha256,
     surface_cases,
     surface_settings,
 )
@@ -134,11 +135,13 @@ def test_a_study_is_a_product_of_its_lists(load):
 
 def test_settings_depend_on_values_not_on_how_they_are_written(load):
     def checksum(campaign):
-        return sha256_of([run_settings(campaign, run_cases(campaign)[0]), surface_settings(campaign, "rough")])
+        return run_sha256(campaign, run_cases(campaign)[0]), campaign_sha256(campaign)
 
     first = checksum(load().campaign)
     assert checksum(load({"materials.soft.contact_modulus": "25000 kPa", "title": "Other"}).campaign) == first
     assert checksum(load({"materials.soft.contact_modulus": "26 MPa"}).campaign) != first
+    assert checksum(load({"studies.one.seeds": [1, 3]}).campaign)[0] == first[0]
+    assert checksum(load({"studies.one.seeds": [1, 3]}).campaign)[1] != first[1]
 
 
 @pytest.mark.parametrize("value", [0.1, 0.1 + 0.2, 1.0, 1e-5, 12.5, 100.0])
@@ -216,7 +219,7 @@ BAD = {
     "separation without unit": ("studies.one.targets", {"mean_separations": [1e-6]}, "the unit is missing"),
     "negative separation": ("studies.one.targets", {"mean_separations": ["-1 um"]}, "greater than 0"),
     "pressure beyond the model": ("studies.one.targets.reduced_pressures", [0.3], "(0, 0.15], which the model covers"),
-    "area beyond the model": ("studies.one.targets", {"area_fractions": [0.5]}, "(0, 0.4], which the model covers"),
+    "area beyond the model": ("studies.one.targets", {"area_fractions": [0.5]}, "(0, 0.25], which the model covers"),
     "zero target": ("studies.one.targets.reduced_pressures", [0, 0.1], "is out of range"),
     "unknown snapshot": ("studies.one.snapshots", [{"area": 0.1}], "studies.one.snapshots[0].area: unknown key"),
     "snapshot of two kinds": (

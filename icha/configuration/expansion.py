@@ -103,6 +103,16 @@ def _load_unit(campaign, measurement) -> float:
     return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
 
 
-def sha256_of(settings) -> str:
+def run_sha256(campaign: Campaign, case: RunCase) -> str:
+    """Checksum of everything that determines a run."""
+    return _sha256([run_settings(campaign, case), surface_settings(campaign, case.surface)])
+
+
+def campaign_sha256(campaign: Campaign) -> str:
+    """Checksum of everything that determines the runs of a campaign: not of its figures or its title."""
+    return _sha256({case.path: run_sha256(campaign, case) for case in run_cases(campaign)})
+
+
+def _sha256(settings) -> str:
     """Checksum of settings, whatever their order or the units that they were written in."""
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()

@@ -27,7 +27,7 @@ from icha.configuration.units import PATTERN, PHYSICAL_NAMES, conversion_factor,
 # What the model covers: beyond these the asperities have lost their identity. `icha.path` holds the same numbers
 # (a test compares them); importing it here would load the whole solver to read a configuration.
 MAX_REDUCED_PRESSURE = 0.15
-MAX_AREA_FRACTION = 0.4
+MAX_AREA_FRACTION = 0.25
 MAX_STEP = 0.5
 
 NAME_PATTERN = r"^[a-z0-9_-]+$"

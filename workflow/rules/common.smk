@@ -10,10 +10,11 @@ from command_line import campaign_configuration
 from fingerprint import code_fingerprint
 
 from icha.configuration.expansion import (
+    campaign_sha256,
     measurement_settings,
     run_cases,
     run_settings,
-    sha256_of,
+    run_sha256,
     surface_cases,
     surface_settings,
 )

@@ -26,8 +26,7 @@ rule configuration:
 
 rule campaign_dataset:
     input:
-        runs=RUNS,
-        configuration=CONFIG_USED,
+        RUNS,
     output:
         DATASET,
     log:
@@ -43,7 +42,8 @@ rule campaign_dataset:
     params:
         labels=LABELS,
         size=len(RUNS),
-        attributes=ATTRIBUTES | {"title": CAMPAIGN.title, "summary": CAMPAIGN.summary},
+        attributes=ATTRIBUTES
+        | {"title": CAMPAIGN.title, "summary": CAMPAIGN.summary, "config_sha256": campaign_sha256(CAMPAIGN)},
         code=code_of("make_dataset.py"),
     message:
         "Campaign dataset of {params.size} runs"

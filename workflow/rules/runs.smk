@@ -21,7 +21,7 @@ rule run:
         attributes=lambda wildcards: ATTRIBUTES
         | {
             "study": wildcards.study,
-            "config_sha256": sha256_of([settings_of(wildcards), surface_settings(CAMPAIGN, wildcards.surface)]),
+            "config_sha256": run_sha256(CAMPAIGN, case_of(wildcards)),
         },
         code=code_of("run_sweep.py"),
     message:

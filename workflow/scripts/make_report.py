@@ -10,7 +10,7 @@ from icha.records import read_campaign, read_dataset, whole_file
 from icha.report import ReportFigure, read_benchmarks, write_report
 
 
-def make_report(page, *, campaign, comparison, checks, configuration, surfaces, figures, citations):
+def make_report(page, *, campaign, comparison, checks, configuration, surfaces, figures, citations, times):
     """Write the page from the files of the campaign's results; `figures` maps names to (PNG, PDF)."""
     write_report(
         page,
@@ -25,6 +25,7 @@ def make_report(page, *, campaign, comparison, checks, configuration, surfaces, 
         configuration=Path(configuration).read_text(encoding="utf-8"),
         dataset_path=campaign,
         citations=citations,
+        times_path=times,
     )
 
 
@@ -49,5 +50,6 @@ if "snakemake" in globals():
             surfaces=snakemake.input.surfaces,
             figures={name: (next(pictures), next(pictures)) for name in snakemake.params.figures},
             citations=snakemake.params.citations,
+            times=snakemake.output.times,
         )
         write_times(snakemake.output.times, snakemake.params.benchmarks)

@@ -1,0 +1,55 @@
+"""The smoke campaign, run once for real, for all tests that look at the workflow."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[1]
+PARTS = ("Snakefile", "icha", "workflow", "config", "profiles")
+SMOKE = "config/campaigns/smoke.yaml"
+
+
+def snakemake_command(*arguments, configuration=SMOKE):
+    """Command and environment of a call of Snakemake in a copy of the project, with that copy's package."""
+    environment = os.environ | {"PYTHONPATH": ".", "PYTHONDONTWRITEBYTECODE": "1"}
+    chosen = ["--configfile", str(configuration)] if configuration else []
+    return [sys.executable, "-m", "snakemake", *arguments, *chosen], environment
+
+
+def snakemake(project, *arguments, configuration=SMOKE):
+    """Call Snakemake in a copy of the project; return the finished process with all that it said as `stdout`."""
+    command, environment = snakemake_command(*arguments, configuration=configuration)
+    environment["PYTHONPATH"] = str(project)
+    return subprocess.run(
+        command, cwd=project, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+
+
+def copy_project(source, target):
+    """Copy the program's files, as a clone does."""
+    target.mkdir(parents=True)
+    for part in PARTS:
+        if (source / part).is_dir():
+            shutil.copytree(source / part, target / part, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copyfile(source / part, target / part)
+    return target
+
+
+@pytest.fixture(scope="session")
+def smoke(tmp_path_factory):
+    """A copy of the project in which the smoke campaign has been run to the end; not to be changed."""
+    project = copy_project(REPOSITORY, tmp_path_factory.mktemp("smoke") / "project")
+    run = snakemake(project, "all", "references", "publish")
+    assert run.returncode == 0, run.stdout
+    return project
+
+
+@pytest.fixture
+def project(smoke, tmp_path):
+    """A finished smoke campaign of one's own."""
+    return shutil.copytree(smoke, tmp_path / "project")

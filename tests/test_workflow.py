@@ -1,0 +1,264 @@
+"""The workflow as its users meet it: whole campaigns, interrupted ones, and wrong input."""
+
+import hashlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+from conftest import REPOSITORY, SMOKE, snakemake, snakemake_command
+
+from icha.configuration.expansion import campaign_sha256
+from icha.configuration.load import load_configuration
+
+pytestmark = pytest.mark.xdist_group("workflow")
+
+CAMPAIGNS = ["config/config.yaml", *(f"config/campaigns/{p.name}" for p in (REPOSITORY / "config/campaigns").iterdir())]
+
+
+def results_of(project):
+    """Checksums of all results but what is measured while they are made: logs, benchmarks, run times."""
+    folder = project / "results/smoke"
+    return {
+        str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file() and file.relative_to(folder).parts[0] not in ("logs", "benchmarks", "run_times.tsv")
+    }
+
+
+def test_everything_that_was_promised_is_there(smoke):
+    files = results_of(smoke)
+    for name in (
+        "surfaces/challenge/seed1.nc",
+        "surfaces/challenge/seed2.nc",
+        "runs/challenge/challenge/seed2/slope1/cmc_adhesionless.nc",
+        "runs/multi_slope/mcghee/seed1/slope0.2/pdms_soft.nc",
+        "references/challenge.nc",
+        "dataset/smoke.nc",
+        "aggregated/smoke.nc",
+        "checks.json",
+        "config.used.yaml",
+        "report.html",
+        "publish/SHA256SUMS",
+        "publish/dataset/smoke.nc",
+    ):
+        assert name in files
+    figures = ("fig1_jkr", "fig2_area_and_gap", "fig3_distributions", "fig4_contact_map", "fig5_multi_slope")
+    for figure in (*figures, "fig6_spots_by_slope"):
+        assert f"figures/{figure}.png" in files and f"figures/{figure}.pdf" in files
+    jobs = [file for file in files if file.startswith(("surfaces", "runs"))]
+    for job in jobs:
+        assert (smoke / "results/smoke/logs" / job).with_suffix(".log").is_file()
+        benchmark = (smoke / "results/smoke/benchmarks" / job).with_suffix(".jsonl")
+        assert json.loads(benchmark.read_text().splitlines()[0])["s"] > 0
+
+
+def test_sweeps_report_progress(smoke):
+    log = smoke / "results/smoke/logs/runs/challenge/challenge/seed1/slope1/cmc.log"
+    assert len(log.read_text().splitlines()) >= 4
+
+
+def test_the_dataset_tells_where_it_comes_from(smoke):
+    campaign = load_configuration(smoke / "results/smoke/config.used.yaml").campaign
+    with xr.open_datatree(smoke / "results/smoke/dataset/smoke.nc") as tree:
+        assert set(tree.children) == {"challenge", "multi_slope"}
+        assert tree.attrs["config_sha256"] == campaign_sha256(campaign)
+        assert tree.attrs["license"] == "CC-BY-4.0"
+        assert tree["multi_slope"]["rms_slope"].values.tolist() == [0.2, 0.5, 1.0]
+    with xr.open_dataset(smoke / "results/smoke/runs/challenge/challenge/seed1/slope1/cmc.nc") as run:
+        assert {"title", "summary", "Conventions", "source", "references"} <= set(run.attrs)
+        assert run.attrs["campaign"] == "smoke" and run.attrs["study"] == "challenge"
+        assert len(run.attrs["config_sha256"]) == 64
+
+
+def test_the_configuration_as_used_is_the_campaign(smoke):
+    used = yaml.safe_load((smoke / "results/smoke/config.used.yaml").read_text())
+    assert used == yaml.safe_load((REPOSITORY / SMOKE).read_text())
+
+
+def test_all_checks_passed(smoke):
+    checks = json.loads((smoke / "results/smoke/checks.json").read_text())
+    assert len({check["subject"] for check in checks}) >= 7
+    assert all(check["passed"] for check in checks)
+
+
+def test_the_deposit_can_be_verified(smoke):
+    done = subprocess.run(
+        ["sha256sum", "--check", "--strict", "SHA256SUMS"],
+        cwd=smoke / "results/smoke/publish",
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    listed = {line.split("  ")[1] for line in (smoke / "results/smoke/publish/SHA256SUMS").read_text().splitlines()}
+    there = {name.removeprefix("publish/") for name in results_of(smoke) if name.startswith("publish/")}
+    assert there == listed | {"SHA256SUMS"}
+
+
+def test_a_second_call_does_nothing(smoke):
+    before = {file: file.stat().st_mtime_ns for file in (smoke / "results").rglob("*")}
+    again = snakemake(smoke, "all", "references", "publish")
+    assert again.returncode == 0 and "Nothing to be done" in again.stdout
+    assert {file: file.stat().st_mtime_ns for file in (smoke / "results").rglob("*")} == before
+
+
+@pytest.mark.parametrize("configuration", CAMPAIGNS)
+def test_shipped_campaigns_can_be_planned(configuration, smoke, tmp_path):
+    plan = snakemake(smoke, "all", "publish", "-n", "-d", str(tmp_path), configuration=configuration)
+    assert plan.returncode == 0, plan.stdout
+    assert "campaign_dataset" in plan.stdout and "deposit" in plan.stdout
+
+
+def test_another_configuration_replaces_the_default_one(smoke, tmp_path):
+    plan = snakemake(smoke, "-n", "-d", str(tmp_path))
+    assert "pdms_soft" in plan.stdout
+    assert "pdms_stiff" not in plan.stdout and "results/paper" not in plan.stdout
+
+
+def test_no_paths_users_or_hosts_in_results(smoke):
+    words = [str(smoke), str(REPOSITORY), os.uname().nodename if len(os.uname().nodename) > 3 else str(smoke)]
+    for name in results_of(smoke):
+        content = (smoke / "results/smoke" / name).read_bytes()
+        for word in words:
+            assert word.encode() not in content, f"{word} in {name}"
+
+
+def test_killed_runs_are_finished_with_the_same_bytes(smoke, tmp_path):
+    project = shutil.copytree(smoke, tmp_path / "project", ignore=shutil.ignore_patterns("results", ".snakemake"))
+    pause = random.Random(1)
+    command, environment = snakemake_command("all", "references", "publish")
+    environment["PYTHONPATH"] = str(project)
+    for attempt in range(4):
+        run = subprocess.Popen(
+            command,
+            cwd=project,
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        time.sleep(pause.uniform(3, 9))
+        if attempt % 2:
+            # Snakemake alone: its jobs go on for a while, beside those of the next call.
+            os.kill(run.pid, signal.SIGKILL)
+        else:
+            os.killpg(run.pid, signal.SIGKILL)
+        run.wait()
+    finished = snakemake(project, "all", "references", "publish")
+    assert finished.returncode == 0, finished.stdout
+    assert results_of(project) == results_of(smoke)
+    assert not [file for file in (project / "results").rglob("*.part")]
+
+
+def test_two_calls_at_once_are_refused(smoke, project, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    from campaign_lock import hold_lock
+
+    monkeypatch.chdir(project)
+    (project / "results/smoke/checks.json").unlink()
+    hold_lock(".snakemake/smoke.lock")
+    refused = snakemake(project)
+    assert refused.returncode != 0
+    assert f"Process {os.getpid()} is running this campaign" in refused.stdout
+    assert "Traceback" not in refused.stdout
+    assert not (project / "results/smoke/checks.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("25 MPa", "-25 MPa", "materials.cmc.contact_modulus: '-25 MPa' is too small"),
+        ("25 MPa", "25", "the unit is missing"),
+        ("hurst: 0.8", "hurst: 0.8\n    hurst: 0.9", "key 'hurst' is given twice"),
+        ("materials: [pdms_soft]", "materials: [pdms]", "'pdms' is not defined"),
+        ("grid: 64", "grid: 16", "grid cells per shortest wavelength"),
+    ],
+)
+def test_a_wrong_configuration_is_a_message(old, new, message, smoke, tmp_path):
+    text = (REPOSITORY / SMOKE).read_text()
+    assert old in text
+    (tmp_path / "wrong.yaml").write_text(text.replace(old, new, 1))
+    refused = snakemake(smoke, "-n", configuration=tmp_path / "wrong.yaml")
+    assert refused.returncode == 1
+    assert message in refused.stdout and f"{tmp_path}/wrong.yaml" in refused.stdout
+    assert "Traceback" not in refused.stdout and ".smk" not in refused.stdout
+
+
+def test_wrong_values_on_the_command_line_are_a_message(smoke):
+    refused = snakemake(smoke, "-n", "--config", "name=My Campaign", "studies={none: {}}")
+    assert refused.returncode == 1
+    assert "--config: name: 'My Campaign' is not a name" in refused.stdout
+    assert "--config: studies.none.surfaces: the key is missing" in refused.stdout
+    assert "Traceback" not in refused.stdout
+
+
+def test_two_configurations_at_once_are_refused(smoke):
+    refused = snakemake(smoke, "-n", "--configfile", "config/config.yaml", SMOKE, configuration=None)
+    assert refused.returncode == 1
+    assert "one file, for one campaign is one file" in refused.stdout
+
+
+def test_a_surface_that_is_too_coarse_is_a_warning(smoke, tmp_path):
+    (tmp_path / "coarse.yaml").write_text((REPOSITORY / SMOKE).read_text().replace("grid: 64", "grid: 32"))
+    plan = snakemake(smoke, "-n", "-d", str(tmp_path), configuration=tmp_path / "coarse.yaml")
+    assert plan.returncode == 0
+    assert "Warning: surfaces.challenge.grid: 32 gives 3.2 grid cells" in plan.stdout
+
+
+def test_a_failing_job_says_why(project):
+    surface = project / "results/smoke/surfaces/mcghee/seed1.nc"
+    surface.write_bytes(b"damaged")
+    os.utime(surface)
+    failed = snakemake(project, "runs")
+    assert failed.returncode == 1
+    assert "seed1.nc: not a readable netCDF file" in failed.stdout
+    assert "Traceback" not in failed.stdout
+    assert not (project / "results/smoke/runs/multi_slope/mcghee/seed1/slope1/pdms_soft.nc").exists()
+
+
+def test_surface_files_and_measurements(smoke, tmp_path):
+    rng = np.random.default_rng(3)
+    x = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    waves = [(rng.integers(1, 4, 2), rng.uniform(0, 6, 2)) for _ in range(8)]
+    heights = sum(np.cos(k[0] * x + a[0])[:, None] * np.cos(k[1] * x + a[1]) for k, a in waves)
+    np.save(tmp_path / "heights.npy", heights)
+    (tmp_path / "points.csv").write_text("p,a\n1,0.1\n100,2\n")
+    content = yaml.safe_load((REPOSITORY / SMOKE).read_text())
+    content["name"] = "own"
+    content["surfaces"] = {
+        "own": {"kind": "file", "path": "heights.npy", "height_unit": "um", "period": "1 mm"},
+    }
+    study = content["studies"]["multi_slope"] | {"surfaces": ["own"], "rms_slopes": [0.5]}
+    study["targets"] = {"area_fractions": [0.002, 0.01]}
+    study["snapshots"] = [{"area_fraction": 0.01}]
+    content["studies"] = {"multi_slope": study}
+    content["figures"] = {"fig5_multi_slope": {"study": "multi_slope"}}
+    content["measurements"] = {
+        "lab": {
+            "path": "points.csv",
+            "label": "measured",
+            "citation": "A. Nobody, private communication",
+            "study": "multi_slope",
+            "load": {"column": "p", "unit": "kPa"},
+            "area": {"column": "a", "unit": "percent"},
+            "material": "pdms_soft",
+            "rms_slope": 0.5,
+        }
+    }
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump(content))
+    run = snakemake(smoke, "-d", str(tmp_path), configuration=tmp_path / "own.yaml")
+    assert run.returncode == 0, run.stdout
+    with xr.open_dataset(tmp_path / "results/own/surfaces/own/seed0.nc") as surface:
+        ratio = surface["height"].values / (heights - heights.mean())
+        assert float(surface["rms_slope"]) == pytest.approx(1)
+        assert np.ptp(ratio[np.isfinite(ratio)]) == pytest.approx(0, abs=1e-9 * abs(ratio).max())
+    assert "A. Nobody, private communication" in (tmp_path / "results/own/report.html").read_text()
+    again = snakemake(smoke, "-n", "-d", str(tmp_path), configuration=tmp_path / "own.yaml")
+    assert "Nothing to be done" in again.stdout
