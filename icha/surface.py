@@ -37,7 +37,10 @@ class Surface:
     def __post_init__(self):
         """Check the values and freeze them."""
         try:
-            heights = np.array(self.heights, dtype=np.float64)
+            heights = np.array(self.heights)
+            if np.iscomplexobj(heights):
+                raise TypeError("they are complex")
+            heights = heights.astype(np.float64)
         except (TypeError, ValueError) as error:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
         if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 8:

@@ -3,6 +3,8 @@
 Lengths, loads and moduli in any consistent units; `adhesion` is surface energy over contact modulus.
 """
 
+import itertools
+
 import numpy as np
 import scipy.integrate
 import scipy.special
@@ -33,7 +35,7 @@ def displacement_by_quadrature(r, a, R, modulus, energy):
 
     edges = [0.0, np.pi / 2] if r >= a else [0.0, np.arcsin(r / a), np.pi / 2]
     total = 0.0
-    for low, high in zip(edges, edges[1:], strict=False):
+    for low, high in itertools.pairwise(edges):
         if high > low:
             total += scipy.integrate.quad(ring, low, high, epsabs=0, epsrel=1e-11, limit=400)[0]
     return total / (np.pi * modulus)

@@ -1,0 +1,247 @@
+"""Spectrum, synthesis and surface statistics against the spectrum's integrals and plain Fourier sums."""
+
+import warnings
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+from icha import SelfAffineSpectrum, Surface
+
+PERIOD = 100e-6
+SPECTRUM = {"period": PERIOD, "rolloff_wavelength": 20e-6, "short_wavelength": PERIOD / 16, "hurst": 0.8}
+
+
+def modes(surface):
+    """|h_q|^2 and q of all modes, from a plain FFT."""
+    n = surface.grid
+    power = np.abs(np.fft.fft2(surface.heights) / n**2) ** 2
+    k = 2 * np.pi / surface.period * np.fft.fftfreq(n, 1 / n)
+    return power, np.hypot(k[:, None], k[None, :])
+
+
+def written_psd(q, plateau, hurst=0.8, ratio=16):
+    q_l, q_0, q_1 = 2 * np.pi / PERIOD, 2 * np.pi / 20e-6, 2 * np.pi / PERIOD * ratio
+    inside = (q >= q_l * (1 - 1e-12)) & (q < q_1 * (1 - 1e-12))
+    return np.where(inside, plateau * np.where(q < q_0, 1.0, (np.maximum(q, q_0) / q_0) ** (-2 * (1 + hurst))), 0.0)
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+@pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])
+def test_synthesis_reproduces_every_mode(seed, hurst):
+    spectrum = SelfAffineSpectrum(**(SPECTRUM | {"hurst": hurst}), rms_slope=0.7)
+    surface = spectrum.realise(96, seed)
+    power, q = modes(surface)
+    expected = written_psd(q, spectrum.plateau, hurst) * (2 * np.pi / PERIOD) ** 2
+    np.testing.assert_allclose(power, expected, rtol=1e-9, atol=1e-20 * expected.max())
+    assert np.sum(q**2 * power) == pytest.approx(0.7**2, rel=1e-12)
+    np.testing.assert_allclose(spectrum.psd(q), expected / (2 * np.pi / PERIOD) ** 2, rtol=1e-12)
+    assert spectrum.rms_height == pytest.approx(np.std(surface.heights), rel=1e-12)
+
+
+def test_statistics_of_a_surface_against_its_modes():
+    surface = SelfAffineSpectrum(**SPECTRUM).realise(97, 3, amplitudes="gaussian")
+    power, q = modes(surface)
+    assert surface.rms_height == pytest.approx(np.std(surface.heights), rel=1e-12)
+    assert surface.rms_slope == pytest.approx(np.sqrt(np.sum(q**2 * power)), rel=1e-12)
+    assert surface.rms_curvature == pytest.approx(np.sqrt(3 / 8 * np.sum(q**4 * power)), rel=1e-12)
+
+
+def test_statistics_of_one_wave():
+    n, k, amplitude = 64, 5, 2e-6
+    x = np.arange(n) / n
+    surface = Surface(amplitude * np.cos(2 * np.pi * k * x)[None, :] * np.ones((n, 1)), PERIOD)
+    q = 2 * np.pi * k / PERIOD
+    assert surface.rms_height == pytest.approx(amplitude / np.sqrt(2), rel=1e-12)
+    assert surface.rms_slope == pytest.approx(q * amplitude / np.sqrt(2), rel=1e-12)
+    # The shortest wave that the grid holds stands alone in its column of the half spectrum.
+    surface = Surface(amplitude * np.cos(np.pi * np.arange(n))[None, :] * np.ones((n, 1)), PERIOD)
+    assert surface.rms_height == pytest.approx(amplitude, rel=1e-12)
+    assert surface.rms_slope == pytest.approx(np.pi * n / PERIOD * amplitude, rel=1e-12)
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])
+def test_continuum_height_against_integration_of_the_spectrum(hurst):
+    spectrum = SelfAffineSpectrum(**(SPECTRUM | {"hurst": hurst, "short_wavelength": PERIOD / 160}), rms_slope=0.5)
+    q_l, q_0, q_1 = (2 * np.pi / length for length in (PERIOD, 20e-6, PERIOD / 160))
+
+    def moment(power):
+        flat = scipy.integrate.quad(lambda q: q ** (power + 1), q_l, q_0, epsrel=1e-12)[0]
+        # In ln q, where the falling branch is a plain exponential.
+        tail = scipy.integrate.quad(
+            lambda s: np.exp(s * (power + 2)) * (np.exp(s) / q_0) ** (-2 * (1 + hurst)),
+            np.log(q_0),
+            np.log(q_1),
+            epsrel=1e-12,
+        )[0]
+        return flat + tail
+
+    expected = 0.5 * np.sqrt(moment(0) / moment(2))
+    assert spectrum.continuum_rms_height() == pytest.approx(expected, rel=1e-9)
+
+
+def test_challenge_surface_has_its_height():
+    challenge = SelfAffineSpectrum(100e-6, 20e-6, 0.1e-6, 0.8)
+    # The lattice of the cell's waves, and the integral, by hand: sqrt(27.622/11602) L/(2 pi).
+    assert challenge.rms_height == pytest.approx(0.783e-6, abs=0.0005e-6)
+    assert challenge.continuum_rms_height() == pytest.approx(0.7766e-6, abs=0.0001e-6)
+
+
+def test_surfaces_of_different_seeds_have_the_same_statistics_and_other_heights():
+    spectrum = SelfAffineSpectrum(**SPECTRUM)
+    one, two = spectrum.realise(64, 1), spectrum.realise(64, 2)
+    assert one.rms_height == pytest.approx(two.rms_height, rel=1e-12)
+    assert one.rms_slope == pytest.approx(1.0, rel=1e-12)
+    assert abs(np.corrcoef(one.heights.ravel(), two.heights.ravel())[0, 1]) < 0.3
+    np.testing.assert_array_equal(one.heights, spectrum.realise(64, 1).heights)
+
+
+@pytest.mark.parametrize("amplitudes", ["fixed", "gaussian"])
+def test_a_finer_grid_holds_the_same_surface(amplitudes):
+    spectrum = SelfAffineSpectrum(**SPECTRUM)
+    coarse, fine = spectrum.realise(64, 5, amplitudes), spectrum.realise(192, 5, amplitudes)
+    np.testing.assert_allclose(fine.heights[::3, ::3], coarse.heights, atol=1e-12 * coarse.rms_height)
+
+
+def test_a_shorter_cut_off_only_adds_waves():
+    long, short = (SelfAffineSpectrum(**(SPECTRUM | {"short_wavelength": PERIOD / m})) for m in (16, 24))
+    spectra = [np.fft.fft2(s.realise(96, 5).heights) for s in (long, short)]
+    held = np.abs(spectra[0]) > 1e-9 * np.abs(spectra[0]).max()
+    phase = np.angle(spectra[1][held] / spectra[0][held])
+    np.testing.assert_allclose(phase, 0, atol=1e-8)
+
+
+def test_phases_are_uniform_and_independent():
+    surface = SelfAffineSpectrum(**SPECTRUM).realise(64, 11)
+    spectrum = np.fft.fft2(surface.heights)
+    unit = spectrum[np.abs(spectrum) > 1e-9 * np.abs(spectrum).max()]
+    unit = unit / np.abs(unit)
+    # Conjugates come in pairs, so that only the cosine is free; three standard deviations.
+    count = len(unit) / 2
+    assert abs(np.mean(unit.real)) < 3 * np.sqrt(0.5 / count)
+    assert abs(np.mean(unit.real**2) - 0.5) < 3 * np.sqrt(0.125 / count)
+
+
+def test_gaussian_amplitudes_follow_an_exponential_law():
+    spectrum = SelfAffineSpectrum(**SPECTRUM)
+    ratios = []
+    for seed in range(4):
+        power, q = modes(spectrum.realise(64, seed, amplitudes="gaussian"))
+        expected = written_psd(q, spectrum.plateau) * (2 * np.pi / PERIOD) ** 2
+        ratios.append((power[expected > 0] / expected[expected > 0]))
+    ratios = np.concatenate(ratios)
+    count = len(ratios) / 2
+    # |h_q|^2 over its mean is exponentially distributed: mean 1, variance 1, median ln 2.
+    assert np.mean(ratios) == pytest.approx(1, abs=3 / np.sqrt(count))
+    assert np.var(ratios) == pytest.approx(1, abs=3 * np.sqrt(8 / count))
+    assert np.median(ratios) == pytest.approx(np.log(2), abs=3 / np.sqrt(count))
+
+
+def test_heights_are_zero_mean_read_only_and_copied():
+    heights = np.random.default_rng(1).normal(size=(16, 16)) + 5
+    surface = Surface(heights, 1.0)
+    heights[0, 0] = 1e9
+    assert abs(surface.heights.mean()) < 1e-14
+    assert surface.heights.max() < 10
+    with pytest.raises(ValueError, match="read-only"):
+        surface.heights[0, 0] = 0
+
+
+def test_scaling_to_a_slope_multiplies_the_heights():
+    surface = SelfAffineSpectrum(**SPECTRUM).realise(64, 1)
+    gentle = surface.scaled_to_rms_slope(0.2)
+    assert gentle.rms_slope == pytest.approx(0.2, rel=1e-12)
+    np.testing.assert_allclose(gentle.heights, 0.2 * surface.heights, rtol=1e-9, atol=1e-20)
+
+
+def test_too_few_cells_per_wave_are_refused_and_few_are_warned_of():
+    spectrum = SelfAffineSpectrum(**SPECTRUM)
+    with pytest.raises(ValueError, match="grid"):
+        spectrum.realise(31, 1)
+    with pytest.warns(UserWarning, match=r"3\.94 cells"):
+        spectrum.realise(63, 1)
+    with pytest.warns(UserWarning, match="grid"):
+        surface = spectrum.realise(32, 1)
+    assert surface.rms_slope == pytest.approx(1, rel=1e-12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        spectrum.realise(64, 1)
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [
+        ("period", 0.0),
+        ("period", -1.0),
+        ("period", "100 um"),
+        ("period", None),
+        ("rolloff_wavelength", 101e-6),
+        ("rolloff_wavelength", float("nan")),
+        ("short_wavelength", 20e-6),
+        ("short_wavelength", 30e-6),
+        ("short_wavelength", 0.0),
+        ("hurst", 0.0),
+        ("hurst", 1.0001),
+        ("hurst", -0.5),
+        ("hurst", True),
+        ("rms_slope", 0.0),
+        ("rms_slope", float("inf")),
+    ],
+)
+def test_bad_spectrum_is_refused_by_name(argument, value):
+    with pytest.raises(ValueError, match=argument):
+        SelfAffineSpectrum(**(SPECTRUM | {argument: value}))
+
+
+def test_a_spectrum_without_any_wave_is_refused():
+    with pytest.raises(ValueError, match="short_wavelength"):
+        SelfAffineSpectrum(1.0, 1.0, 0.999999999999, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [("grid", 64.0), ("grid", 4), ("grid", "64"), ("seed", -1), ("seed", 1.5), ("seed", None), ("amplitudes", "none")],
+)
+def test_bad_realisation_is_refused_by_name(argument, value):
+    good = {"grid": 64, "seed": 1, "amplitudes": "fixed"}
+    with pytest.raises(ValueError, match=argument):
+        SelfAffineSpectrum(**SPECTRUM).realise(**(good | {argument: value}))
+
+
+def _with(value):
+    heights = np.random.default_rng(0).normal(size=(16, 16))
+    heights[3, 4] = value
+    return heights
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [
+        np.zeros((16, 16)),
+        np.ones((16, 15)),
+        np.arange(49.0).reshape(7, 7),
+        np.arange(64.0),
+        np.ones((8, 8, 1)),
+        _with(np.nan),
+        _with(np.inf),
+        [["a", "b"], ["c", "d"]],
+        None,
+        np.full((16, 16), 1j),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_bad_heights_are_refused_by_name(heights):
+    with pytest.raises(ValueError, match="heights"):
+        Surface(heights, 1.0)
+
+
+@pytest.mark.parametrize("period", [0, -1.0, float("nan"), "1", [1.0]])
+def test_bad_period_is_refused_by_name(period):
+    with pytest.raises(ValueError, match="period"):
+        Surface(_with(0.0), period)
+
+
+@pytest.mark.parametrize("rms_slope", [0, -1.0, float("nan"), "1"])
+def test_bad_slope_is_refused_by_name(rms_slope):
+    with pytest.raises(ValueError, match="rms_slope"):
+        Surface(_with(0.0), 1.0).scaled_to_rms_slope(rms_slope)
