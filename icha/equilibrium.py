@@ -144,7 +144,7 @@ def contact_stiffness(contact: Contact, state: ContactState) -> float:
     R, a = spots.radius_of_curvature, spots.contact_radius
     response = _separation_response(contact, spots, _LINEAR_TOLERANCE_TANGENT)
     growth = _radius_response(law, a, R, spots.approach) * response
-    return -float(np.sum(law.force_derivative(a, R) * growth)) / contact.area
+    return 0.0 - float(np.sum(law.force_derivative(a, R) * growth)) / contact.area
 
 
 def untouched(contact: Contact) -> ContactState:
