@@ -128,7 +128,7 @@ def test_gaussian_amplitudes_follow_an_exponential_law():
     for seed in range(4):
         power, q = modes(spectrum.realise(64, seed, amplitudes="gaussian"))
         expected = written_psd(q, spectrum.plateau) * (2 * np.pi / PERIOD) ** 2
-        ratios.append((power[expected > 0] / expected[expected > 0]))
+        ratios.append(power[expected > 0] / expected[expected > 0])
     ratios = np.concatenate(ratios)
     count = len(ratios) / 2
     # |h_q|^2 over its mean is exponentially distributed: mean 1, variance 1, median ln 2.
