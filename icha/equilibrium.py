@@ -283,7 +283,8 @@ def equilibrium(contact: Contact, state: ContactState, separation: float) -> Con
     Spots past jump-off are dropped, free asperities beyond jump-in join, asperities under a spot are taken into it
     and overlapping spots coalesce, all that apply at once, until nothing changes. That ends: without adhesion spots
     are only added or united (one of radius zero is harmless and is removed at the end); with adhesion an asperity
-    that has broken contact here may not make it again at this separation (`pending` counts those that would).
+    that has broken contact here may not make it again at this separation (`pending` counts those that would, and
+    without adhesion those left by a united spot that let go).
 
     Raises
     ------
@@ -350,8 +351,13 @@ def equilibrium(contact: Contact, state: ContactState, separation: float) -> Con
 
     if not adhesive:
         idle = _broken(law, spots)
-        jump_offs += int(np.count_nonzero(idle))
-        spots, owner = _remove(spots, owner, idle)
+        if idle.any():
+            jump_offs += int(np.count_nonzero(idle))
+            freed = np.flatnonzero((owner != _FREE) & idle[owner])
+            spots, owner = _remove(spots, owner, idle)
+            # Asperities of a united spot that let go may lie in the half-space; the next equilibrium takes them up.
+            w = contact.interaction(spots, asperities.position[freed]).displacement(spots.contact_radius)
+            pending = int(np.count_nonzero(asperities.height[freed] - separation - w > 0))
     response = _separation_response(contact, spots, _LINEAR_TOLERANCE)
     return ContactState(separation, spots, owner, response, residual, jump_ins, jump_offs, coalescences, pending)
 

@@ -3,6 +3,7 @@
 Lengths, loads and moduli in any consistent units; `adhesion` is surface energy over contact modulus.
 """
 
+import functools
 import itertools
 
 import numpy as np
@@ -57,6 +58,7 @@ def _partial_sum(x, y, count):
     return np.sum(1 / r) - background
 
 
+@functools.cache
 def periodic_point_load(x, y, count=24):
     """Sum of 1/r over all images of a unit cell less the uniform background; at the origin without the own 1/r.
 
