@@ -39,7 +39,7 @@ run: environment
 	@python workflow/scripts/show_results.py $(CONFIG)
 
 test: environment
-	pytest -n $(CORES) --dist loadgroup
+	pytest -n $(CORES) --dist loadfile
 
 lint: environment
 	ruff check .

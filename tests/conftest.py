@@ -1,5 +1,6 @@
 """The smoke campaign, run once for real, for all tests that look at the workflow."""
 
+import fcntl
 import os
 import shutil
 import subprocess
@@ -43,9 +44,16 @@ def copy_project(source, target):
 @pytest.fixture(scope="session")
 def smoke(tmp_path_factory):
     """A copy of the project in which the smoke campaign has been run to the end; not to be changed."""
-    project = copy_project(REPOSITORY, tmp_path_factory.mktemp("smoke") / "project")
-    run = snakemake(project, "all", "references", "publish")
-    assert run.returncode == 0, run.stdout
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent  # one for all processes that share the tests
+    project = folder / "smoke"
+    with (folder / "smoke.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not project.exists():
+            copy_project(REPOSITORY, project)
+            run = snakemake(project, "all", "references", "publish")
+            assert run.returncode == 0, run.stdout
     return project
 
 

@@ -14,7 +14,6 @@ import pytest
 from conftest import copy_project, snakemake
 
 REPOSITORY = Path(__file__).parents[1]
-pytestmark = pytest.mark.xdist_group("workflow")
 
 ALL_RULES = {
     "configuration",

@@ -18,8 +18,6 @@ from conftest import REPOSITORY, SMOKE, snakemake, snakemake_command
 from icha.configuration.expansion import campaign_sha256
 from icha.configuration.load import load_configuration
 
-pytestmark = pytest.mark.xdist_group("workflow")
-
 CAMPAIGNS = ["config/config.yaml", *(f"config/campaigns/{p.name}" for p in (REPOSITORY / "config/campaigns").iterdir())]
 
 
