@@ -72,7 +72,7 @@ class JKR:
         x = np.maximum(d, 0.0) ** 0.25 + np.cbrt(c)
         lowest = np.cbrt(c / 4)  # x at jump-off, where the slope vanishes
         for _ in range(_MAX_NEWTON_STEPS):
-            slope = np.maximum(4 * x**3 - c, 1e-300)
+            slope = np.maximum(4 * x**3 - c, 1e-100)
             new = np.maximum(x - (x**4 - c * x - d) / slope, lowest)
             done = np.all(x - new <= 4e-16 * x)
             x = np.minimum(new, x)  # monotone: rounding cannot make it climb again
