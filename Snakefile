@@ -33,7 +33,7 @@ rule all:
         CONFIG_USED,
         FIGURES,
         DATASET,
-        CHECKS,
+        VERDICT,
         REPORT,
 
 
@@ -56,7 +56,7 @@ rule dataset:
     input:
         DATASET,
         COMPARISON,
-        CHECKS,
+        VERDICT,
 
 
 rule figures:

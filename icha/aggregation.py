@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from icha.records import COMPLETE, LABELS
+from icha.campaign import LABELS
+from icha.records import COMPLETE
 
 # Loads at which curves are compared, per decade.
 _POINTS_PER_DECADE = 8
@@ -55,7 +56,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
 
     Parameters
     ----------
-    study : one group of the campaign dataset (`icha.records.campaign_tree`).
+    study : one group of the campaign dataset (`icha.campaign.campaign_tree`).
     attrs : further global attributes.
 
     Returns

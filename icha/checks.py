@@ -15,7 +15,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from icha.records import INCOMPLETE, MISSING, RunLabels, run_labels, select_run, whole_file
+from icha.campaign import RunLabels, run_labels, select_run
+from icha.files import whole_file
+from icha.records import INCOMPLETE, MISSING
 
 RESIDUAL_LIMIT = 1e-8
 IDENTITY_LIMIT = 1e-8

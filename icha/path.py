@@ -17,6 +17,7 @@ from icha.equilibrium import (
     mean_pressure,
     untouched,
 )
+from icha.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
 from icha.validation import number, positive
 
 REDUCED_PRESSURE = "reduced_pressure"
@@ -24,11 +25,6 @@ RELATIVE_LOAD = "relative_load"
 AREA_FRACTION = "area_fraction"
 MEAN_SEPARATION = "mean_separation"
 KINDS = (REDUCED_PRESSURE, RELATIVE_LOAD, AREA_FRACTION, MEAN_SEPARATION)
-
-# Beyond these the spots have lost their identity: soon after, the computed mean planes of a surface without
-# adhesion meet.
-MAX_REDUCED_PRESSURE = 0.15
-MAX_AREA_FRACTION = 0.25
 
 # A step that does not converge is halved down to this fraction of the longest one.
 _SMALLEST_STEP = 2.0**-14
@@ -99,8 +95,8 @@ class Path:
         if unload is not False:
             raise ValueError(f"unload: {unload!r} is not available in this version; only False is")
         max_step = positive("max_step", max_step, "h_rms")
-        if max_step > 0.5:
-            raise ValueError(f"max_step: {max_step!r} must not exceed 0.5 (in h_rms)")
+        if max_step > MAX_STEP:
+            raise ValueError(f"max_step: {max_step!r} must not exceed {MAX_STEP} (in h_rms)")
         ((kind, (name, values)),) = given.items()
         values = _stops(name, kind, values)
         if snapshots is None:

@@ -22,9 +22,10 @@ import xarray as xr
 from markupsafe import Markup, escape
 
 from icha.aggregation import at_round_pressures
+from icha.campaign import RunLabels, run_labels, select_run
 from icha.checks import Check, worst
 from icha.figures.style import quantity
-from icha.records import RunLabels, run_labels, select_run, whole_file
+from icha.files import whole_file
 
 PAPER = (
     "G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media with an advanced asperity model"

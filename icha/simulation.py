@@ -18,9 +18,10 @@ from icha.equilibrium import (
     mean_pressure,
 )
 from icha.jkr import JKR
+from icha.limits import MAX_REDUCED_PRESSURE
 from icha.material import Material
 from icha.observables import GAP_BINS, PRESSURE_BINS, gap_distribution, pressure_distribution
-from icha.path import MAX_REDUCED_PRESSURE, RELATIVE_LOAD, Path, load
+from icha.path import RELATIVE_LOAD, Path, load
 from icha.surface import Surface
 from icha.validation import integer
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import small_campaign as small
 
+from icha.campaign import RunLabels, campaign_tree
 from icha.checks import Check, check_campaign, check_run, read_checks, worst, write_checks
-from icha.records import RunLabels, campaign_tree
 
 
 def failed(run):

@@ -402,16 +402,6 @@ def test_measurements_that_cannot_be_drawn(table, changes, message, load, tmp_pa
     assert message in str(error.value)
 
 
-def test_limits_are_those_of_the_path():
-    from icha import path
-
-    assert model.MAX_REDUCED_PRESSURE == path.MAX_REDUCED_PRESSURE
-    assert model.MAX_AREA_FRACTION == path.MAX_AREA_FRACTION
-    with pytest.raises(ValueError, match="max_step"):
-        path.Path([0.1], max_step=model.MAX_STEP * 1.01)
-    assert path.Path([0.1], max_step=model.MAX_STEP).max_step == model.MAX_STEP
-
-
 def test_schema_and_tables_are_those_of_the_model():
     advice = "out of date: run `make schema`"
     assert (REPOSITORY / "workflow/schemas/config.schema.json").read_text(encoding="utf-8") == json_schema(), advice

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import small_campaign as small
 
+from icha.campaign import campaign_tree
 from icha.figures import (
     fig1_jkr,
     fig2_area_and_gap,
@@ -15,7 +16,7 @@ from icha.figures import (
 )
 from icha.figures.select import find_snapshot, path_steps, periodic_circles
 from icha.figures.style import number, quantity, save, unit_for
-from icha.records import campaign_tree, read_dataset, write_surface
+from icha.records import read_dataset, write_surface
 from icha.reference import reference_dataset
 
 

@@ -7,8 +7,9 @@ import pytest
 import small_campaign as small
 import yaml
 
+from icha.campaign import campaign_tree
 from icha.configuration.load import load_configuration
-from icha.records import campaign_tree, write_dataset
+from icha.records import write_dataset
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 

@@ -6,18 +6,8 @@ import pytest
 import small_campaign as small
 import xarray as xr
 
-from icha.records import (
-    RunLabels,
-    campaign_tree,
-    read_campaign,
-    read_dataset,
-    read_run,
-    read_surface,
-    run_labels,
-    select_run,
-    write_dataset,
-    write_surface,
-)
+from icha.campaign import RunLabels, campaign_tree, run_labels, select_run
+from icha.records import read_campaign, read_dataset, read_run, read_surface, write_dataset, write_surface
 
 
 def simple(values=(1.0, 2.0)):

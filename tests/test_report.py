@@ -8,11 +8,12 @@ import pytest
 import small_campaign as small
 
 from icha.aggregation import at_round_pressures, compare_campaign, compare_runs, interpolated
+from icha.campaign import campaign_tree
 from icha.checks import Check, check_campaign
 from icha.figures import fig1_jkr
 from icha.figures.select import path_steps
 from icha.figures.style import save
-from icha.records import campaign_tree, read_campaign, read_dataset, write_dataset, write_surface
+from icha.records import read_campaign, read_dataset, write_dataset, write_surface
 from icha.report import Benchmark, ReportFigure, read_benchmarks, write_report
 
 

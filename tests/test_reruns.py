@@ -23,6 +23,7 @@ ALL_RULES = {
     "campaign_dataset",
     "comparison",
     "checks",
+    "verdict",
     "figure",
     "report_page",
 }

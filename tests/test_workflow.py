@@ -42,6 +42,7 @@ def test_everything_that_was_promised_is_there(smoke):
         "dataset/smoke.nc",
         "aggregated/smoke.nc",
         "checks.json",
+        "verdict.txt",
         "config.used.yaml",
         "report.html",
         "publish/SHA256SUMS",
@@ -160,13 +161,26 @@ def test_two_calls_at_once_are_refused(smoke, project, monkeypatch):
     from campaign_lock import hold_lock
 
     monkeypatch.chdir(project)
-    (project / "results/smoke/checks.json").unlink()
+    (project / "results/smoke/verdict.txt").unlink()
     hold_lock(".snakemake/smoke.lock")
     refused = snakemake(project)
     assert refused.returncode != 0
     assert f"Process {os.getpid()} is running this campaign" in refused.stdout
     assert "Traceback" not in refused.stdout
-    assert not (project / "results/smoke/checks.json").exists()
+    assert not (project / "results/smoke/verdict.txt").exists()
+
+
+def test_a_failed_check_stops_the_campaign_and_is_named(smoke, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
+    from judge_results import judge_results
+
+    checks = json.loads((smoke / "results/smoke/checks.json").read_text())
+    checks[3].update(passed=False, value=0.5)
+    spoilt, verdict = tmp_path / "checks.json", tmp_path / "verdict.txt"
+    spoilt.write_text(json.dumps(checks))
+    with pytest.raises(ValueError, match=f"1 of {len(checks)} checks failed\n.*{checks[3]['name']}: 0.5"):
+        judge_results(spoilt, verdict)
+    assert not verdict.exists()
 
 
 @pytest.mark.parametrize(

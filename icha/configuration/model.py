@@ -23,12 +23,7 @@ from pydantic import (
 )
 
 from icha.configuration.units import PATTERN, PHYSICAL_NAMES, conversion_factor, to_number, to_si
-
-# What the model covers: beyond these the asperities have lost their identity. `icha.path` holds the same numbers
-# (a test compares them); importing it here would load the whole solver to read a configuration.
-MAX_REDUCED_PRESSURE = 0.15
-MAX_AREA_FRACTION = 0.25
-MAX_STEP = 0.5
+from icha.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
 
 NAME_PATTERN = r"^[a-z0-9_-]+$"
 # Rounding of the quotient of two lengths must not decide whether a wave has its cells.

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from icha.records import RunLabels, run_labels, select_run
+from icha.campaign import RunLabels, run_labels, select_run
 
 
 def study_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from icha.records import whole_file
+from icha.files import whole_file
 
 # Widths of one and of two columns of a journal page, inches.
 ONE_COLUMN = 3.5

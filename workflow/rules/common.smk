@@ -34,6 +34,7 @@ REFERENCES = [f"{RESULTS}/references/{name}.nc" for name in dict.fromkeys(name f
 DATASET = f"{RESULTS}/dataset/{CAMPAIGN.name}.nc"
 COMPARISON = f"{RESULTS}/aggregated/{CAMPAIGN.name}.nc"
 CHECKS = f"{RESULTS}/checks.json"
+VERDICT = f"{RESULTS}/verdict.txt"
 FIGURES = [f"{RESULTS}/figures/{name}.{ending}" for name in CAMPAIGN.figures.drawn() for ending in ("png", "pdf")]
 REPORT = f"{RESULTS}/report.html"
 RUN_TIMES = f"{RESULTS}/run_times.tsv"

@@ -97,3 +97,27 @@ rule checks:
         "Checks of the results"
     script:
         "../scripts/check_results.py"
+
+
+# A failed check stops the campaign here; the report, which shows all checks, is made nevertheless.
+rule verdict:
+    input:
+        CHECKS,
+    output:
+        VERDICT,
+    log:
+        f"{LOGS}/verdict.log",
+    benchmark:
+        f"{BENCHMARKS}/verdict.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=200,
+        runtime=5,
+    params:
+        code=code_of("judge_results.py"),
+    message:
+        "Verdict on the checks"
+    script:
+        "../scripts/judge_results.py"

@@ -3,7 +3,7 @@
 
 rule deposit:
     input:
-        [CONFIG_USED, DATASET, COMPARISON, CHECKS, REPORT],
+        [CONFIG_USED, DATASET, COMPARISON, CHECKS, VERDICT, REPORT],
         FIGURES,
         SURFACES,
         RUNS,

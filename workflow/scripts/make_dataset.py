@@ -2,7 +2,8 @@
 
 from job import logged
 
-from icha.records import campaign_tree, read_run, write_dataset
+from icha.campaign import campaign_tree
+from icha.records import read_run, write_dataset
 
 
 def make_dataset(runs, output, *, labels, attributes):

@@ -6,7 +6,8 @@ from pathlib import Path
 from job import logged
 
 from icha.checks import read_checks
-from icha.records import read_campaign, read_dataset, whole_file
+from icha.files import whole_file
+from icha.records import read_campaign, read_dataset
 from icha.report import ReportFigure, read_benchmarks, write_report
 
 

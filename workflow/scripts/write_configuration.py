@@ -2,7 +2,7 @@
 
 from job import logged
 
-from icha.records import whole_file
+from icha.files import whole_file
 
 
 def write_configuration(output, *, text):
