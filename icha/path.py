@@ -101,6 +101,8 @@ class Path:
         values = _stops(name, kind, values)
         if snapshots is None:
             snapshots = [(kind, values[-1])]
+        if not isinstance(snapshots, list | tuple):
+            raise ValueError(f"snapshots: {snapshots!r} is not a list of pairs (kind, value)")
         wanted = []
         for index, snapshot in enumerate(snapshots):
             label = f"snapshots[{index}]"
