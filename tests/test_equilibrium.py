@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 from half_space import jkr_approach, jkr_force, periodic_displacement
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import icha.equilibrium
@@ -321,19 +321,24 @@ def assert_consistent(contact, state):
     assert np.count_nonzero(beyond) <= state.pending
 
 
-def counting(monkeypatch):
-    """Count the equilibria that are solved."""
+def counting(monkeypatch, most):
+    """Count the equilibria that are solved, and stop at more than `most`."""
     calls = []
     original = icha.equilibrium.balance
 
     def balance(*arguments, **options):
         calls.append(1)
+        assert len(calls) <= most, "the rounds do not end"
         return original(*arguments, **options)
 
     monkeypatch.setattr(icha.equilibrium, "balance", balance)
     return calls
 
 
+# Here contacts that break would be made again for ever.
+@example(seed=140, noise=False, adhesion=-0.5, tabor=1.04, first=2.54, moves=[-0.16, -0.43])
+@example(seed=180, noise=True, adhesion=-0.6, tabor=0.5, first=1.5, moves=[0.33, -0.8])
+@example(seed=231, noise=False, adhesion=-0.09, tabor=1.07, first=2.13, moves=[-0.02, -0.4])
 @settings(max_examples=40, deadline=None, derandomize=True, database=None)
 @given(
     seed=st.integers(0, 10**6),
@@ -358,7 +363,8 @@ def test_equilibrium_always_ends(seed, noise, adhesion, tabor, first, moves):
     contact = Contact(JKR(Material(MODULUS, energy, range_)), asperities, surface.rms_height)
     state, separation = untouched(contact), first * surface.rms_height
     with pytest.MonkeyPatch.context() as monkeypatch:
-        calls = counting(monkeypatch)
+        # Every round but the last adds an asperity, loses one for good, or unites two spots.
+        calls = counting(monkeypatch, 3 * len(asperities) + 2)
         for move in [0.0, *moves]:
             separation += move * surface.rms_height
             calls.clear()
@@ -368,8 +374,6 @@ def test_equilibrium_always_ends(seed, noise, adhesion, tabor, first, moves):
                 pass
             else:
                 assert_consistent(contact, state)
-            # Every round but the last adds an asperity, loses one for good, or unites two spots.
-            assert len(calls) <= 3 * len(asperities) + 2
 
 
 @pytest.mark.parametrize("energy", [0.0, 1e-3, ENERGY])

@@ -137,6 +137,23 @@ def test_gaussian_amplitudes_follow_an_exponential_law():
     assert np.median(ratios) == pytest.approx(np.log(2), abs=3 / np.sqrt(count))
 
 
+def test_gaussian_amplitudes_do_not_depend_on_the_phases():
+    spectrum = SelfAffineSpectrum(**SPECTRUM)
+    products = []
+    for seed in range(4):
+        modes_ = np.fft.fft2(spectrum.realise(64, seed, amplitudes="gaussian").heights) / 64**2
+        k = np.fft.fftfreq(64, 1 / 64)
+        half = (k[None, :] > 0) & (np.hypot(k[:, None], k[None, :]) < 15.5)
+        power = np.abs(modes_[half]) ** 2
+        q = 2 * np.pi / PERIOD * np.hypot(*np.broadcast_arrays(k[:, None], k[None, :]))[half]
+        ratio = power / (written_psd(q, spectrum.plateau) * (2 * np.pi / PERIOD) ** 2)
+        products.append((ratio - 1) * modes_[half] / np.abs(modes_[half]))
+    products = np.concatenate(products)
+    # The covariance with cosine and sine of the phase has the variance 1/2.
+    assert abs(products.mean().real) < 3 * np.sqrt(0.5 / len(products))
+    assert abs(products.mean().imag) < 3 * np.sqrt(0.5 / len(products))
+
+
 def test_heights_are_zero_mean_read_only_and_copied():
     heights = np.random.default_rng(1).normal(size=(16, 16)) + 5
     surface = Surface(heights, 1.0)
