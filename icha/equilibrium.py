@@ -28,7 +28,7 @@ RESIDUAL_TOLERANCE = 1e-10
 # Relative error of a load or an area that was asked for.
 TARGET_TOLERANCE = 1e-11
 _MAX_NEWTON_STEPS = 60
-_LINEAR_TOLERANCE = 1e-4
+_LINEAR_TOLERANCE = 1e-3
 _LINEAR_TOLERANCE_TANGENT = 1e-10
 _FREE = -1
 

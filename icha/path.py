@@ -244,9 +244,11 @@ def load(
         except NotConverged as failure:
             step /= 2
             if step < _SMALLEST_STEP * longest:
+                area, pressure = area_fraction(contact, state.spots), mean_pressure(contact, state.spots)
+                tension = "; the load is still tensile, adhesion may be pulling the surfaces into full contact"
                 raise NotConverged(
-                    f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, after "
-                    f"{total - len(waiting)} of {total} stops: {failure}"
+                    f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, A/A0 = {area:.3g}, "
+                    f"after {total - len(waiting)} of {total} stops: {failure}{tension if pressure < 0 else ''}"
                 ) from failure
             continue
         step = min(longest, 2 * step)
