@@ -228,10 +228,13 @@ def load(
     scale = {REDUCED_PRESSURE: pressure_unit, RELATIVE_LOAD: contact_modulus}
     waiting = [_Stop(target, contact, scale.get(target.kind, 1.0)) for target in path.targets]
     total = len(waiting)
-    state = untouched(contact)
+    first_contact = untouched(contact)
+    state = first_contact
     longest = path.max_step * contact.rms_height
     step = longest
     while waiting:
+        if not len(state.spots) and state.separation > first_contact.separation:
+            state = first_contact  # nothing happens on the way there
         try:
             beyond = equilibrium(contact, state, state.separation - step)
             passed = [stop for stop in waiting if stop.excess(beyond) >= 0]

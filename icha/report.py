@@ -75,7 +75,7 @@ def write_report(
     checks : findings of `icha.checks.check_campaign`.
     comparison : `icha.aggregation.compare_campaign` of the campaign, if there is one.
     surfaces : surface files, for the parameters of their spectra.
-    times_path : the table of what the jobs took, to be linked.
+    times_path : the table of what the jobs took, to be named.
     configuration : text of the configuration as used.
     dataset_path : the campaign dataset's file, to be linked.
     citations : further sources to cite, such as those of measurements.

@@ -21,9 +21,12 @@ from icha.jkr import JKR
 from icha.limits import MAX_REDUCED_PRESSURE
 from icha.material import Material
 from icha.observables import GAP_BINS, PRESSURE_BINS, gap_distribution, pressure_distribution
-from icha.path import RELATIVE_LOAD, Path, load
+from icha.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, load
 from icha.surface import Surface
 from icha.validation import integer
+
+# Snapshots farther up, in h_rms, would not fit the bins of the gap.
+_HIGHEST_SNAPSHOT = 20.0
 
 # Wu's jump-in formula was verified between these Tabor parameters.
 WU_RANGE = (2.0, 5.0)
@@ -151,13 +154,18 @@ def simulate(
         ("path", path, Path),
     ):
         if not isinstance(value, kind):
-            raise ValueError(f"{name}: {value!r} is not an icha.{kind.__name__}")
+            raise ValueError(f"{name}: a {type(value).__name__} is not an icha.{kind.__name__}")
     seed = integer("seed", seed, -1)
     for target in path.targets:
         if target.kind == RELATIVE_LOAD and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
             raise ValueError(
                 f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} lies "
                 f"beyond what the model covers (a reduced pressure of at most {MAX_REDUCED_PRESSURE})"
+            )
+        if target.snapshot and target.kind == MEAN_SEPARATION and target.value > _HIGHEST_SNAPSHOT * surface.rms_height:
+            raise ValueError(
+                f"path: a snapshot at a mean separation of {target.value!r} m lies more than {_HIGHEST_SNAPSHOT:g} rms "
+                f"heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m) up, far above any contact"
             )
     law = JKR(material)
     steps, snapshots, failure = [], [], None

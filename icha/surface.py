@@ -38,8 +38,10 @@ class Surface:
         """Check the values and freeze them."""
         try:
             heights = np.array(self.heights)
-            if np.iscomplexobj(heights):
-                raise TypeError("they are complex")
+            if heights.dtype.kind not in "fiu":
+                raise TypeError(f"they are of type {heights.dtype.name}")
+            if np.ma.is_masked(self.heights):
+                raise ValueError("some are masked; fill or crop them first")
             heights = heights.astype(np.float64)
         except (TypeError, ValueError) as error:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None

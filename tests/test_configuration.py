@@ -199,7 +199,7 @@ BAD = {
     "snapshot twice": ("studies.one.snapshots", [{"area_fraction": 0.02}, {"area_fraction": "2e-2"}], "given twice"),
     "unknown surface": ("studies.one.surfaces", ["rouhg"], "'rouhg' is not defined; allowed: rough"),
     "unknown material": ("studies.one.materials", ["hard"], "'hard' is not defined; allowed: soft"),
-    "negative seed": ("studies.one.seeds", [-1], "studies.one.seeds[0]: -1 is not an integer of at least 0"),
+    "negative seed": ("studies.one.seeds", [-1], "studies.one.seeds[0]: -1 is not an integer from 0"),
     "zero slope": ("studies.one.rms_slopes", [0], "studies.one.rms_slopes[0]: 0 is out of range"),
     "infinite slope": ("studies.one.rms_slopes", [float("inf")], "is not finite"),
     "list that is none": ("studies.one.seeds", 1, "is not a list"),
@@ -241,6 +241,12 @@ BAD = {
         {"fig3_distributions": {"study": "one", "snapshot": {"area_fraction": 0.1}}},
         "'area_fraction 0.1' is no snapshot of study 'one'; allowed: area_fraction 0.02",
     ),
+    "map of a seed that is not there": (
+        "figures",
+        {"fig4_contact_map": {"study": "one", "seed": 9}},
+        "figures.fig4_contact_map.seed: 9 is not in study 'one'; allowed: 1, 2",
+    ),
+    "grid beyond any memory": ("surfaces.rough.grid", 10**9, "surfaces.rough.grid"),
     "missing surface file": (
         "surfaces.rough",
         {"kind": "file", "path": "none.npy", "height_unit": "um", "period": "1 mm"},
@@ -253,6 +259,20 @@ BAD = {
     ),
     "ORCID": ("authors", [{"name": "A", "orcid": "1"}], "authors[0].orcid"),
 }
+
+
+def test_figures_of_snapshots_need_one(load):
+    figures = {"fig3_distributions": {"study": "one"}}
+    load({"figures": figures})
+    with pytest.raises(ConfigurationError, match=r"fig3_distributions\.study: 'one' keeps no snapshot to draw"):
+        load({"figures": figures, "studies.one.snapshots": []})
+
+
+def test_random_surfaces_and_files_need_studies_of_their_own(load, tmp_path):
+    np.save(tmp_path / "own.npy", np.random.default_rng(1).random((16, 16)))
+    own = {"kind": "file", "path": "own.npy", "height_unit": "um", "period": "1 mm"}
+    with pytest.raises(ConfigurationError, match=r"studies\.one\.surfaces: 'rough, own' mixes"):
+        load({"surfaces.own": own, "studies.one.surfaces": ["rough", "own"]})
 
 
 @pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))

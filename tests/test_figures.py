@@ -14,7 +14,8 @@ from icha.figures import (
     fig5_multi_slope,
     fig6_spots_by_slope,
 )
-from icha.figures.select import find_snapshot, path_steps, periodic_circles
+from icha.figures.select import find_snapshot, path_steps
+from icha.figures.spots import periodic_circles
 from icha.figures.style import number, quantity, save, unit_for
 from icha.records import read_dataset, write_surface
 from icha.reference import reference_dataset

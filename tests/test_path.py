@@ -5,6 +5,7 @@ import pytest
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, simulate
 from icha.asperities import find_summits
+from icha.checks import check_run
 from icha.equilibrium import Contact, NotConverged, area_fraction, equilibrium, mean_pressure, untouched
 from icha.jkr import JKR
 from icha.path import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, load
@@ -215,3 +216,23 @@ def test_progress_tells_every_stop(surface):
 def test_bad_paths_are_refused_by_name(arguments, message):
     with pytest.raises(ValueError, match=message):
         Path(**arguments)
+
+
+def test_the_way_to_first_contact_costs_nothing(surface):
+    """A stop a metre up is met, without a step for every tenth of h_rms on the way down."""
+    path = Path(mean_separations=[1.0, 1.5 * surface.rms_height], snapshots=[])
+    stops = list(load(contact_of(surface, BARE), path, MODULUS, MODULUS))
+    assert [len(state.spots) > 0 for _, state in stops] == [False, True]
+    reached = [state.separation for _, state in stops]
+    assert reached == pytest.approx([1.0, 1.5 * surface.rms_height], rel=1e-12)
+
+
+def test_a_snapshot_before_first_contact_is_all_gap(surface):
+    high = 8 * surface.rms_height
+    path = Path(reduced_pressures=[1e-3], snapshots=[("mean_separation", high)])
+    run = simulate(surface, ADHESIVE, path)
+    assert float(run.contact_area_fraction[0]) == 0 and run.sizes["spot"] == 0
+    assert float((run.gap_density * np.diff(run.gap_bin_edges)).sum()) == pytest.approx(1, abs=1e-12)
+    assert all(check.passed for check in check_run(run))
+    with pytest.raises(ValueError, match=r"path: a snapshot at a mean separation of 1\.0 m"):
+        simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-3], snapshots=[("mean_separation", 1.0)]))

@@ -262,3 +262,13 @@ def test_bad_period_is_refused_by_name(period):
 def test_bad_slope_is_refused_by_name(rms_slope):
     with pytest.raises(ValueError, match="rms_slope"):
         Surface(_with(0.0), 1.0).scaled_to_rms_slope(rms_slope)
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [np.ma.masked_greater(np.arange(64.0).reshape(8, 8), 60), np.eye(8, dtype=bool), np.full((8, 8), "1.0")],
+    ids=["masked", "boolean", "text"],
+)
+def test_heights_that_are_no_plain_numbers_are_refused(heights):
+    with pytest.raises(ValueError, match="heights: must be an array of real numbers"):
+        Surface(heights, 1e-3)

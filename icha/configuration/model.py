@@ -69,13 +69,13 @@ def _number(allowed, *, above=None, least=None, most=None):
     return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
 
 
-def _integer(least):
+def _integer(least, most=2**31 - 1):
     def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or value < least or value > 2**31 - 1:
-            raise ValueError(f"is not an integer of at least {least}; allowed: {least}, {least + 1}, …")
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise ValueError(f"is not an integer from {least} to {most}; allowed: {least}, {least + 1}, … {most}")
         return value
 
-    schema = {"type": "integer", "minimum": least}
+    schema = {"type": "integer", "minimum": least, "maximum": most}
     return Annotated[int, BeforeValidator(read), WithJsonSchema(schema)]
 
 
@@ -139,7 +139,7 @@ class SelfAffineSurface(Section):
         "grid cells (an error below), better 4 (a warning below) or 8."
     )
     hurst: _number("a number in (0, 1]", above=0, most=1) = Field(description="Hurst exponent H, in (0, 1].")
-    grid: _integer(8) = Field(description="Grid points along a side.")
+    grid: _integer(8, 32768) = Field(description="Grid points along a side.")
     amplitudes: Literal["fixed", "gaussian"] = Field(
         default="fixed",
         description="Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and "
@@ -482,6 +482,12 @@ class Campaign(Section):
             for kind, names in (("surfaces", self.surfaces), ("materials", self.materials)):
                 for index, name in enumerate(getattr(study, kind)):
                     known(("studies", label, kind, index), name, names)
+            kinds = {self.surfaces[name].kind for name in study.surfaces if name in self.surfaces}
+            if len(kinds) > 1:
+                reason = (
+                    "mixes random surfaces with surfaces read from a file, which have no seed; allowed: a study each"
+                )
+                found.append((("studies", label, "surfaces"), ", ".join(study.surfaces), reason))
         for label, measurement in self.measurements.items():
             known(("measurements", label, "study"), measurement.study, self.studies)
             if measurement.material is not None:
@@ -495,8 +501,10 @@ class Campaign(Section):
         return found
 
     def _figure_problems(self, location, figure, study):
+        seeded = any(self.surfaces[name].kind == "self_affine" for name in study.surfaces if name in self.surfaces)
         for key, there in (
             ("surface", study.surfaces),
+            ("seed", study.seeds if seeded else [0]),
             ("material", study.materials),
             ("rms_slope", study.rms_slopes),
         ):
@@ -510,6 +518,8 @@ class Campaign(Section):
                 if kind not in kinds:
                     reason = f"has no snapshot of kind {kind}; allowed: a study with one"
                     yield (*location, "study"), figure.study, reason
+        if isinstance(figure, SnapshotFigure) and study.snapshots == []:
+            yield (*location, "study"), figure.study, "keeps no snapshot to draw; allowed: a study with one"
         snapshot = getattr(figure, "snapshot", None)
         if snapshot is not None and snapshot not in (study.snapshots or []):
             there = ", ".join(f"{kind} {value:g}" for kind, value in (s.target for s in study.snapshots or []))

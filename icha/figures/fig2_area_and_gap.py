@@ -25,7 +25,7 @@ CAPTION = (
     "F/(E* h'rms A0), on double logarithmic axes. Markers: ICHA, one for each stop of the loading path; open markers "
     "are without adhesion. Lines: adhesionless theories of Persson (area) and of Yang and Persson (separation), and "
     "the linear law of Bush, Gibson and Thomas where few summits touch. Crosses: adhesionless Green's function "
-    "molecular dynamics (GFMD), reduced from published data."
+    "molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no roll-off), reduced from published data."
 )
 
 PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"

@@ -93,9 +93,10 @@ def figure(
         left.loglog(u, density, **look)
         p, density = pressure_points(run, at)
         right.semilogy(p, density, markevery=3, **look)
-        shown = density > 1e-3 * density.max()
-        lowest, highest = min(lowest, p[shown].min()), max(highest, p[shown].max())
-        top = max(top, density.max())
+        if len(density):  # before first contact there is no pressure
+            shown = density > 1e-3 * density.max()
+            lowest, highest = min(lowest, p[shown].min()), max(highest, p[shown].max())
+            top = max(top, density.max())
         step = int(run["snapshot_step"].values[at])
         load = float(run["reduced_pressure"].values[step])
     line = np.linspace(0.002, highest, 300)
@@ -106,7 +107,8 @@ def figure(
     right.set_xlabel(r"contact pressure  $p/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
     right.set_ylabel(r"$P(p)\; E^{\ast}h_{\mathrm{rms}}^{\prime}$")
     right.set_xlim(lowest * 1.05, highest * 1.05)
-    right.set_ylim(top * 5e-5, top * 3)
+    if top > 0:
+        right.set_ylim(top * 5e-5, top * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
     kind_shown, value = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
     left.text(

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from icha.figures.select import find_snapshot, periodic_circles, pick, spots_of, study_runs
+from icha.figures.select import find_snapshot, pick, spots_of, study_runs
+from icha.figures.spots import draw_spots, periodic_circles
 from icha.figures.style import TWO_COLUMNS, new_figure, number, panel_label, styled, unit_for
 
 CAPTION = (
@@ -123,24 +122,6 @@ def figure(
     )
     right.set_title(f"enlarged ×{1 / _ZOOM:g}", loc="right")
     return fig
-
-
-def draw_spots(axes: Axes, circles, **look) -> None:
-    """Add circles (x, y, radius in data units) to axes."""
-    if not circles:
-        return
-    x, y, radius = np.array(circles).T
-    axes.add_collection(
-        EllipseCollection(
-            2 * radius,
-            2 * radius,
-            np.zeros(len(radius)),
-            offsets=np.column_stack([x, y]),
-            offset_transform=axes.transData,
-            units="xy",
-            **look,
-        )
-    )
 
 
 def _frame(corner, size):

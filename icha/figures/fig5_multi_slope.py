@@ -27,7 +27,7 @@ from icha.figures.style import (
 
 CAPTION = (
     "Real contact area over nominal area against the reduced pressure F/(E* h'rms A0) (a) and against F/(E* A0) (b) "
-    "for several rms slopes (shape of the markers) and materials (colour). Without adhesion the curves of one "
+    "for several rms slopes (shape of the markers) and materials (colour and size). Without adhesion the curves of one "
     "topography, scaled to different slopes, are one curve in (a); what adhesion adds depends on the material and "
     "grows as the slope falls. In (b) the slope orders the curves: at a given load the area falls as the slope rises. "
     "Measurements, where given, are drawn as lines."

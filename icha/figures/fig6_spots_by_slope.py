@@ -7,8 +7,8 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Wedge
 
-from icha.figures.fig4_contact_map import draw_spots
-from icha.figures.select import find_snapshot, periodic_circles, pick, spots_of, study_runs
+from icha.figures.select import find_snapshot, pick, spots_of, study_runs
+from icha.figures.spots import draw_spots, periodic_circles
 from icha.figures.style import (
     BLUE,
     GREEN,

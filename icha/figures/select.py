@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import xarray as xr
 
@@ -67,12 +65,3 @@ def spots_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
     """The spots of one snapshot of a run."""
     own = [name for name, variable in run.variables.items() if variable.dims == ("spot",)]
     return run[own].isel(spot=np.flatnonzero(run["spot_snapshot"].values == snapshot))
-
-
-def periodic_circles(x, y, radius, period: float) -> Iterator[tuple[float, float, float]]:
-    """Centre and radius of every circle, and of its images that reach into the cell [0, L)²."""
-    for cx, cy, r in zip(x, y, radius, strict=True):
-        for dx in (-period, 0.0, period):
-            for dy in (-period, 0.0, period):
-                if -r < cx + dx < period + r and -r < cy + dy < period + r:
-                    yield cx + dx, cy + dy, r
