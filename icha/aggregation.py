@@ -71,8 +71,9 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].values[None, None, :, None, None]
     loads = {"reduced_pressure": pressure, "relative_load": pressure * slope}
-    curves = {name: study[name].transpose(*LABELS, "step").values for name in ("contact_area_fraction",)}
-    curves["reduced_separation"] = study["reduced_separation"].transpose(*LABELS, "step").values
+    curves = {
+        name: study[name].transpose(*LABELS, "step").values for name in ("contact_area_fraction", "reduced_separation")
+    }
 
     variables, coords = {"status": study["status"]}, {label: study[label] for label in LABELS}
     for axis, load in loads.items():

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from icha.labels import RunLabels
 from icha.records import COMPLETE, INCOMPLETE, MISSING, STATUS_MEANINGS
 
 LABELS = ("surface", "seed", "rms_slope", "material")
@@ -29,20 +29,6 @@ _VARIES_WITH = {
     "snapshot_target": (),
 }
 _SPOT_DIM = "spot"
-
-
-class RunLabels(NamedTuple):
-    """Which run of a campaign: names of study, surface and material, seed, and rms slope as configured."""
-
-    study: str
-    surface: str
-    seed: int
-    rms_slope: float
-    material: str
-
-    def __str__(self):
-        """The run's place under `runs/`."""
-        return f"{self.study}/{self.surface}/seed{self.seed}/slope{self.rms_slope:g}/{self.material}"
 
 
 def campaign_tree(

@@ -18,7 +18,7 @@ import numpy as np
 import scipy.fft
 import scipy.sparse
 from scipy.spatial import cKDTree
-from scipy.special import erf
+from scipy.special import erf, erfc
 
 from icha.jkr import JKR
 
@@ -50,8 +50,18 @@ def _smooth(r, alpha):
     return value, laplacian
 
 
+def _smooth_mode(q, alpha, contact_modulus, period):
+    """Displacement of a mode of wave number q > 0 by a unit point force and its images, the smooth half."""
+    return 2 / (contact_modulus * q * period**2) * erfc(q / (2 * alpha))
+
+
+def _short_mean(alpha, contact_modulus, period):
+    """Mean displacement by a unit point force and its images, the short-ranged half; the smooth half has none."""
+    return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
+
+
 def periodic_difference(first, second, period):
-    """Shortest vectors first - second between points of the periodic cell, (..., 2), m."""
+    """Shortest way first - second between coordinates in the periodic cell, of any shape, m."""
     difference = first - second
     return difference - period * np.rint(difference / period)
 
@@ -73,7 +83,7 @@ class _FarField:
         q2 = k[:, None] ** 2 + k[None, :] ** 2
         q2[highest, highest] = 1.0
         q = np.sqrt(q2)
-        green = 2 / (self.contact_modulus * q * self.period**2) * np.exp(_log_erfc(q / (2 * self.alpha)))
+        green = _smooth_mode(q, self.alpha, self.contact_modulus, self.period)
         green[highest, highest] = 0.0
         return green, -q2 * green
 
@@ -110,12 +120,6 @@ class _FarField:
         mirrored = np.conj(c[::-1, ::-1])
         field = green * (0.5 * (c + mirrored)) + (laplacian / scale) * (-0.5j * (c - mirrored))
         return np.ascontiguousarray(distribute.execute(np.ascontiguousarray(field)).real)
-
-
-def _log_erfc(x):
-    from scipy.special import log_ndtr
-
-    return np.log(2.0) + log_ndtr(-np.sqrt(2.0) * x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +198,7 @@ class Interaction:
         values = pair_values(r, source) - scale * (force[source] * smooth + moment[source] * laplacian)
         w = np.bincount(target, weights=values, minlength=len(self._points)).astype(float)
         w += self._far(force, moment)
-        # The short-ranged halves alone have this mean.
-        w -= scale * np.sum(force) * 2 * np.sqrt(np.pi) / (self._alpha * self.period**2)
+        w -= np.sum(force) * _short_mean(self._alpha, self.law.material.contact_modulus, self.period)
         if self.targets is None:
             w -= scale * (force * self._own_smooth[0] + moment * self._own_smooth[1])
         return w
@@ -215,7 +218,7 @@ class Interaction:
         values = values - scale * (force[source] * smooth + moment[source] * laplacian)
         shape = (len(self._points), len(self.sources))
         near = scipy.sparse.csr_matrix((values, (target, source)), shape=shape)
-        mean = scale * 2 * np.sqrt(np.pi) / (self._alpha * self.period**2)
+        mean = _short_mean(self._alpha, law.material.contact_modulus, self.period)
         own = None
         if self.targets is None:
             own = scale * (force * self._own_smooth[0] + moment * self._own_smooth[1])
@@ -265,7 +268,7 @@ def displacement_field(law: JKR, period: float, grid: int, centres, a, R) -> np.
     ]
     q = np.sqrt(k[:, None] ** 2 + k[None, highest:] ** 2)
     q[highest, 0] = 1.0
-    green = 2 / (law.material.contact_modulus * q * period**2) * np.exp(_log_erfc(q / (2 * alpha)))
+    green = _smooth_mode(q, alpha, law.material.contact_modulus, period)
     green[highest, 0] = 0.0
     half = np.zeros((grid, grid // 2 + 1), dtype=complex)
     rows = np.arange(-highest, highest + 1) % grid
@@ -273,7 +276,7 @@ def displacement_field(law: JKR, period: float, grid: int, centres, a, R) -> np.
     w += scipy.fft.irfft2(half, s=(grid, grid), norm="forward", overwrite_x=True, workers=1)
 
     scale = 1 / (np.pi * law.material.contact_modulus)
-    w -= scale * np.sum(force) * 2 * np.sqrt(np.pi) / (alpha * period**2)
+    w -= np.sum(force) * _short_mean(alpha, law.material.contact_modulus, period)
     window = np.minimum(np.maximum(reach, _WINDOW * a), 0.5 * period)
     for j in range(len(a)):
         rows, columns, r = nodes_around(centres[j], window[j], grid, period)

@@ -27,6 +27,8 @@ from icha.jkr import JKR
 RESIDUAL_TOLERANCE = 1e-10
 # Relative error of a load or an area that was asked for.
 TARGET_TOLERANCE = 1e-11
+# One weighs as much as the other in a solve.
+_MISS_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
 _MAX_NEWTON_STEPS = 60
 _LINEAR_TOLERANCE = 1e-3
 _LINEAR_TOLERANCE_TANGENT = 1e-10
@@ -257,13 +259,10 @@ def _separation_response(contact: Contact, spots: Spots, tolerance: float):
     return solve(-np.ones(len(a)), tolerance)
 
 
-# A relative error of TARGET_TOLERANCE in the control weighs as much as RESIDUAL_TOLERANCE in the equilibrium.
-_MISS_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
-
-
 def _linearised(law, interaction, a, R, delta):
     """A solver of the linearised equilibrium, (1 + W' da/d(delta)) x = b, and da/d(delta)."""
     radius_response = _radius_response(law, a, R, delta)
+    # A spot of radius zero has no tangent; one too small to matter stands for it, and its radius_response is zero.
     tangent = interaction.tangent(np.where(a > 0, a, np.finfo(float).tiny ** 0.25))
     size = len(a)
     operator = LinearOperator((size, size), matvec=lambda x: x + tangent(radius_response * x), dtype=float)

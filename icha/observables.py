@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.elasticity import displacement_field, nodes_around
+from icha.elasticity import displacement_field, nodes_around, periodic_difference
 from icha.equilibrium import ContactState, Spots
 from icha.jkr import JKR
 from icha.surface import Surface
@@ -59,8 +59,8 @@ def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
     spacing = surface.spacing
     for centre, a in zip(spots.position, spots.contact_radius, strict=True):
         rows, columns = _cells_around(centre, a, surface)
-        dx = _nearest(columns * spacing - centre[0], surface.period)
-        dy = _nearest(rows * spacing - centre[1], surface.period)
+        dx = periodic_difference(columns * spacing, centre[0], surface.period)
+        dy = periodic_difference(rows * spacing, centre[1], surface.period)
         half = 0.5 * spacing
         area = (
             _disc_below(dx + half, dy + half, a)
@@ -130,10 +130,6 @@ def covered_nodes(surface: Surface, spots: Spots) -> np.ndarray:
         rows, columns, _ = nodes_around(centre, min(a, 0.5 * surface.period), surface.grid, surface.period)
         covered[rows, columns] = True
     return covered
-
-
-def _nearest(offset, period):
-    return offset - period * np.rint(offset / period)
 
 
 def _cells_around(centre, a, surface):

@@ -18,7 +18,7 @@ from icha.equilibrium import (
     untouched,
 )
 from icha.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
-from icha.validation import number, positive
+from icha.validation import positive
 
 REDUCED_PRESSURE = "reduced_pressure"
 RELATIVE_LOAD = "relative_load"
@@ -137,7 +137,7 @@ def _stops(name, kind, values):
         raise ValueError(f"{name}: {values!r} is not a list of numbers") from None
     if not values:
         raise ValueError(f"{name}: the list is empty")
-    values = [_covered(f"{name}[{i}]", kind, number(f"{name}[{i}]", v)) for i, v in enumerate(values)]
+    values = [_covered(f"{name}[{i}]", kind, v) for i, v in enumerate(values)]
     for i, (one, next_one) in enumerate(itertools.pairwise(values)):
         if not (next_one < one if kind == MEAN_SEPARATION else next_one > one):
             order = "decreasing" if kind == MEAN_SEPARATION else "increasing"

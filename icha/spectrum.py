@@ -117,7 +117,7 @@ class SelfAffineSpectrum:
         return math.sqrt(2 * self.plateau * float(np.sum(self._shape(k))) * q**2)
 
     def continuum_rms_height(self) -> float:
-        """h_rms in m from the integral of C(q) over the plane, C0 being fixed by `continuum_rms_slope`'s integral.
+        """h_rms in m from integrals over the plane of wave vectors, as if the cell were infinite.
 
         h_rms^2 = 2 pi C0 [(q0^2-qL^2)/2 + q0^2 (1-(q1/q0)^(-2H))/(2H)], and for the slope q^3 under the integral.
         The lattice of a finite cell differs from it by the sampling of its few longest waves.

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 
-from icha.validation import positive
+from icha.validation import flaw_of_heights, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +45,8 @@ class Surface:
             heights = heights.astype(np.float64)
         except (TypeError, ValueError) as error:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
-        if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 8:
-            raise ValueError(f"heights: shape {heights.shape} is not a square grid of at least 8 x 8 points")
-        bad = int(np.count_nonzero(~np.isfinite(heights)))
-        if bad:
-            raise ValueError(f"heights: {bad} of {heights.size} values are not finite; fill or crop them first")
-        if np.ptp(heights) == 0:
-            raise ValueError("heights: all values are the same; a flat surface has no asperities")
+        if flaw := flaw_of_heights(heights):
+            raise ValueError(f"heights: {flaw}")
         heights -= heights.mean()
         heights.flags.writeable = False
         object.__setattr__(self, "heights", heights)

@@ -10,7 +10,6 @@ from icha.configuration import model
 from icha.configuration.expansion import (
     campaign_sha256,
     measurement_settings,
-    number_label,
     run_cases,
     run_settings,
     run_sha256,
@@ -20,6 +19,7 @@ from icha.configuration.expansion import (
 from icha.configuration.load import ConfigurationError, load_configuration
 from icha.configuration.schema import json_schema, readme_with_tables
 from icha.configuration.units import to_number, to_si
+from icha.labels import number_label
 
 REPOSITORY = Path(__file__).parents[1]
 SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])

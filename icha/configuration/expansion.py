@@ -5,53 +5,21 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from dataclasses import dataclass
 
 from icha.configuration.model import Campaign, SelfAffineSurface
+from icha.labels import RunLabels
 
 
-@dataclass(frozen=True)
-class RunCase:
-    """One loading sweep: which topography, at which rms slope, against which material."""
-
-    study: str
-    surface: str
-    seed: int
-    rms_slope: float
-    material: str
-
-    @property
-    def slope_label(self) -> str:
-        """The rms slope as it stands in file names: the shortest text that reads back as the same number."""
-        return number_label(self.rms_slope)
-
-    @property
-    def path(self) -> str:
-        """Where the run's dataset stands among the runs, without the ending."""
-        return f"{self.study}/{self.surface}/seed{self.seed}/slope{self.slope_label}/{self.material}"
-
-
-def number_label(value: float) -> str:
-    """The shortest text that reads back as `value`: 0.2 is `0.2`, 1.0 is `1`."""
-    return repr(float(value)).removesuffix(".0")
-
-
-def run_cases(campaign: Campaign) -> list[RunCase]:
+def run_cases(campaign: Campaign) -> list[RunLabels]:
     """All runs of a campaign, study by study, in the order of the configuration's lists."""
     return [
-        RunCase(label, surface, seed, slope, material)
+        RunLabels(label, surface, seed, slope, material)
         for label, study in campaign.studies.items()
         for surface in study.surfaces
         for seed, slope, material in itertools.product(
-            surface_seeds(campaign, label, surface), study.rms_slopes, study.materials
+            campaign.surface_seeds(label, surface), study.rms_slopes, study.materials
         )
     ]
-
-
-def surface_seeds(campaign: Campaign, study: str, surface: str) -> list[int]:
-    """Seeds of a surface in a study; a surface that is read from a file has one realisation, numbered 0."""
-    random = isinstance(campaign.surfaces[surface], SelfAffineSurface)
-    return campaign.studies[study].seeds if random else [0]
 
 
 def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
@@ -59,7 +27,7 @@ def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
     return list(dict.fromkeys((case.surface, case.seed) for case in run_cases(campaign)))
 
 
-def run_settings(campaign: Campaign, case: RunCase) -> dict:
+def run_settings(campaign: Campaign, case: RunLabels) -> dict:
     """Everything that determines a run's numbers, in SI units: arguments of the model's own objects."""
     study = campaign.studies[case.study]
     targets = study.targets.model_dump(exclude_none=True)
@@ -103,7 +71,7 @@ def _load_unit(campaign, measurement) -> float:
     return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
 
 
-def run_sha256(campaign: Campaign, case: RunCase) -> str:
+def run_sha256(campaign: Campaign, case: RunLabels) -> str:
     """Checksum of everything that determines a run."""
     return _sha256([run_settings(campaign, case), surface_settings(campaign, case.surface)])
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from icha.validation import flaw_of_heights
+
 _ALLOWED = "allowed: a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
 
 
@@ -31,13 +33,8 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
         raise ValueError(f"cannot be read ({error}); {_ALLOWED}") from None
     if heights.dtype.kind not in "iuf":
         raise ValueError(f"holds {heights.dtype}, not real numbers; {_ALLOWED}")
-    if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 8:
-        raise ValueError(f"holds an array of shape {heights.shape}; {_ALLOWED}")
-    bad = int(np.count_nonzero(~np.isfinite(heights)))
-    if bad:
-        raise ValueError(f"holds {bad} of {heights.size} heights that are not finite; {_ALLOWED}")
-    if np.ptp(heights) == 0:
-        raise ValueError(f"holds heights that are all the same; {_ALLOWED}")
+    if flaw := flaw_of_heights(heights):
+        raise ValueError(f"holds {flaw}; {_ALLOWED}")
     return heights.astype(float) * metres_per_unit
 
 

@@ -500,11 +500,16 @@ class Campaign(Section):
                 found += self._figure_problems(("figures", label), figure, self.studies[figure.study])
         return found
 
+    def surface_seeds(self, study: str, surface: str) -> list[int]:
+        """Seeds of a surface in a study; a surface that is read from a file has one realisation, numbered 0."""
+        return self.studies[study].seeds if isinstance(self.surfaces[surface], SelfAffineSurface) else [0]
+
     def _figure_problems(self, location, figure, study):
-        seeded = any(self.surfaces[name].kind == "self_affine" for name in study.surfaces if name in self.surfaces)
+        known = [name for name in study.surfaces if name in self.surfaces]
+        seeds = dict.fromkeys(seed for name in known for seed in self.surface_seeds(figure.study, name))
         for key, there in (
             ("surface", study.surfaces),
-            ("seed", study.seeds if seeded else [0]),
+            ("seed", seeds),
             ("material", study.materials),
             ("rms_slope", study.rms_slopes),
         ):

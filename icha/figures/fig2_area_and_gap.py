@@ -48,8 +48,6 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         If there is no such study or no run in it.
     """
     runs = study_runs(campaign, study)
-    if not runs:
-        raise ValueError(f"study {study}: there is no run to draw")
     dataset = campaign[study].to_dataset()
     materials = [str(name) for name in dataset["material"].values]
     lines = list(dict.fromkeys((labels.surface, labels.rms_slope) for labels, _ in runs))

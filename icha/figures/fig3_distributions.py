@@ -61,8 +61,6 @@ def figure(
         If there is no such study or snapshot.
     """
     runs = study_runs(campaign, study)
-    if not runs:
-        raise ValueError(f"study {study}: there is no run to draw")
     first = runs[0][0]
     chosen = [
         (labels, run)

@@ -62,8 +62,6 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
         If there is no such study or no run in it.
     """
     runs = study_runs(campaign, study)
-    if not runs:
-        raise ValueError(f"study {study}: there is no run to draw")
     dataset = campaign[study].to_dataset()
     materials = [str(name) for name in dataset["material"].values]
     # The largest slope comes first and gets circles, as in the paper.

@@ -60,8 +60,6 @@ def figure(
         If there is no such study, run or snapshot.
     """
     runs = study_runs(campaign, study)
-    if not runs:
-        raise ValueError(f"study {study}: there is no run to draw")
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
     seed = pick("seed", seed, [labels.seed for labels, _ in runs if labels.surface == surface])
     own = [(labels, run) for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)]

@@ -9,16 +9,19 @@ from icha.campaign import RunLabels, run_labels, select_run
 
 
 def study_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All runs of a study that are there.
+    """All runs of a study that are there, at least one.
 
     Raises
     ------
     ValueError
-        If the campaign has no such study.
+        If the campaign has no such study, or no run of it.
     """
     if study not in campaign.children:
         raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
-    return [(labels, select_run(campaign, labels)) for labels in run_labels(campaign) if labels.study == study]
+    runs = [(labels, select_run(campaign, labels)) for labels in run_labels(campaign) if labels.study == study]
+    if not runs:
+        raise ValueError(f"study {study}: there is no run to draw")
+    return runs
 
 
 def pick(labels: str, wanted, there: list):

@@ -22,7 +22,7 @@ from icha.configuration.expansion import (
 CONFIGURATION = campaign_configuration(workflow)
 CAMPAIGN = CONFIGURATION.campaign
 CASES = {f"{case.path}.nc": case for case in run_cases(CAMPAIGN)}
-LABELS = [(case.study, case.surface, case.seed, case.rms_slope, case.material) for case in CASES.values()]
+LABELS = [tuple(case) for case in CASES.values()]
 
 RESULTS = f"results/{CAMPAIGN.name}"
 LOGS = f"{RESULTS}/logs"

@@ -22,7 +22,7 @@ asperities). All quantities are in SI units; every variable names its unit.
 | `surfaces/` | the topographies, at rms slope 1 |
 | `references/` | theory curves and published points for these surfaces |
 | `figures/`, `report.html` | figures, and the report with tables and checks |
-| `checks.json` | checks of the results |
+| `checks.json`, `verdict.txt` | checks of the results, and that all passed |
 | `SHA256SUMS` | checksums of all files: `sha256sum -c SHA256SUMS` |
 """
 

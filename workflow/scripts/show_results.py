@@ -7,8 +7,8 @@ from icha.configuration.load import load_configuration
 
 def show_results(configuration="config/config.yaml"):
     """Print where the results of the campaign of a configuration file are."""
-    results = f"results/{load_configuration(configuration).campaign.name}"
-    name = results.rpartition("/")[2]
+    name = load_configuration(configuration).campaign.name
+    results = f"results/{name}"
     print(f"figures: {results}/figures/\ndataset: {results}/dataset/{name}.nc\nreport:  {results}/report.html")
 
 

@@ -1,0 +1,30 @@
+"""What a run of a campaign is called."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class RunLabels(NamedTuple):
+    """Which run of a campaign: names of study, surface and material, seed, and rms slope as configured."""
+
+    study: str
+    surface: str
+    seed: int
+    rms_slope: float
+    material: str
+
+    @property
+    def path(self) -> str:
+        """Where the run's dataset stands among the runs, without the ending."""
+        slope = number_label(self.rms_slope)
+        return f"{self.study}/{self.surface}/seed{self.seed}/slope{slope}/{self.material}"
+
+    def __str__(self):
+        """The run's place among the runs."""
+        return self.path
+
+
+def number_label(value: float) -> str:
+    """The shortest text that reads back as `value`: 0.2 is `0.2`, 1.0 is `1`."""
+    return repr(float(value)).removesuffix(".0")
