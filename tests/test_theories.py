@@ -98,9 +98,37 @@ def test_mean_separation_is_continuous_where_the_plateau_ends():
     np.testing.assert_allclose(without, nearly, rtol=2e-3)
 
 
-def test_pressure_must_be_positive():
+@pytest.mark.parametrize("hurst", [0.8, 1.0])
+def test_stiffness_is_the_derivative_of_the_separation(hurst):
+    p, step = np.array([1e-4, 1e-2, 0.1, 0.5]), 1e-3
+    surface = spectrum(hurst=hurst)
+    above, below = (theories.persson_mean_separation(p * np.exp(s), surface) for s in (step, -step))
+    stiffness = p * 2 * step / (below - above)
+    np.testing.assert_allclose(theories.persson_stiffness(p, surface), stiffness, rtol=2e-4)
+
+
+def test_stiffness_is_proportional_to_small_pressures():
+    p = np.array([1e-7, 1e-6, 1e-5])
+    ratio = theories.persson_stiffness(p, spectrum()) / p
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-3)
+    # u0 is 0.4-0.5 h_rms (Persson, Phys. Rev. Lett. 99 (2007) 125502).
+    assert 1 / ratio[0] == pytest.approx(0.45, abs=0.1)
+
+
+def test_stiffness_is_near_boundary_elements():
+    # Slopes of the separation between the loads of `test_mean_separation_is_near_boundary_elements`; at smaller ones
+    # few of a finite surface's highest hills touch, and the ratio of stiffness to pressure rises (Pastewka et al.,
+    # Phys. Rev. E 87 (2013) 062809).
+    p = np.array([1e-2, 3.16e-2, 0.1])
+    measured = np.diff(np.log(p)) / -np.diff([1.62, 1.07, 0.52])
+    middle = np.sqrt(p[1:] * p[:-1])
+    np.testing.assert_allclose(theories.persson_stiffness(middle, spectrum()) / middle, measured, rtol=0.15)
+
+
+@pytest.mark.parametrize("theory", [theories.persson_mean_separation, theories.persson_stiffness])
+def test_pressure_must_be_positive(theory):
     with pytest.raises(ValueError, match="reduced_pressure"):
-        theories.persson_mean_separation([0.0, 0.1], spectrum())
+        theory([0.0, 0.1], spectrum())
 
 
 def test_literature_is_cited_and_consistent():
@@ -130,4 +158,4 @@ def test_reference_dataset_is_complete_and_byte_stable(tmp_path):
     dataset = reference_dataset(spectrum())
     assert float(dataset["bush_gibson_thomas_area_fraction"].max()) <= 0.1
     assert all("references" in dataset[name].attrs for name in ("persson_area_fraction", "gfmd_area_fraction"))
-    assert "persson_reduced_separation" not in reference_dataset()
+    assert {"persson_reduced_separation", "persson_reduced_stiffness"}.isdisjoint(reference_dataset())

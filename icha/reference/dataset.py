@@ -24,7 +24,7 @@ def reference_dataset(
 
     Parameters
     ----------
-    spectrum : of the surface; without one (a measured surface) there is no theory of its mean separation.
+    spectrum : of the surface; without one (a measured surface) there is no theory of its separation and stiffness.
     reduced_pressures : p/(E* h'_rms), increasing and positive.
     attrs : further global attributes.
     """
@@ -60,10 +60,16 @@ def reference_dataset(
             "mean separation over rms height, Yang and Persson",
             yang,
         )
+        variables["persson_reduced_stiffness"] = variable(
+            "reduced_pressure",
+            theories.persson_stiffness(pressure, spectrum),
+            "contact stiffness times rms height over contact modulus and rms slope, Yang and Persson",
+            yang,
+        )
     coords = {"reduced_pressure": variable("reduced_pressure", pressure, reduced, "")}
     title = {
         "title": "Theories of adhesionless rough contact, and published points",
-        "summary": "Contact area and mean separation against reduced pressure.",
+        "summary": "Contact area, mean separation and contact stiffness against reduced pressure.",
         "Conventions": "CF-1.11",
     }
     return xr.Dataset(variables, coords, title | dict(attrs))

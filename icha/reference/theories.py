@@ -6,6 +6,8 @@ Pressures are reduced, p* = p/(E* h'_rms). Sources:
   slope, A/A0 = erf(sqrt(2) p*), e.g. M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2.
 - Yang & Persson: C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214,
   doi:10.1088/0953-8984/20/21/215214.
+- Stiffness proportional to pressure: B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502,
+  doi:10.1103/PhysRevLett.99.125502.
 - Bush, Gibson & Thomas: Wear 35 (1975) 87-111, doi:10.1016/0043-1648(75)90145-3.
 """
 
@@ -63,6 +65,25 @@ def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GA
     gamma : their parameter; 0.45 unless told.
     points : wave numbers of the quadrature on either side of the roll-off; odd, for Simpson's rule.
     """
+    return _over_wave_numbers(lambda t: _stored_share(t, gamma), reduced_pressure, spectrum, points)
+
+
+def persson_stiffness(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, points=401):
+    r"""Contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures, in the theory of Yang & Persson (2008).
+
+    The derivative of `persson_mean_separation`, in closed form but for the integral over the wave numbers:
+
+        -p du/dp = sqrt(pi) int dq q^2 C(q) w(q) [gamma + 3 (1 - gamma) P^2] exp(-(w p/E*)^2).
+
+    For small pressures this is a length u0, so that p falls as exp(-u/u0) and the stiffness is p/u0 (Persson 2007).
+    Parameters as those of `persson_mean_separation`.
+    """
+    decay_length = _over_wave_numbers(lambda t: _share_density(t, gamma), reduced_pressure, spectrum, points)
+    return np.asarray(reduced_pressure, float) / decay_length
+
+
+def _over_wave_numbers(share, reduced_pressure, spectrum, points):
+    """sqrt(pi) int dq q^2 C(q) w(q) share(w p/E*), over h_rms."""
     pressure = np.asarray(reduced_pressure, float)
     if np.any(pressure <= 0):
         raise ValueError("reduced_pressure: must be greater than 0")
@@ -91,15 +112,20 @@ def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GA
     w = np.sqrt(2 / slope2)
     # The rms slope is the square root of the last slope2, in these units.
     t = np.multiply.outer(pressure * np.sqrt(slope2[-1]), w)
-    integrand = q**2 * shape * w * _stored_share(t, gamma) * above
+    integrand = q**2 * shape * w * share(t) * above
     separation = np.sqrt(np.pi) * simpson(integrand, x=np.log(above), axis=-1)
     return separation / np.sqrt(moment(1, q[-1]))
 
 
+def _share_density(t, gamma):
+    """[gamma + 3 (1 - gamma) erf(t)^2] exp(-t^2)."""
+    return (gamma + 3 * (1 - gamma) * erf(t) ** 2) * np.exp(-(t**2))
+
+
 def _stored_share(t, gamma):
-    """Integral of [gamma + 3 (1 - gamma) erf(s)^2] exp(-s^2)/s over s from t to infinity."""
+    """Integral of `_share_density`(s)/s over s from t to infinity."""
     s = np.geomspace(1e-12, 12, 6001)
-    integrand = (gamma + 3 * (1 - gamma) * erf(s) ** 2) * np.exp(-(s**2))
+    integrand = _share_density(s, gamma)
     log_s = np.log(s)
     panels = 0.5 * (integrand[1:] + integrand[:-1]) * np.diff(log_s)
     tail = np.concatenate([np.cumsum(panels[::-1])[::-1], [0.0]])
