@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.ndimage
-from scipy.interpolate import NdBSpline
 from scipy.spatial import cKDTree
 
+from icha.cores import blocks, on_cores
 from icha.surface import Surface
 
 # A quintic spline reproduces a parabola exactly, depends on far nodes only weakly (0.43 per cell), and at eight
@@ -19,6 +19,24 @@ _VALUE = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120
 _SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24
 _CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6
 
+# Quintic B-splines of the six nodes around a point, as polynomials of its way t from the third of them to the fourth
+# (rows: nodes; columns: powers of t), and their first and second derivatives.
+_BASIS = (
+    np.array(
+        [
+            [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
+            [26.0, -50.0, 20.0, 20.0, -20.0, 5.0],
+            [66.0, 0.0, -60.0, 0.0, 30.0, -10.0],
+            [26.0, 50.0, 20.0, -20.0, -20.0, 10.0],
+            [1.0, 5.0, 10.0, 10.0, 5.0, -5.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+    / 120
+)
+_BASIS_SLOPE = _BASIS[:, 1:] * np.arange(1, 6)
+_BASIS_CURVATURE = _BASIS_SLOPE[:, 1:] * np.arange(1, 5)
+
 _MAX_NEWTON_STEPS = 30
 # In cells: the last step of a converged search, how far from its node it may end, and when two ends are the same.
 _CONVERGED = 1e-9
@@ -26,8 +44,9 @@ _FARTHEST = 1.5
 _SAME_SUMMIT = 1e-3
 # Less curvature than this part of the surface's mean is rounding on a plateau.
 _FLAT = 1e-6
-# Rows of the grid examined at a time, which bounds the memory.
-_ROWS = 512
+# Rows or columns of the grid, and points between them, that are worked on at a time, which bounds the memory.
+_LINES = 32
+_POINTS = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,38 +88,64 @@ def find_summits(surface: Surface) -> Asperities:
         If the surface has no summit with negative-definite curvature.
     """
     grid, spacing = surface.grid, surface.spacing
-    coefficients = scipy.ndimage.spline_filter(surface.heights, order=_DEGREE, output=np.float64, mode="grid-wrap")
+    coefficients = _spline_coefficients(surface.heights)
     node, flat = _nodes_near_summits(coefficients)
-    spline = _periodic_spline(coefficients)
+    searches = on_cores(lambda some: _climb(coefficients, node[some], flat), blocks(len(node), _POINTS))
+    at = np.concatenate([np.empty((0, 2)), *searches])
+    # Several nodes lead to one summit: the first stands for it.
+    twice = np.sort(cKDTree(at, boxsize=grid).query_pairs(_SAME_SUMMIT, output_type="ndarray"), axis=1)
+    at = np.delete(at, twice[:, 1], axis=0)
+    if not len(at):
+        raise ValueError("heights: the surface has no summit with negative-definite curvature")
+    there = on_cores(lambda some: _spline(coefficients, at[some]), blocks(len(at), _POINTS))
+    height, _, _, hyy, hyx, hxx = np.concatenate(there, axis=1)
+    position = at[:, ::-1] * spacing
+    position[position >= surface.period] = 0.0
+    return Asperities(
+        position=position,
+        height=height,
+        radius=spacing**2 / np.sqrt(hyy * hxx - hyx**2),
+        period=surface.period,
+    )
 
+
+def _spline_coefficients(heights):
+    """Coefficients (n, n) of the periodic quintic spline through the heights."""
+    coefficients = np.empty_like(heights)
+
+    def along_x(rows):
+        _spline_filter(heights[rows], output=coefficients[rows])
+
+    def along_y(columns):
+        coefficients[:, columns] = _spline_filter(np.ascontiguousarray(coefficients[:, columns].T)).T
+
+    on_cores(along_x, blocks(len(heights), _LINES))
+    on_cores(along_y, blocks(len(heights), _LINES))
+    return coefficients
+
+
+def _spline_filter(lines, output=np.float64):
+    return scipy.ndimage.spline_filter1d(lines, order=_DEGREE, axis=1, output=output, mode="grid-wrap")
+
+
+def _climb(coefficients, node, flat):
+    """The summits (k, 2), in cells, to which Newton's method leads from those of the nodes (m, 2) that have one."""
+    grid = len(coefficients)
     at, converged = node.copy(), np.zeros(len(node), dtype=bool)
     moving = np.arange(len(node))
     for _ in range(_MAX_NEWTON_STEPS):
-        here = np.mod(at[moving], grid)
-        gradient = [spline(here, nu=nu) for nu in ((1, 0), (0, 1))]
-        concave, _, step = _newton_step(*gradient, *_hessian(spline, here), flat)
+        _, *derivatives = _spline(coefficients, np.mod(at[moving], grid))
+        concave, _, step = _newton_step(*derivatives, flat)
         at[moving] += np.clip(step, -0.5, 0.5)
         near = concave & (np.max(np.abs(at[moving] - node[moving]), axis=1) <= _FARTHEST)
         small = np.max(np.abs(step), axis=1) <= _CONVERGED
         converged[moving] = near & small
         moving = moving[near & ~small]
+        if not len(moving):
+            break
     at = np.mod(at[converged], grid)
     at[at >= grid] = 0.0
-    # Several nodes lead to one summit: the first stands for it.
-    twice = np.sort(cKDTree(at, boxsize=grid).query_pairs(_SAME_SUMMIT, output_type="ndarray"), axis=1)
-    at = np.delete(at, twice[:, 1], axis=0)
-    hyy, hyx, hxx = _hessian(spline, at)
-    curvature = hyy * hxx - hyx**2
-    if not len(at):
-        raise ValueError("heights: the surface has no summit with negative-definite curvature")
-    position = at[:, ::-1] * spacing
-    position[position >= surface.period] = 0.0
-    return Asperities(
-        position=position,
-        height=spline(at),
-        radius=spacing**2 / np.sqrt(curvature),
-        period=surface.period,
-    )
+    return at
 
 
 def _nodes_near_summits(coefficients):
@@ -109,28 +154,49 @@ def _nodes_near_summits(coefficients):
     Curvatures are in metres per squared cell.
     """
     grid = len(coefficients)
-    found, trace = [], 0.0
-    for first in range(0, grid, _ROWS):
-        rows = np.arange(first, min(first + _ROWS, grid))
-        block = coefficients[np.arange(rows[0] - 2, rows[-1] + 3) % grid]
 
-        def derivative(along_y, along_x, block=block):
-            partial = scipy.ndimage.correlate1d(block, along_y, axis=0)[2:-2]
-            return scipy.ndimage.correlate1d(partial, along_x, axis=1, mode="wrap")
+    def examine(rows):
+        block = coefficients[np.arange(rows.start - 2, rows.stop + 2) % grid]
+        value, slope, curvature = (
+            scipy.ndimage.correlate1d(block, weights, axis=0)[2:-2] for weights in (_VALUE, _SLOPE, _CURVATURE)
+        )
 
-        hessian = derivative(_CURVATURE, _VALUE), derivative(_SLOPE, _SLOPE), derivative(_VALUE, _CURVATURE)
-        concave, determinant, step = _newton_step(derivative(_SLOPE, _VALUE), derivative(_VALUE, _SLOPE), *hessian, 0.0)
-        trace += float(np.sum(np.abs(hessian[0] + hessian[2])))
+        def along_x(partial, weights):
+            return scipy.ndimage.correlate1d(partial, weights, axis=1, mode="wrap")
+
+        gradient = along_x(slope, _VALUE), along_x(value, _SLOPE)
+        hessian = along_x(curvature, _VALUE), along_x(slope, _SLOPE), along_x(value, _CURVATURE)
+        concave, determinant, step = _newton_step(*gradient, *hessian, 0.0)
         close = np.argwhere(concave & (np.max(np.abs(step), axis=-1) <= 1))
-        found.append(np.column_stack([close + np.array([first, 0]), determinant[tuple(close.T)]]))
+        found = np.column_stack([close + np.array([rows.start, 0]), determinant[tuple(close.T)]])
+        return found, np.sum(np.abs(hessian[0] + hessian[2]))
+
+    found, traces = zip(*on_cores(examine, blocks(grid, _LINES)), strict=True)
     found = np.concatenate(found)
-    flat = _FLAT * trace / grid**2
+    flat = _FLAT * float(np.sum(traces)) / grid**2
     return found[found[:, 2] > flat**2, :2], flat
 
 
-def _hessian(spline, at):
-    """Second derivatives yy, yx and xx of the spline at points (n, 2)."""
-    return [spline(at, nu=nu) for nu in ((2, 0), (1, 1), (0, 2))]
+def _spline(coefficients, at):
+    """The spline's value and its derivatives y, x, yy, yx, xx at points (k, 2) in cells, each (k,)."""
+    grid = len(coefficients)
+    floor = np.floor(at).astype(int).T
+    (ty, tx), nodes = at.T - floor, np.arange(-2, 4)[:, None]
+    row, column = np.mod(floor[0] + nodes, grid), np.mod(floor[1] + nodes, grid)
+    around = coefficients[row[:, None], column[None, :]]
+    # First along y, then along x: what is left are the six nodes of a row.
+    by = [np.einsum("ik,ijk->jk", basis, around) for basis in _basis(ty)]
+    bx = _basis(tx)
+    return [np.einsum("jk,jk->k", by[i], bx[j]) for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
+
+
+def _basis(t):
+    """Value, slope and curvature (6, k) of the six quintic B-splines around points at t in [0, 1), (k,)."""
+    powers = np.cumprod(np.vstack([np.ones_like(t), np.broadcast_to(t, (_DEGREE, len(t)))]), axis=0)
+    return [
+        np.einsum("ij,jk->ik", polynomial, powers[: polynomial.shape[1]])
+        for polynomial in (_BASIS, _BASIS_SLOPE, _BASIS_CURVATURE)
+    ]
 
 
 def _newton_step(gy, gx, hyy, hyx, hxx, flat):
@@ -141,12 +207,3 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
     step = np.stack([(hxx * gy - hyx * gx) / safe, (hyy * gx - hyx * gy) / safe], axis=-1)
     step[~concave] = 0.0
     return concave, determinant, step
-
-
-def _periodic_spline(coefficients: np.ndarray) -> NdBSpline:
-    """The quintic spline of given periodic coefficients, as a function of (row, column) in [0, n)."""
-    margin = _DEGREE
-    coefficients = np.pad(coefficients, margin, mode="wrap")
-    # Coefficient i belongs to the basis function centred on node i - margin.
-    knots = np.arange(coefficients.shape[0] + _DEGREE + 1, dtype=float) - margin - (_DEGREE + 1) / 2
-    return NdBSpline((knots, knots), coefficients, _DEGREE)

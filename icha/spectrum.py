@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 
+from icha.cores import blocks, on_cores
 from icha.surface import Surface
 from icha.validation import integer, number, positive
 
@@ -23,6 +24,9 @@ from icha.validation import integer, number, positive
 _ROUNDING = 1e-9
 
 AMPLITUDES = ("fixed", "gaussian")
+
+# Rows or columns that are transformed at a time.
+_LINES = 64
 
 
 @dataclass(frozen=True)
@@ -176,8 +180,19 @@ class SelfAffineSpectrum:
         if amplitudes == "gaussian":
             size = size * np.sqrt(-np.log1p(-random[:, 1]))
         modes = size * np.exp(2j * np.pi * random[:, 0])
-        half = np.zeros((grid, grid // 2 + 1), dtype=complex)
+        # Columns of shorter waves are empty and need no transform along y.
+        half = np.zeros((grid, kx.max() + 1), dtype=complex)
         half[ky % grid, kx] = modes
         on_axis = kx == 0
         half[-ky[on_axis] % grid, 0] = np.conj(modes[on_axis])
-        return Surface(scipy.fft.irfft2(half, s=(grid, grid), norm="forward", overwrite_x=True, workers=1), self.period)
+        heights = np.empty((grid, grid))
+
+        def along_y(columns):
+            half[:, columns] = scipy.fft.ifft(half[:, columns], axis=0, norm="forward", workers=1)
+
+        def along_x(rows):
+            heights[rows] = scipy.fft.irfft(half[rows], n=grid, axis=1, norm="forward", workers=1)
+
+        on_cores(along_y, blocks(half.shape[1], _LINES))
+        on_cores(along_x, blocks(grid, _LINES))
+        return Surface(heights, self.period)

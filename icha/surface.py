@@ -12,7 +12,11 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 
+from icha.cores import blocks, on_cores
 from icha.validation import flaw_of_heights, positive
+
+# Rows or columns that are transformed at a time.
+_LINES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +41,12 @@ class Surface:
     def __post_init__(self):
         """Check the values and freeze them."""
         try:
-            heights = np.array(self.heights)
-            if heights.dtype.kind not in "fiu":
-                raise TypeError(f"they are of type {heights.dtype.name}")
+            given = np.asarray(self.heights)
+            if given.dtype.kind not in "fiu":
+                raise TypeError(f"they are of type {given.dtype.name}")
             if np.ma.is_masked(self.heights):
                 raise ValueError("some are masked; fill or crop them first")
-            heights = heights.astype(np.float64)
+            heights = np.array(given, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
         if flaw := flaw_of_heights(heights):
@@ -69,17 +73,32 @@ class Surface:
         They are the variance of height, the squared rms slope |grad h| and the squared rms of the Laplacian.
         """
         n = self.grid
-        power = np.abs(scipy.fft.rfft2(self.heights, norm="forward", workers=1)) ** 2
-        # The half spectrum holds every column but the first (and, on even grids, the last) only once.
-        power[:, 1 : (n + 1) // 2] *= 2
-        q = 2 * np.pi / self.period
-        q2 = (q * scipy.fft.fftfreq(n, 1 / n))[:, None] ** 2 + (q * scipy.fft.rfftfreq(n, 1 / n))[None, :] ** 2
-        power[0, 0] = 0.0
-        zeroth = float(np.sum(power))
-        power *= q2
-        second = float(np.sum(power))
-        power *= q2
-        return zeroth, second, float(np.sum(power))
+        half = np.empty((n, n // 2 + 1), dtype=complex)
+
+        def along_x(rows):
+            half[rows] = scipy.fft.rfft(self.heights[rows], axis=1, norm="forward", workers=1)
+
+        k2 = scipy.fft.fftfreq(n, 1 / n) ** 2
+
+        def along_y(columns):
+            modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
+            power = modes.real**2 + modes.imag**2
+            # The half spectrum holds every column but the first (and, on even grids, the last) only once.
+            kx = np.arange(columns.start, columns.stop)
+            power[:, (kx > 0) & (2 * kx < n)] *= 2
+            if columns.start == 0:
+                power[0, 0] = 0.0
+            weight = k2[:, None] + kx**2
+            moments = []
+            for _ in range(3):
+                moments.append(np.sum(power))
+                power *= weight
+            return moments
+
+        on_cores(along_x, blocks(n, _LINES))
+        moments = np.sum(on_cores(along_y, blocks(n // 2 + 1, _LINES)), axis=0)
+        q2 = (2 * np.pi / self.period) ** 2
+        return float(moments[0]), float(moments[1] * q2), float(moments[2] * q2**2)
 
     @property
     def rms_height(self) -> float:
@@ -102,4 +121,8 @@ class Surface:
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """The same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
         rms_slope = positive("rms_slope", rms_slope, "1")
-        return Surface(self.heights * (rms_slope / self.rms_slope), self.period)
+        factor = rms_slope / self.rms_slope
+        scaled = Surface(self.heights * factor, self.period)
+        # Known already; `cached_property` keeps its values there.
+        vars(scaled)["spectral_moments"] = tuple(moment * factor**2 for moment in self.spectral_moments)
+        return scaled
