@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.ndimage
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.spatial import cKDTree
 
 from icha.cores import blocks, on_cores
@@ -45,7 +46,7 @@ _SAME_SUMMIT = 1e-3
 # Less curvature than this part of the surface's mean is rounding on a plateau.
 _FLAT = 1e-6
 # Rows or columns of the grid, and points between them, that are worked on at a time, which bounds the memory.
-_LINES = 32
+_LINES = 16
 _POINTS = 4096
 
 
@@ -157,19 +158,19 @@ def _nodes_near_summits(coefficients):
 
     def examine(rows):
         block = coefficients[np.arange(rows.start - 2, rows.stop + 2) % grid]
-        value, slope, curvature = (
-            scipy.ndimage.correlate1d(block, weights, axis=0)[2:-2] for weights in (_VALUE, _SLOPE, _CURVATURE)
-        )
+        five = sliding_window_view(block, 5, axis=0)
+        value, slope, curvature = (np.einsum("ijk,k->ij", five, weights) for weights in (_VALUE, _SLOPE, _CURVATURE))
 
         def along_x(partial, weights):
-            return scipy.ndimage.correlate1d(partial, weights, axis=1, mode="wrap")
+            return scipy.ndimage.correlate1d(partial, weights, axis=1, mode="wrap").ravel()
 
-        gradient = along_x(slope, _VALUE), along_x(value, _SLOPE)
-        hessian = along_x(curvature, _VALUE), along_x(slope, _SLOPE), along_x(value, _CURVATURE)
-        concave, determinant, step = _newton_step(*gradient, *hessian, 0.0)
-        close = np.argwhere(concave & (np.max(np.abs(step), axis=-1) <= 1))
-        found = np.column_stack([close + np.array([rows.start, 0]), determinant[tuple(close.T)]])
-        return found, np.sum(np.abs(hessian[0] + hessian[2]))
+        hyy, hyx, hxx = along_x(curvature, _VALUE), along_x(slope, _SLOPE), along_x(value, _CURVATURE)
+        concave = np.flatnonzero((hyy * hxx > hyx**2) & (hyy < 0))
+        gradient = along_x(slope, _VALUE)[concave], along_x(value, _SLOPE)[concave]
+        _, determinant, step = _newton_step(*gradient, hyy[concave], hyx[concave], hxx[concave], 0.0)
+        close = np.max(np.abs(step), axis=1) <= 1
+        row, column = np.divmod(concave[close], grid)
+        return np.column_stack([row + rows.start, column, determinant[close]]), np.sum(np.abs(hyy + hxx))
 
     found, traces = zip(*on_cores(examine, blocks(grid, _LINES)), strict=True)
     found = np.concatenate(found)
