@@ -221,7 +221,8 @@ class Material(Section):
     contact_modulus: Modulus = Field(description="Composite elastic modulus E*.")
     surface_energy: SurfaceEnergy = Field(description="Energy of adhesion Δγ per area; `0 J/m^2` is adhesionless.")
     interaction_range: Length = Field(
-        description="Range of the attraction, which sets the separation at which asperities jump into contact."
+        description="Range ε of the attraction, which sets the separation at which asperities jump into contact. It "
+        "gives a surface of rms curvature 1/R the Tabor parameter μ = (RΔγ²/E*²)^(1/3)/ε."
     )
 
 
@@ -417,6 +418,10 @@ class SlopesFigure(StudyFigure):
     material: Name | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
 
 
+class TaborFigure(SnapshotFigure):
+    """A figure of one snapshot of all runs of a study, whose materials differ in their range of attraction."""
+
+
 class Figures(Section):
     """The figures of the campaign; those that are left out are not drawn."""
 
@@ -435,6 +440,16 @@ class Figures(Section):
         default=None,
         description="Contact spots of all slopes at the same load and at the same area. The study needs snapshots of "
         "kinds relative_load and area_fraction.",
+    )
+    fig7_stiffness: StudyFigure | None = Field(default=None, description="Contact stiffness against load, with theory.")
+    fig8_patch_sizes: SnapshotFigure | None = Field(
+        default=None,
+        description="Sizes of the contact patches of every material, on the study's first surface.",
+    )
+    fig9_tabor: TaborFigure | None = Field(
+        default=None,
+        description="Contact area and mean separation against the Tabor parameter. The study needs materials with "
+        "adhesion that differ in their `interaction_range`.",
     )
 
     def drawn(self) -> dict[str, Section]:
@@ -523,6 +538,11 @@ class Campaign(Section):
                 if kind not in kinds:
                     reason = f"has no snapshot of kind {kind}; allowed: a study with one"
                     yield (*location, "study"), figure.study, reason
+        if isinstance(figure, TaborFigure):
+            materials = [self.materials[name] for name in study.materials if name in self.materials]
+            if not any(material.surface_energy > 0 for material in materials):
+                reason = "has no material with adhesion, so no Tabor parameter; allowed: a study with one"
+                yield (*location, "study"), figure.study, reason
         if isinstance(figure, SnapshotFigure) and study.snapshots == []:
             yield (*location, "study"), figure.study, "keeps no snapshot to draw; allowed: a study with one"
         snapshot = getattr(figure, "snapshot", None)

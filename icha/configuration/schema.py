@@ -41,10 +41,11 @@ _HEADINGS = {
     "Column": "`measurements.<name>.load` and `.area`",
     "Figures": "`figures`",
     "JKRFigure": "`figures.fig1_jkr`",
-    "StudyFigure": "`figures.fig2_area_and_gap`, `figures.fig5_multi_slope`",
-    "SnapshotFigure": "`figures.fig3_distributions`",
+    "StudyFigure": "`figures.fig2_area_and_gap`, `figures.fig5_multi_slope`, `figures.fig7_stiffness`",
+    "SnapshotFigure": "`figures.fig3_distributions`, `figures.fig8_patch_sizes`",
     "MapFigure": "`figures.fig4_contact_map`",
     "SlopesFigure": "`figures.fig6_spots_by_slope`",
+    "TaborFigure": "`figures.fig9_tabor`",
     "Author": "`authors`, each",
 }
 

@@ -7,18 +7,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from icha.figures.select import path_steps, study_runs
-from icha.figures.style import (
-    BLACK,
-    COLOURS,
-    GREY,
-    MARKERS,
-    TWO_COLUMNS,
-    material_label,
-    new_figure,
-    panel_label,
-    styled,
-)
+from icha.figures.curves import PRESSURE_LABEL, add_legends, extra_height, study_curves
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, new_figure, panel_label, styled
 
 CAPTION = (
     "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
@@ -28,8 +18,8 @@ CAPTION = (
     "molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no roll-off), reduced from published data."
 )
 
-PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"
 AREA_LABEL = r"contact area  $A/A_0$"
+SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
 
 
 @styled
@@ -47,42 +37,11 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     ValueError
         If there is no such study or no run in it.
     """
-    runs = study_runs(campaign, study)
-    dataset = campaign[study].to_dataset()
-    materials = [str(name) for name in dataset["material"].values]
-    lines = list(dict.fromkeys((labels.surface, labels.rms_slope) for labels, _ in runs))
-
-    fig = new_figure(TWO_COLUMNS, 3.3 + (0.1 * len(lines) * len(materials) if len(lines) * len(materials) > 3 else 0))
+    curves = study_curves(campaign, study)
+    fig = new_figure(TWO_COLUMNS, 3.3 + extra_height(curves))
     left, right = fig.subplots(1, 2)
     pressures, areas, gaps = [], [], []
-    named, shown = set(), set()
-    for labels, run in runs:
-        adhesive = float(run["surface_energy"]) > 0
-        style = materials.index(labels.material)
-        marker = MARKERS[lines.index((labels.surface, labels.rms_slope)) % len(MARKERS)]
-        if len(lines) == 1:
-            marker = MARKERS[style % len(MARKERS)]
-        key = (labels.material, labels.surface, labels.rms_slope)
-        name = material_label(dataset, labels.material)
-        # Only what differs within the study is named.
-        if len({surface for surface, _ in lines}) > 1:
-            name += f", {labels.surface}"
-        if len({slope for _, slope in lines}) > 1:
-            name += rf", $h_{{\mathrm{{rms}}}}^{{\prime}}$ = {labels.rms_slope:g}"
-        look = {
-            "ls": "none",
-            "marker": marker,
-            "mec": COLOURS[(style + 1) % len(COLOURS)],
-            "mfc": COLOURS[(style + 1) % len(COLOURS)] if adhesive else "white",
-            "mew": 0.9,
-            "label": None if key in named else name,
-            "zorder": 4 if adhesive else 3,
-            # Open markers are larger, so that they show behind closed ones where the results agree.
-            "ms": 3.8 if adhesive else 5.6,
-        }
-        named.add(key)
-        shown.add(name)
-        run = path_steps(run)
+    for run, look in curves:
         p = run["reduced_pressure"].values
         left.loglog(p, run["contact_area_fraction"].values, **look)
         right.loglog(p, run["reduced_separation"].values, **look)
@@ -107,19 +66,8 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         ax.set_xlabel(PRESSURE_LABEL)
         panel_label(ax, letter)
     left.set_ylabel(AREA_LABEL)
-    right.set_ylabel(r"mean separation  $\bar{u}/h_{\mathrm{rms}}$")
-    if len(named) <= 3:
-        left.legend(loc="lower right")
-        right.legend(loc="lower left")
-    else:
-        # Too many for the panels: the runs go below, the references stay.
-        handles, names = left.get_legend_handles_labels()
-        runs_shown = [(handle, name) for handle, name in zip(handles, names, strict=True) if name in shown]
-        fig.legend(*zip(*runs_shown, strict=True), loc="outside lower center", ncols=2)
-        for ax, corner in ((left, "lower right"), (right, "lower left")):
-            others = [pair for pair in zip(*ax.get_legend_handles_labels(), strict=True) if pair[1] not in shown]
-            if others:
-                ax.legend(*zip(*others, strict=True), loc=corner)
+    right.set_ylabel(SEPARATION_LABEL)
+    add_legends(fig, {left: "lower right", right: "lower left"}, curves)
     return fig
 
 

@@ -6,19 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.select import find_snapshot, study_runs
-from icha.figures.style import (
-    BLACK,
-    COLOURS,
-    DASHES,
-    MARKERS,
-    TWO_COLUMNS,
-    material_label,
-    new_figure,
-    number,
-    panel_label,
-    styled,
-)
+from icha.figures.select import first_line_runs, snapshot_label
+from icha.figures.style import BLACK, TWO_COLUMNS, line_look, material_label, new_figure, panel_label, styled
 from icha.reference.theories import persson_pressure_density
 
 CAPTION = (
@@ -31,12 +20,6 @@ CAPTION = (
 
 # Sampled gaps per plotted point: bins with less are joined with their neighbours.
 _LEAST_CELLS = 100
-_KIND_LABELS = {
-    "reduced_pressure": r"$F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$",
-    "relative_load": r"$F/(E^{\ast}A_0)$",
-    "area_fraction": r"$A/A_0$",
-    "mean_separation": r"$\bar{u}$ (m)",
-}
 
 
 @styled
@@ -60,33 +43,14 @@ def figure(
     ValueError
         If there is no such study or snapshot.
     """
-    runs = study_runs(campaign, study)
-    first = runs[0][0]
-    chosen = [
-        (labels, run)
-        for labels, run in runs
-        if (labels.surface, labels.seed, labels.rms_slope) == (first.surface, first.seed, first.rms_slope)
-    ]
+    runs = first_line_runs(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2)
     lowest, highest, top = -0.3, 0.3, 0.0
-    for k, (labels, run) in enumerate(chosen):
-        at = find_snapshot(run, kind, target)
-        adhesive = float(run["surface_energy"]) > 0
-        colour = COLOURS[(k + 1) % len(COLOURS)]
-        look = {
-            "color": colour,
-            "ls": DASHES[k % len(DASHES)],
-            "marker": MARKERS[k % len(MARKERS)],
-            "mfc": colour if adhesive else "white",
-            "mec": colour,
-            "ms": 3.4 if adhesive else 4.4,
-            "mew": 0.8,
-            "lw": 0.8,
-            "label": material_label(dataset, labels.material),
-            "zorder": 4 if adhesive else 3,
-        }
+    for k, (labels, run, at) in enumerate(runs):
+        look = line_look(k, adhesive=float(run["surface_energy"]) > 0)
+        look["label"] = material_label(dataset, labels.material)
         u, density = gap_points(run, at)
         left.loglog(u, density, **look)
         p, density = pressure_points(run, at)
@@ -108,14 +72,7 @@ def figure(
     if top > 0:
         right.set_ylim(top * 5e-5, top * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
-    kind_shown, value = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
-    left.text(
-        0.04,
-        0.95,
-        f"{_KIND_LABELS[kind_shown]} = {number(value)}",
-        transform=left.transAxes,
-        va="top",
-    )
+    left.text(0.04, 0.95, snapshot_label(run, at), transform=left.transAxes, va="top")
     left.legend(loc="lower left")
     right.legend(loc="lower right")
     for ax, letter in ((left, "a"), (right, "b")):

@@ -16,8 +16,17 @@ CAPTION = (
     "circles that cross a border continue at the opposite one."
 )
 
-# Part of the period that the enlarged view shows.
-_ZOOM = 0.25
+# The enlarged view shows a quarter of the period, halved as often as it is wider than so many radii of the spots, and
+# at least so many cells.
+_ZOOM = 4
+_WIDEST_IN_RADII = 40
+_LEAST_CELLS = 64
+# More cells a side than this cannot be told apart in a panel.
+_MOST_CELLS = 1024
+# Outlines of spots that are smaller than this part of the period would hide them; more spots than this are drawn as an
+# image in PDF files as well.
+_LEAST_OUTLINED = 2.5e-3
+_MANY_SPOTS = 2000
 
 
 @styled
@@ -66,46 +75,50 @@ def figure(
     if "seed" in surface and int(surface["seed"]) != labels.seed:
         raise ValueError(f"{labels}: the surface given has seed {int(surface['seed'])}")
 
-    heights = surface["height"].transpose("y", "x").values * (float(run["rms_height"]) / float(surface["rms_height"]))
+    heights = surface["height"].transpose("y", "x").values
+    factor = float(run["rms_height"]) / float(surface["rms_height"])
     spots = spots_of(run, at)
+    radius = spots["spot_radius"].values
     length, length_unit = unit_for(period, "m")
-    height, height_unit = unit_for(float(np.abs(heights).max()), "m")
-    side = period * length
+    highest = max(float(heights.max()), -float(heights.min())) * factor
+    height, height_unit = unit_for(highest, "m")
+    side, n = period * length, len(heights)
+    # The mean radius over the area of contact.
+    typical = float(np.sum(radius**3) / np.sum(radius**2)) if radius.any() else period
+    zoom = _ZOOM
+    while period / zoom > _WIDEST_IN_RADII * typical and n / (2 * zoom) >= _LEAST_CELLS:
+        zoom *= 2
+    window = side / zoom
+    middle = np.array([side, side]) / 2
+    if len(radius):
+        largest = int(np.argmax(radius))
+        middle = np.array([spots["spot_x"].values[largest], spots["spot_y"].values[largest]]) * length
+    corner = np.clip(middle - window / 2, 0, side - window)
 
     fig = new_figure(TWO_COLUMNS, 3.35)
     left, right = fig.subplots(1, 2)
-    scale = float(np.abs(heights).max()) * height
     # Nodes are the centres of the picture's cells; the first row and column come again at the far border.
-    half = 0.5 * side / heights.shape[0]
-    heights = np.pad(heights, (0, 1), mode="wrap")
+    cell = side / n
+    look = {"origin": "lower", "cmap": "cividis", "vmin": -highest * height, "vmax": highest * height}
+    whole = np.pad(_means(heights), (0, 1), mode="wrap") * (factor * height)
+    reach = (-cell / 2, side - cell / 2 + side / (len(whole) - 1))
+    image = left.imshow(whole, extent=reach * 2, interpolation="antialiased", **look)
+    first = np.floor(corner / cell).astype(int)
+    columns, rows = (np.arange(start, start + int(np.ceil(window / cell)) + 2) for start in first)
+    part = _means(heights[np.ix_(rows % n, columns % n)]) * (factor * height)
+    reach = [((nodes[0] - 0.5) * cell, (nodes[-1] + 0.5) * cell) for nodes in (columns, rows)]
+    right.imshow(part, extent=(*reach[0], *reach[1]), interpolation="nearest", **look)
     for ax in (left, right):
-        image = ax.imshow(
-            heights * height,
-            origin="lower",
-            extent=(-half, side + half, -half, side + half),
-            cmap="cividis",
-            vmin=-scale,
-            vmax=scale,
-            interpolation="nearest" if ax is right else "antialiased",
-        )
         ax.set_xlabel(f"x ({length_unit})")
         ax.tick_params(direction="out", top=False, right=False)
-    circles = list(
-        periodic_circles(
-            spots["spot_x"].values * length, spots["spot_y"].values * length, spots["spot_radius"].values * length, side
-        )
-    )
-    draw_spots(left, circles, facecolor=(0.9, 0.0, 0.05, 0.85), edgecolor="black", lw=0.35)
-    draw_spots(right, circles, facecolor=(0.9, 0.0, 0.05, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
+    circles = periodic_circles(spots["spot_x"].values * length, spots["spot_y"].values * length, radius * length, side)
+    outline = 0.35 if typical > _LEAST_OUTLINED * period else 0.0
+    many = len(circles) > _MANY_SPOTS
+    draw_spots(left, circles, facecolor=(0.9, 0.0, 0.05, 0.85), edgecolor="black", lw=outline, rasterized=many)
+    near = np.all(np.abs(circles[:, :2] - (corner + window / 2)) < window / 2 + circles[:, 2:], axis=1)
+    draw_spots(right, circles[near], facecolor=(0.9, 0.0, 0.05, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
     left.set_xlim(0, side)
     left.set_ylim(0, side)
-    if len(spots["spot_radius"]):
-        largest = int(np.argmax(spots["spot_radius"].values))
-        middle = np.array([spots["spot_x"].values[largest], spots["spot_y"].values[largest]]) * length
-    else:
-        middle = np.array([side, side]) / 2
-    window = _ZOOM * side
-    corner = np.clip(middle - window / 2, 0, side - window)
     right.set_xlim(corner[0], corner[0] + window)
     right.set_ylim(corner[1], corner[1] + window)
     left.set_ylabel(f"y ({length_unit})")
@@ -120,8 +133,18 @@ def figure(
     left.set_title(
         rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {number(load)}, $A/A_0$ = {area:.3f}", loc="right"
     )
-    right.set_title(f"enlarged ×{1 / _ZOOM:g}", loc="right")
+    right.set_title(f"enlarged ×{zoom}", loc="right")
     return fig
+
+
+def _means(heights):
+    """Means over blocks of nodes, as near to equal as can be, where there are too many to be drawn."""
+    count = min(len(heights), _MOST_CELLS)
+    if count == len(heights):
+        return heights
+    starts = np.arange(count) * len(heights) // count
+    width = np.diff(starts, append=len(heights))
+    return np.add.reduceat(np.add.reduceat(heights, starts, axis=1), starts, axis=0) / np.outer(width, width)
 
 
 def _frame(corner, size):

@@ -83,13 +83,11 @@ def figure(
             period = float(run["period"])
             length, unit = unit_for(period, "m")
             spots = spots_of(run, at)
-            circles = list(
-                periodic_circles(
-                    spots["spot_x"].values * length,
-                    spots["spot_y"].values * length,
-                    spots["spot_radius"].values * length,
-                    period * length,
-                )
+            circles = periodic_circles(
+                spots["spot_x"].values * length,
+                spots["spot_y"].values * length,
+                spots["spot_radius"].values * length,
+                period * length,
             )
             if kind == "relative_load":
                 draw_spots(ax, circles, zorder=2 + order, facecolor=colour[slope], edgecolor="black", lw=0.25)

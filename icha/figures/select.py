@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from icha.campaign import RunLabels, run_labels, select_run
+from icha.figures.style import number
 
 
 def study_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
@@ -62,6 +63,39 @@ def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None
     there = ", ".join(f"{k} {t:g}" for k, t in zip(kinds, targets, strict=True)) or "none"
     asked = kind or "any kind"
     raise ValueError(f"no snapshot of {asked}{'' if target is None else f' {target:g}'}; there are: {there}")
+
+
+def first_line_runs(
+    campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
+) -> list[tuple[RunLabels, xr.Dataset, int]]:
+    """The runs of every material on the first surface, seed and slope of a study, and where their snapshot is.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study, run or snapshot.
+    """
+    runs = study_runs(campaign, study)
+    first = runs[0][0]
+    return [
+        (labels, run, find_snapshot(run, kind, target))
+        for labels, run in runs
+        if (labels.surface, labels.seed, labels.rms_slope) == (first.surface, first.seed, first.rms_slope)
+    ]
+
+
+_KIND_LABELS = {
+    "reduced_pressure": r"$F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$",
+    "relative_load": r"$F/(E^{\ast}A_0)$",
+    "area_fraction": r"$A/A_0$",
+    "mean_separation": r"$\bar{u}$ (m)",
+}
+
+
+def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
+    """At which load, area or separation a snapshot was taken, for figures."""
+    kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
+    return f"{_KIND_LABELS[kind]} = {number(value)}"
 
 
 def spots_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:

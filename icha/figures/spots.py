@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 
 
-def periodic_circles(x, y, radius, period: float) -> Iterator[tuple[float, float, float]]:
-    """Centre and radius of every circle, and of its images that reach into the cell [0, L)²."""
-    for cx, cy, r in zip(x, y, radius, strict=True):
-        for dx in (-period, 0.0, period):
-            for dy in (-period, 0.0, period):
-                if -r < cx + dx < period + r and -r < cy + dy < period + r:
-                    yield cx + dx, cy + dy, r
+def periodic_circles(x, y, radius, period: float) -> np.ndarray:
+    """Centre and radius, (m, 3), of every circle and of its images that reach into the cell [0, L)²."""
+    shifts = np.array([(dx, dy) for dx in (-period, 0.0, period) for dy in (-period, 0.0, period)])
+    centres = np.column_stack([x, y])[:, None, :] + shifts
+    circles = np.concatenate([centres, np.broadcast_to(np.asarray(radius)[:, None, None], (*centres.shape[:2], 1))], -1)
+    reach = circles[..., 2:]
+    return circles[np.all((circles[..., :2] > -reach) & (circles[..., :2] < period + reach), axis=-1)]
 
 
-def draw_spots(axes: Axes, circles, **look) -> None:
-    """Add circles (x, y, radius in data units) to axes."""
-    if not circles:
+def draw_spots(axes: Axes, circles: np.ndarray, **look) -> None:
+    """Add circles, (m, 3) of x, y and radius in data units, to axes."""
+    if not len(circles):
         return
-    x, y, radius = np.array(circles).T
+    x, y, radius = circles.T
     axes.add_collection(
         EllipseCollection(
             2 * radius,

@@ -127,10 +127,33 @@ def quantity(value: float, unit: str) -> str:
 
 
 def material_label(study, material: str) -> str:
-    """What distinguishes a material, for legends: modulus and surface energy, in the same units for a whole study."""
+    """What distinguishes a material, for legends: modulus and surface energy, in the same units for a whole study.
+
+    The range of attraction is added where the others do not tell two materials apart.
+    """
+    own = study.sel(material=material)
     parts = []
     for name, symbol, unit in (("contact_modulus", r"$E^{\ast}$", "Pa"), ("surface_energy", r"$\Delta\gamma$", "J/m²")):
-        value = float(study[name].sel(material=material))
+        value = float(own[name])
         factor, prefixed = unit_for(float(study[name].max()), unit)
         parts.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
+    alike = (study["contact_modulus"] == own["contact_modulus"]) & (study["surface_energy"] == own["surface_energy"])
+    if int(alike.sum()) > 1:
+        parts.append(f"range {quantity(float(own['interaction_range']), 'm')}")
     return ", ".join(parts)
+
+
+def line_look(index: int, *, adhesive: bool) -> dict:
+    """Look of the line and markers of the material `index` of a figure; open markers are without adhesion."""
+    colour = COLOURS[(index + 1) % len(COLOURS)]
+    return {
+        "color": colour,
+        "ls": DASHES[index % len(DASHES)],
+        "marker": MARKERS[index % len(MARKERS)],
+        "mfc": colour if adhesive else "white",
+        "mec": colour,
+        "ms": 3.4 if adhesive else 4.4,
+        "mew": 0.8,
+        "lw": 0.8,
+        "zorder": 4 if adhesive else 3,
+    }

@@ -85,7 +85,7 @@ def figure_data(name):
         return {}
     data = {"campaign": DATASET}
     study = CAMPAIGN.studies[options.study]
-    if name == "fig2_area_and_gap":
+    if name in ("fig2_area_and_gap", "fig7_stiffness"):
         data["references"] = f"{RESULTS}/references/{study.surfaces[0]}.nc"
     if name == "fig4_contact_map":
         case = next(

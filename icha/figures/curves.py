@@ -1,0 +1,85 @@
+"""Curves of all runs of a study against load: the same marker for the same run in every figure, and their legends."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from icha.figures.select import path_steps, study_runs
+from icha.figures.style import COLOURS, MARKERS, material_label
+
+PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"
+
+
+class Curve(NamedTuple):
+    """A run on the stops of its study's path, and the look of its markers (arguments of `Axes.plot`)."""
+
+    run: xr.Dataset
+    look: dict
+
+
+def study_curves(campaign: xr.DataTree, study: str) -> list[Curve]:
+    """All runs of a study: a colour for every material, a marker for every surface and slope; open without adhesion.
+
+    Only the first run of every kind has a label, so that seeds do not crowd the legend.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study or no run in it.
+    """
+    runs = study_runs(campaign, study)
+    dataset = campaign[study].to_dataset()
+    materials = [str(name) for name in dataset["material"].values]
+    lines = list(dict.fromkeys((labels.surface, labels.rms_slope) for labels, _ in runs))
+    curves, named = [], set()
+    for labels, run in runs:
+        adhesive = float(run["surface_energy"]) > 0
+        style = materials.index(labels.material)
+        marker = MARKERS[lines.index((labels.surface, labels.rms_slope)) % len(MARKERS)]
+        if len(lines) == 1:
+            marker = MARKERS[style % len(MARKERS)]
+        key = (labels.material, labels.surface, labels.rms_slope)
+        name = material_label(dataset, labels.material)
+        # Only what differs within the study is named.
+        if len({surface for surface, _ in lines}) > 1:
+            name += f", {labels.surface}"
+        if len({slope for _, slope in lines}) > 1:
+            name += rf", $h_{{\mathrm{{rms}}}}^{{\prime}}$ = {labels.rms_slope:g}"
+        look = {
+            "ls": "none",
+            "marker": marker,
+            "mec": COLOURS[(style + 1) % len(COLOURS)],
+            "mfc": COLOURS[(style + 1) % len(COLOURS)] if adhesive else "white",
+            "mew": 0.9,
+            "label": None if key in named else name,
+            "zorder": 4 if adhesive else 3,
+            # Open markers are larger, so that they show behind closed ones where the results agree.
+            "ms": 3.8 if adhesive else 5.6,
+        }
+        named.add(key)
+        curves.append(Curve(path_steps(run), look))
+    return curves
+
+
+def extra_height(curves: list[Curve]) -> float:
+    """Inches that the legend of `add_legends` needs below the panels."""
+    named = sum(curve.look["label"] is not None for curve in curves)
+    return 0.1 * named if named > 3 else 0.0
+
+
+def add_legends(figure: Figure, panels: dict, curves: list[Curve]) -> None:
+    """Add a legend to every panel of `panels` (axes and corner); many runs are named once, below the panels."""
+    shown = {curve.look["label"] for curve in curves} - {None}
+    if len(shown) > 3:
+        first = next(iter(panels))
+        runs_shown = [pair for pair in zip(*first.get_legend_handles_labels(), strict=True) if pair[1] in shown]
+        figure.legend(*zip(*runs_shown, strict=True), loc="outside lower center", ncols=2)
+    else:
+        shown = set()
+    for axes, corner in panels.items():
+        others = [pair for pair in zip(*axes.get_legend_handles_labels(), strict=True) if pair[1] not in shown]
+        if others:
+            axes.legend(*zip(*others, strict=True), loc=corner)

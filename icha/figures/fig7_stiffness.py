@@ -1,0 +1,77 @@
+"""Fig. 7: contact stiffness against load, with the proportional law that theory and computations find."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from icha.figures.curves import PRESSURE_LABEL, add_legends, extra_height, study_curves
+from icha.figures.style import BLACK, TWO_COLUMNS, new_figure, panel_label, styled
+
+CAPTION = (
+    "Contact stiffness K = -dp/du, nominal pressure p over mean separation u, against the reduced pressure "
+    "F/(E* h'rms A0): in units of E* h'rms/h_rms (a) and of p/h_rms (b), where the law K = p/u0 is a constant. "
+    "Markers: ICHA, from the tangent of the equilibrium with the present spots; open ones are without adhesion. States "
+    "under tension or of negative stiffness have no place on these axes. Line: derivative of the adhesionless "
+    "separation of Yang and Persson for an infinite surface. On a finite surface the stiffness at small loads lies "
+    "above the proportional law, as only its highest parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
+)
+
+
+@styled
+def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study: str) -> Figure:
+    """Draw all runs of a study.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    references : theory for the study's surface (`icha.reference.reference_dataset`), if any.
+    study : name of the study.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study or no run in it, or nothing in it has a positive load and stiffness.
+    """
+    curves = study_curves(campaign, study)
+    fig = new_figure(TWO_COLUMNS, 3.3 + extra_height(curves))
+    left, right = fig.subplots(1, 2)
+    pressures, stiffnesses = [], []
+    for run, look in curves:
+        p, stiffness = stiffness_points(run)
+        left.loglog(p, stiffness, **look)
+        right.semilogx(p, stiffness / p, **look)
+        pressures.append(p)
+        stiffnesses.append(stiffness)
+    pressures, stiffnesses = np.concatenate(pressures), np.concatenate(stiffnesses)
+    if not len(pressures):
+        raise ValueError(f"study {study}: no stop with a positive load and a positive stiffness to draw")
+    x = (pressures.min() / 1.6, pressures.max() * 1.6)
+    ratio = stiffnesses / pressures
+    if references is not None and "persson_reduced_stiffness" in references:
+        p = references["reduced_pressure"].values
+        theory = references["persson_reduced_stiffness"].values
+        shown = (p >= x[0] / 1.5) & (p <= x[1] * 1.5)
+        look = {"ls": "-", "color": BLACK, "lw": 1, "label": "Yang & Persson", "zorder": 2}
+        left.plot(p[shown], theory[shown], **look)
+        right.plot(p[shown], theory[shown] / p[shown], **look)
+        ratio = np.concatenate([ratio, theory[shown] / p[shown]])
+    for ax, letter in ((left, "a"), (right, "b")):
+        ax.set_xlim(x)
+        ax.set_xlabel(PRESSURE_LABEL)
+        panel_label(ax, letter)
+    left.set_ylim(stiffnesses.min() / 2, stiffnesses.max() * 2)
+    right.set_ylim(0, 1.15 * ratio.max())
+    left.set_ylabel(r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
+    right.set_ylabel(r"$K h_{\mathrm{rms}}/p$")
+    add_legends(fig, {left: "lower right", right: "lower left"}, curves)
+    return fig
+
+
+def stiffness_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Reduced pressures, and K h_rms/(E* h'_rms) = -dp*/d(u/h_rms), of the steps where both are positive."""
+    unit = float(run["contact_modulus"] * run["rms_slope"] / run["rms_height"])
+    p, stiffness = run["reduced_pressure"].values, run["contact_stiffness"].values / unit
+    positive = (p > 0) & (stiffness > 0)
+    return p[positive], stiffness[positive]
