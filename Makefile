@@ -12,7 +12,7 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help environment run test lint format schema clean
+.PHONY: help environment run test lint format schema benchmarks benchmarks-page clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -20,6 +20,8 @@ help:
 	@echo "make lint    check style of Python code and workflow"
 	@echo "make format  put Python code and workflow into that style"
 	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
+	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
+	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
 	@echo "make clean   remove results and Snakemake's records (not the environment)"
 
 environment: .venv/.installed
@@ -54,6 +56,20 @@ format: environment
 
 schema: environment
 	python -m icha.configuration.schema
+
+# The codes compared with have an environment of their own; where aspher cannot be built, the page says so.
+.venv-benchmarks/.installed: .venv-tools/bin/uv benchmarks/requirements.txt benchmarks/requirements-aspher.txt
+	.venv-tools/bin/uv venv --quiet --clear --python $(PYTHON) .venv-benchmarks
+	.venv-tools/bin/uv pip sync --quiet --python .venv-benchmarks/bin/python benchmarks/requirements.txt
+	-.venv-tools/bin/uv pip install --quiet --python .venv-benchmarks/bin/python -r benchmarks/requirements-aspher.txt
+	@touch $@
+
+benchmarks: environment .venv-benchmarks/.installed
+	python benchmarks/run.py $(OPTIONS)
+	python benchmarks/page.py
+
+benchmarks-page: environment
+	python benchmarks/page.py
 
 clean:
 	rm -rf .snakemake

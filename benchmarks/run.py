@@ -1,0 +1,161 @@
+"""Run the benchmarks one process at a time and keep what they measured in benchmarks/results. Standard library only.
+
+python benchmarks/run.py [--only CODE ...] [--parts sweep scaling stages] [--grids 256 512 1024] [--limit SECONDS]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+
+from measure import measure
+
+HERE = Path(__file__).resolve().parent
+RESULTS = HERE / "results"
+OTHERS = HERE.parent / ".venv-benchmarks" / "bin" / "python"
+PACKAGES = ("icha", "numpy", "scipy", "finufft")
+
+# Code, threads, whether with adhesion, and what is given at the stops. ICHA first: its path gives the mean gaps.
+SWEEPS = (
+    ("icha", 1, False, "load"),
+    ("icha", 1, True, "load"),
+    ("icha", 1, True, "gap"),
+    ("aspher", 1, False, "load"),
+    ("aspher", 2, False, "load"),
+    ("tamaas", 1, False, "load"),
+    ("tamaas", 2, False, "load"),
+    ("contactmechanics", 1, False, "load"),
+    ("adhesion", 1, True, "load"),
+    ("tamaas", 1, True, "gap"),
+    ("tamaas", 2, True, "gap"),
+)
+CODES = tuple(dict.fromkeys(code for code, *_ in SWEEPS))
+# Patches along a side of the surfaces of the scaling; a patch has about a thousand spots at the end of the sweep.
+PATCHES = (1, 2, 3, 4, 6, 10)
+
+
+def python(code: str) -> str:
+    return sys.executable if code == "icha" else str(OTHERS)
+
+
+def script(name: str) -> str:
+    return str(HERE / "codes" / f"{name}.py")
+
+
+def keep(name: str, record: dict) -> None:
+    """Write a result, whole or not at all."""
+    RESULTS.mkdir(exist_ok=True)
+    path = RESULTS / f"{name}.json"
+    partial = path.with_suffix(".partial")
+    partial.write_text(json.dumps(record, indent=1) + "\n")
+    partial.replace(path)
+
+
+def run(name: str, command: list[str], answer: Path, threads: int, limit: float, about: dict) -> dict:
+    """Measure a command that writes its answer to a file, and keep both."""
+    print(f"{name} ...", end=" ", flush=True)
+    measured = measure([*command, str(answer), str(threads)], threads, limit)
+    found = json.loads(answer.read_text()) if answer.exists() else {}
+    record = about | {"threads": threads, "limit": limit} | asdict(measured) | found
+    keep(name, record)
+    print(
+        f"{measured.outcome}, {measured.wall:.1f} s, {measured.peak / 2**20:.0f} MiB {measured.last_words}", flush=True
+    )
+    return record
+
+
+def sweep(scratch: Path, grid: int, codes: set[str], limit: float) -> None:
+    """One sweep of 20 stops on the same heights by every code."""
+    folder = scratch / f"sweep-{grid}"
+    folder.mkdir()
+    subprocess.run([sys.executable, script("make_task"), folder, str(grid)], check=True)
+    task = json.loads((folder / "task.json").read_text())
+    saved = RESULTS / f"task-{grid}.json"
+    gaps = json.loads(saved.read_text())["mean_gaps"] if saved.exists() else None
+    for code, threads, adhesion, control in SWEEPS:
+        if code not in codes:
+            continue
+        settings = task if adhesion else task | {"surface_energy": 0.0}
+        if control == "gap":
+            if gaps is None:
+                raise SystemExit(f"no mean gaps for grid {grid}: run icha first")
+            settings = settings | {"mean_gaps": gaps}
+        (folder / "task.json").write_text(json.dumps(settings))
+        name = f"sweep-{code}-{'adhesion' if adhesion else 'hard'}-{control}-{grid}-{threads}"
+        about = {"code": code, "grid": grid, "adhesion": adhesion, "control": control}
+        command = [python(code), script(f"solve_{code}"), str(folder)]
+        record = run(name, command, folder / f"{name}.json", threads, limit, about)
+        if (code, adhesion, control) == ("icha", True, "load") and (gaps is None or codes == set(CODES)):
+            # Rounded, and kept, so that one code can be measured again at the same stops.
+            gaps = [float(f"{stop['mean_gap']:.6g}") for stop in record["stops"]]
+            keep(saved.stem, task | {"mean_gaps": gaps})
+
+
+def scaling(scratch: Path, limit: float) -> None:
+    """The contact solver alone against the number of spots."""
+    folder = scratch / "scaling"
+    folder.mkdir()
+    subprocess.run([sys.executable, script("make_patches"), folder], check=True)
+    for patches in PATCHES:
+        for adhesion in (False, True):
+            name = f"scaling-{'adhesion' if adhesion else 'hard'}-{patches}"
+            command = [sys.executable, script("scale_icha"), str(folder), str(patches), "01"[adhesion]]
+            run(name, command, folder / f"{name}.json", 1, limit, {"patches": patches, "adhesion": adhesion})
+
+
+def stages(scratch: Path, limit: float) -> None:
+    """Where time and memory go, on 512^2 and on the challenge's full surface."""
+    cores = min(2, os.cpu_count())
+    cases = [("512", adhesion, threads) for adhesion in (False, True) for threads in sorted({1, cores})]
+    cases += [("challenge", adhesion, cores) for adhesion in (False, True)]
+    for surface, adhesion, threads in cases:
+        name = f"stages-{surface}-{'adhesion' if adhesion else 'hard'}-{threads}"
+        command = [sys.executable, script("profile_icha"), surface, "01"[adhesion]]
+        run(name, command, scratch / f"{name}.json", threads, limit, {"surface": surface, "adhesion": adhesion})
+
+
+def machine() -> dict:
+    """What the numbers were taken on, without names."""
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return {
+        "processor": models[0] if models else platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "memory": os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"),
+        "system": platform.system(),
+        "python": platform.python_version(),
+        "versions": {name: version(name) for name in PACKAGES},
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", nargs="+", choices=CODES, default=CODES, metavar="CODE", help=", ".join(CODES))
+    parser.add_argument(
+        "--parts", nargs="+", choices=("sweep", "scaling", "stages"), default=["sweep", "scaling", "stages"]
+    )
+    parser.add_argument("--grids", nargs="+", type=int, default=[256, 512, 1024])
+    parser.add_argument("--limit", type=float, default=1200.0, help="seconds that one process may take")
+    options = parser.parse_args()
+    keep("machine", machine())
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = Path(scratch)
+        if "sweep" in options.parts:
+            for grid in options.grids:
+                sweep(scratch, grid, set(options.only), options.limit)
+        if "icha" in options.only and "scaling" in options.parts:
+            scaling(scratch, options.limit)
+        if "icha" in options.only and "stages" in options.parts:
+            stages(scratch, options.limit)
+
+
+if __name__ == "__main__":
+    main()
