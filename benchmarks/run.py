@@ -67,7 +67,7 @@ def run(name: str, command: list[str], answer: Path, threads: int, limit: float,
     record = about | {"threads": threads, "limit": limit} | asdict(measured) | found
     keep(name, record)
     print(
-        f"{measured.outcome}, {measured.wall:.1f} s, {measured.peak / 2**20:.0f} MiB {measured.last_words}", flush=True
+        f"{measured.outcome}, {measured.wall:.1f} s, {measured.peak / 2**20:.0f} MiB", measured.last_words, flush=True
     )
     return record
 

@@ -44,9 +44,8 @@ def main(folder, grid):
         "tabor_parameter": np.cbrt((SURFACE_ENERGY / MODULUS) ** 2 / surface.rms_curvature) / interaction_range,
         "pressures": list(REDUCED_PRESSURES * MODULUS * surface.rms_slope),
     }
-    (folder / "task.json").write_text(
-        json.dumps({k: v if isinstance(v, int | list) else float(v) for k, v in settings.items()})
-    )
+    plain = {name: value if isinstance(value, int | list) else float(value) for name, value in settings.items()}
+    (folder / "task.json").write_text(json.dumps(plain))
 
 
 main(Path(sys.argv[1]), int(sys.argv[2]))

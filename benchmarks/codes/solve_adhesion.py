@@ -1,6 +1,7 @@
-"""adhesion: exponential attraction outside a hard wall; the energy is minimised over gaps by NuMPI's trust-region Newton.
+"""adhesion: exponential attraction outside a hard wall.
 
-The load enters as its work, p times the mean gap; every load starts from the gaps of the last.
+NuMPI's trust-region Newton method minimises the energy over the gaps. The load enters as its work, p times the mean
+gap; every load starts from the gaps of the last.
 """
 
 from Adhesion.Interactions import Exponential

@@ -1,4 +1,4 @@
-"""contactmechanics: Polonsky & Keer's conjugate gradients at given load; every load starts from the last one's forces."""
+"""contactmechanics: Polonsky & Keer's conjugate gradients; every load starts from the forces of the last."""
 
 from ContactMechanics import PeriodicFFTElasticHalfSpace
 from ContactMechanics.Systems import NonSmoothContactSystem

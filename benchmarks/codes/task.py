@@ -1,8 +1,8 @@
 """What every code is given and what it hands back. Needs NumPy only: it runs in the codes' environment.
 
 A task is a folder with heights.npy (m, towards the elastic body) and task.json: period (m), contact_modulus (Pa),
-rms_slope, rms_height (m), surface_energy (J/m^2), interaction_range (m), and the stops: pressures (Pa) or mean_gaps (m).
-The answer is a JSON file with one entry per stop, written anew after each, so that a code that is stopped at its
+rms_slope, rms_height (m), surface_energy (J/m^2), interaction_range (m), and the stops, pressures (Pa) or mean_gaps
+(m). The answer is a JSON file with one entry per stop, written anew after each, so that a code that is stopped at its
 time limit leaves the stops that it reached.
 """
 
