@@ -16,9 +16,10 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_
 
 @dataclass(frozen=True)
 class Measurement:
-    """Wall time in s, peak resident memory in bytes, and how it ended: "complete", "over time" or "failed"."""
+    """Wall and processor time in s, peak resident memory in bytes, and the end: "complete", "over time" or "failed"."""
 
     wall: float
+    processor: float
     peak: int
     outcome: str
     last_words: str
