@@ -41,6 +41,5 @@ def measure(command: list[str], threads: int, limit: float) -> Measurement:
     process.returncode = os.waitstatus_to_exitcode(status)
     reader.join()
     outcome = "complete" if process.returncode == 0 else "over time" if wall >= limit else "failed"
-    return Measurement(
-        wall, usage.ru_maxrss * 1024, outcome, "".join(lines[-1:]).strip() if outcome == "failed" else ""
-    )
+    last_words = "".join(lines[-1:]).strip() if outcome == "failed" else ""
+    return Measurement(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024, outcome, last_words)

@@ -1,6 +1,6 @@
 """Run the benchmarks one process at a time and keep what they measured in benchmarks/results. Standard library only.
 
-python benchmarks/run.py [--only CODE ...] [--parts sweep scaling stages] [--grids 256 512 1024] [--limit SECONDS]
+python benchmarks/run.py [--only CODE ...] [--parts PART ...] [--grids N ...] [--threads N] [--limit SECONDS]
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ CODES = tuple(dict.fromkeys(code for code, *_ in SWEEPS))
 PATCHES = (1, 2, 3, 4, 6, 10)
 
 
-def python(code: str) -> str:
+def interpreter(code: str) -> str:
     return sys.executable if code == "icha" else str(OTHERS)
 
 
@@ -66,13 +66,12 @@ def run(name: str, command: list[str], answer: Path, threads: int, limit: float,
     found = json.loads(answer.read_text()) if answer.exists() else {}
     record = about | {"threads": threads, "limit": limit} | asdict(measured) | found
     keep(name, record)
-    print(
-        f"{measured.outcome}, {measured.wall:.1f} s, {measured.peak / 2**20:.0f} MiB", measured.last_words, flush=True
-    )
+    spent = f"{measured.wall:.1f} s ({measured.processor:.1f} s of processor), {measured.peak / 2**20:.0f} MiB"
+    print(f"{measured.outcome}, {spent}", measured.last_words, flush=True)
     return record
 
 
-def sweep(scratch: Path, grid: int, codes: set[str], limit: float) -> None:
+def sweep(scratch: Path, grid: int, codes: set[str], most_threads: int, limit: float) -> None:
     """One sweep of 20 stops on the same heights by every code."""
     folder = scratch / f"sweep-{grid}"
     folder.mkdir()
@@ -81,7 +80,7 @@ def sweep(scratch: Path, grid: int, codes: set[str], limit: float) -> None:
     saved = RESULTS / f"task-{grid}.json"
     gaps = json.loads(saved.read_text())["mean_gaps"] if saved.exists() else None
     for code, threads, adhesion, control in SWEEPS:
-        if code not in codes:
+        if code not in codes or threads > most_threads:
             continue
         settings = task if adhesion else task | {"surface_energy": 0.0}
         if control == "gap":
@@ -91,7 +90,7 @@ def sweep(scratch: Path, grid: int, codes: set[str], limit: float) -> None:
         (folder / "task.json").write_text(json.dumps(settings))
         name = f"sweep-{code}-{'adhesion' if adhesion else 'hard'}-{control}-{grid}-{threads}"
         about = {"code": code, "grid": grid, "adhesion": adhesion, "control": control}
-        command = [python(code), script(f"solve_{code}"), str(folder)]
+        command = [interpreter(code), script(f"solve_{code}"), str(folder)]
         record = run(name, command, folder / f"{name}.json", threads, limit, about)
         if (code, adhesion, control) == ("icha", True, "load") and (gaps is None or codes == set(CODES)):
             # Rounded, and kept, so that one code can be measured again at the same stops.
@@ -143,6 +142,7 @@ def main() -> None:
         "--parts", nargs="+", choices=("sweep", "scaling", "stages"), default=["sweep", "scaling", "stages"]
     )
     parser.add_argument("--grids", nargs="+", type=int, default=[256, 512, 1024])
+    parser.add_argument("--threads", type=int, default=2, help="leave out sweeps with more threads than this")
     parser.add_argument("--limit", type=float, default=1200.0, help="seconds that one process may take")
     options = parser.parse_args()
     keep("machine", machine())
@@ -150,7 +150,7 @@ def main() -> None:
         scratch = Path(scratch)
         if "sweep" in options.parts:
             for grid in options.grids:
-                sweep(scratch, grid, set(options.only), options.limit)
+                sweep(scratch, grid, set(options.only), options.threads, options.limit)
         if "icha" in options.only and "scaling" in options.parts:
             scaling(scratch, options.limit)
         if "icha" in options.only and "stages" in options.parts:

@@ -86,7 +86,7 @@ class Stages:
 
     def counted(self, name, function):
         """The function, counting its calls."""
-        self.counts[name] = 0
+        self.counts.setdefault(name, 0)
 
         def run(*args, **kwargs):
             self.counts[name] += 1
@@ -110,6 +110,7 @@ def main(kind, adhesion, answer):
             (path, "equilibrium", "equilibria"),
             (elasticity.Interaction, "tangent", "linearisations"),
             (elasticity.Tangent, "__call__", "products with the tangent"),
+            (elasticity.Tangent, "nearly", "products with the tangent"),
             (elasticity.Interaction, "displacement", "displacements"),
         ):
             watched.enter_context(mock.patch.object(owner, name, stages.counted(what, getattr(owner, name))))

@@ -66,9 +66,8 @@ def main(folder, patches, adhesion, answer):
                     "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
                 }
             )
-            answer.write_text(
-                json.dumps({"asperities": len(asperities), "memory_before": before * 1024, "stops": rows})
-            )
+            found = {"asperities": len(asperities), "memory_before": before * 1024, "stops": rows}
+            answer.write_text(json.dumps(found))
 
 
 if __name__ == "__main__":
