@@ -6,14 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.elasticity import displacement_field, nodes_around, periodic_difference
+from icha.cores import on_cores
 from icha.equilibrium import ContactState, Spots
+from icha.fields import DisplacementField, displacement_field, row_blocks, windows
 from icha.jkr import JKR
 from icha.surface import Surface
+from icha.validation import integer
 
 # Bins of the gap in units of h_rms: one from zero, then 20 per decade; and of the pressure in units of
 # E* h'_rms: linear where the bulk is, 20 per decade in the tails. JKR pressures tend to minus infinity at the edge
 # of a spot as |p|^-3, hence the long tail.
+_GAPS_PER_DECADE = 20
 GAP_BINS = np.concatenate([[0.0], np.logspace(-4, 1.5, 111)])
 PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5, 301), 5 * np.logspace(0, 2, 41)[1:]])
 
@@ -36,47 +39,46 @@ class PressureDistribution:
     mean: np.ndarray
 
 
-def displacement(law: JKR, surface: Surface, state: ContactState) -> np.ndarray:
-    """Displacement w of the half-space at the surface's nodes, (n, n), m; zero mean (eq. 9, periodic)."""
+def displacement(law: JKR, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
+    """Displacement w of the half-space at the surface's nodes, (n, n), m; zero mean (eq. 9, periodic).
+
+    `every` : only at every so-manieth node of both directions, a divisor of the grid. The values are the same; time
+    and memory fall with the number of nodes.
+    """
     spots = state.spots
+    grid = _coarse_grid(surface, every)
     return displacement_field(
-        law, surface.period, surface.grid, spots.position, spots.contact_radius, spots.radius_of_curvature
+        law, surface.period, grid, spots.position, spots.contact_radius, spots.radius_of_curvature
     )
 
 
-def gap(law: JKR, surface: Surface, state: ContactState) -> np.ndarray:
+def gap(law: JKR, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
     """Gap u = mean separation + w - h at the nodes, (n, n), m; meaningful outside the spots, where the model's
-    inexactness can make it negative."""
-    return displacement(law, surface, state) + (state.separation - surface.heights)
+    inexactness can make it negative. `every` as for `displacement`."""
+    return displacement(law, surface, state, every) + (state.separation - surface.heights[::every, ::every])
 
 
-def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
+def contact_cover(surface: Surface, spots: Spots, every: int = 1) -> np.ndarray:
     """Fraction of every node's cell that lies in contact, (n, n), exact for discs.
 
-    Its mean is the contact area fraction to rounding, spots being disjoint.
+    Its mean is the contact area fraction to rounding, spots being disjoint. `every` : of cells so many times wider,
+    around every so-manieth node.
     """
-    cover = np.zeros((surface.grid, surface.grid))
-    spacing = surface.spacing
-    for centre, a in zip(spots.position, spots.contact_radius, strict=True):
-        rows, columns = _cells_around(centre, a, surface)
-        dx = periodic_difference(columns * spacing, centre[0], surface.period)
-        dy = periodic_difference(rows * spacing, centre[1], surface.period)
-        half = 0.5 * spacing
-        area = (
-            _disc_below(dx + half, dy + half, a)
-            - _disc_below(dx - half, dy + half, a)
-            - _disc_below(dx + half, dy - half, a)
-            + _disc_below(dx - half, dy - half, a)
-        )
-        cover[rows, columns] += area / spacing**2
-    return cover
+    grid = _coarse_grid(surface, every)
+    return np.concatenate(on_cores(lambda rows: _cover(surface.period, grid, spots, rows)[0], row_blocks(grid)))
+
+
+def covered_nodes(surface: Surface, spots: Spots) -> np.ndarray:
+    """Whether each node lies inside a spot, (n, n) of bool."""
+    grid = surface.grid
+    return np.concatenate(on_cores(lambda rows: _cover(surface.period, grid, spots, rows)[1], row_blocks(grid)))
 
 
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDistribution:
     """P(u) from the gap field; cells on the edge of a spot count with the part that lies outside.
 
     integral of P(u) + A/A0 + overlap = 1. The part outside of a cell whose node lies inside a spot has gap zero: it
-    is the spot's edge.
+    is the spot's edge. The field is never held as a whole.
 
     Raises
     ------
@@ -84,16 +86,37 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDist
         If a gap exceeds the largest bin, 31.6 h_rms.
     """
     edges = GAP_BINS * surface.rms_height
-    u = gap(law, surface, state)
-    cover = contact_cover(surface, state.spots)
-    inside = covered_nodes(surface, state.spots)
-    u[inside] = 0.0
-    weight = np.clip(1 - cover, 0.0, 1.0) / surface.grid**2
-    if u.max() > edges[-1]:
-        raise ValueError(f"gap: {u.max():.3e} m exceeds the largest bin, {edges[-1]:.3e} m")
-    overlap = u < 0
-    content, _ = np.histogram(u[~overlap], bins=edges, weights=weight[~overlap])
-    return GapDistribution(edges, content / np.diff(edges), float(np.sum(weight[overlap])))
+    spots = state.spots
+    field = DisplacementField(
+        law, surface.period, surface.grid, spots.position, spots.contact_radius, spots.radius_of_curvature
+    )
+
+    def nodes_per_bin(rows, w):
+        u = w + (state.separation - surface.heights[rows])
+        cover, inside = _cover(surface.period, surface.grid, spots, rows)
+        u[inside] = 0.0
+        # The first place is for the overlap.
+        place = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
+        cut = np.flatnonzero(cover)
+        hidden = np.bincount(place[cut], weights=np.clip(cover.ravel()[cut], 0.0, 1.0), minlength=len(edges))
+        return np.bincount(place, minlength=len(edges)) - hidden, u.max()
+
+    content, largest = zip(*field.in_blocks(nodes_per_bin), strict=True)
+    if max(largest) > edges[-1]:
+        raise ValueError(f"gap: {max(largest):.3e} m exceeds the largest bin, {edges[-1]:.3e} m")
+    content = np.sum(content, axis=0) / surface.grid**2
+    return GapDistribution(edges, content[1:] / np.diff(edges), float(content[0]))
+
+
+def _gap_bin(u, edges):
+    """Index of the bin edges[i] <= u < edges[i + 1] of every gap; the last bin holds what is larger."""
+    last = len(edges) - 2
+    decade = np.log10(np.maximum(u / edges[1], 1.0))
+    index = np.minimum(decade * _GAPS_PER_DECADE + 1, last).astype(np.intp)
+    # Next to an edge the logarithm may round to the wrong side.
+    index -= u < edges[index]
+    index += (u >= edges[index + 1]) & (index < last)
+    return index
 
 
 def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> PressureDistribution:
@@ -123,23 +146,29 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> PressureD
     return PressureDistribution(edges, content / (surface.period**2 * np.diff(edges)), mean)
 
 
-def covered_nodes(surface: Surface, spots: Spots) -> np.ndarray:
-    """Whether each node lies inside a spot, (n, n) of bool."""
-    covered = np.zeros((surface.grid, surface.grid), dtype=bool)
-    for centre, a in zip(spots.position, spots.contact_radius, strict=True):
-        rows, columns, _ = nodes_around(centre, min(a, 0.5 * surface.period), surface.grid, surface.period)
-        covered[rows, columns] = True
-    return covered
+def _coarse_grid(surface, every):
+    if surface.grid % integer("every", every, 1):
+        raise ValueError(f"every: {every} does not divide the {surface.grid} nodes along a side")
+    return surface.grid // every
 
 
-def _cells_around(centre, a, surface):
-    """Rows and columns of all cells that a disc can touch, flat."""
-    n = surface.grid
-    count = min(int(a / surface.spacing) + 2, n // 2 - 1)
-    middle = np.rint(np.asarray(centre) / surface.spacing).astype(int)
-    offset = np.arange(-count, count + 1)
-    row, column = np.meshgrid((middle[1] + offset) % n, (middle[0] + offset) % n, indexing="ij")
-    return row.ravel(), column.ravel()
+def _cover(period, grid, spots, rows):
+    """Of a range of rows: the fraction of every cell in contact, and whether the node lies inside a spot."""
+    spacing = period / grid
+    cover = np.zeros((rows.stop - rows.start) * grid)
+    inside = np.zeros(len(cover), dtype=bool)
+    # Spots of like size share the width of their windows, a power of two of cells.
+    width = 2 ** np.ceil(np.log2(spots.contact_radius / spacing + 2)).astype(int)
+    for cells in np.unique(width):
+        same = np.flatnonzero((width == cells) & (spots.contact_radius > 0))
+        centres, radii = spots.position[same], spots.contact_radius[same]
+        for window in windows(centres, (cells - 1) * spacing, grid, period, rows):
+            a = radii[window.spot][:, None]
+            left = np.concatenate([window.dx - 0.5 * spacing, window.dx[:, -1:] + 0.5 * spacing], axis=1)
+            below = [_disc_below(left, (window.dy + side * spacing)[:, None], a) for side in (-0.5, 0.5)]
+            np.add.at(cover, window.node.ravel(), np.diff(below[1] - below[0], axis=1).ravel() / spacing**2)
+            inside[window.node[np.hypot(window.dx, window.dy[:, None]) <= a]] = True
+    return cover.reshape(-1, grid), inside.reshape(-1, grid)
 
 
 def _disc_below(x, y, a):
