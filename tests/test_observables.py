@@ -1,5 +1,7 @@
 """Gap and pressure: fields and distributions against brute force, closed forms and their identities."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -8,10 +10,12 @@ from half_space import periodic_displacement
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperities import find_summits
 from icha.equilibrium import Contact, Spots, area_fraction, equilibrium, mean_pressure, untouched
+from icha.fields import displacement_field, row_blocks
 from icha.jkr import JKR
 from icha.observables import (
     GAP_BINS,
     PRESSURE_BINS,
+    _gap_bin,
     contact_cover,
     covered_nodes,
     displacement,
@@ -87,8 +91,15 @@ def test_at_every_single_summit_in_contact_the_gap_closes(case):
     spots = state.spots
     single = np.flatnonzero(spots.members == 1)
     assert len(single) > 10
-    w = contact.interaction(spots, spots.position[single]).displacement(spots.contact_radius)
-    np.testing.assert_allclose(w, spots.height[single] - state.separation, atol=1e-7 * surface.rms_height)
+    # On a grid shifted so that its first node is the summit.
+    w = [
+        displacement_field(
+            contact.law, PERIOD, 64, spots.position - spots.position[j], spots.contact_radius, spots.radius_of_curvature
+        )[0, 0]
+        for j in single
+    ]
+    # The solver and the field split the sum over images differently.
+    np.testing.assert_allclose(w, spots.height[single] - state.separation, atol=1e-6 * surface.rms_height)
 
 
 def test_identity_of_the_gap_distribution(case):
@@ -116,6 +127,74 @@ def test_gap_distribution_by_counting_nodes(case):
     mean = np.sum(content * 0.5 * (gaps.edges[1:] + gaps.edges[:-1]))
     # The mean gap is the mean separation up to what the spots and the overlap hide.
     assert mean == pytest.approx(state.separation, rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def rough():
+    """A surface of several blocks of rows with disjoint spots of all sizes on it, in no particular equilibrium."""
+    grid = 800
+    surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 100, 0.8).realise(grid, 2)
+    assert len(row_blocks(grid)) > 1
+    rng = np.random.default_rng(3)
+    lattice = np.stack(np.meshgrid(np.arange(12), np.arange(12)), axis=-1).reshape(-1, 2)
+    a = 10 ** rng.uniform(-4.5, -1.45, len(lattice)) * PERIOD
+    spots = spots_of((lattice + 0.5 * rng.random(lattice.shape)) * (PERIOD / 12), a)
+    radius = a**2 / (0.3 * surface.rms_height)
+    spots = Spots(spots.position, spots.height, radius, a, spots.approach, spots.members)
+    return surface, JKR(Material(MODULUS, 0.0, 1e-9)), SimpleNamespace(spots=spots, separation=2 * surface.rms_height)
+
+
+def test_gap_distribution_of_many_spots_from_their_fields(rough):
+    surface, law, state = rough
+    gaps = gap_distribution(law, surface, state)
+    u = np.where(covered_nodes(surface, state.spots), 0.0, gap(law, surface, state))
+    outside = np.clip(1 - contact_cover(surface, state.spots), 0, 1) / surface.grid**2
+    expected, _ = np.histogram(u, bins=gaps.edges, weights=outside)
+    np.testing.assert_allclose(gaps.density * np.diff(gaps.edges), expected, rtol=1e-9, atol=1e-12)
+    assert gaps.overlap_fraction == pytest.approx(np.sum(outside[u < 0]), rel=1e-9)
+    area = np.sum(np.pi * state.spots.contact_radius**2) / PERIOD**2
+    assert np.sum(expected) + gaps.overlap_fraction + area == pytest.approx(1, abs=1e-12)
+
+
+def test_gaps_on_the_edges_of_bins_are_counted_in_the_bin_above():
+    # On every edge and at the numbers next to it.
+    edges = GAP_BINS[1:-1]
+    wanted = np.concatenate([edges, np.nextafter(edges, 0), np.nextafter(edges, np.inf), [0.0] * 3, [GAP_BINS[-1]] * 2])
+    n = 20
+    u = np.resize(wanted, n * n)
+    index = _gap_bin(u.reshape(n, n) * 0.7, GAP_BINS * 0.7).ravel()
+    expected = np.minimum(np.searchsorted(GAP_BINS * 0.7, u * 0.7, side="right") - 1, len(GAP_BINS) - 2)
+    np.testing.assert_array_equal(index, expected)
+
+
+def test_every_fourth_node_and_wider_cells(rough):
+    surface, law, state = rough
+    fine, coarse = gap(law, surface, state), gap(law, surface, state, every=4)
+    np.testing.assert_allclose(coarse, fine[::4, ::4], rtol=0, atol=1e-7 * surface.rms_height)
+    cover, wide = contact_cover(surface, state.spots), contact_cover(surface, state.spots, every=5)
+    # A wide cell around every fifth node holds five by five of the narrow ones.
+    shifted = np.roll(cover, 2, axis=(0, 1)).reshape(160, 5, 160, 5)
+    np.testing.assert_allclose(wide, shifted.mean(axis=(1, 3)), atol=1e-11)
+    for every in (3, 0, 2.0):
+        with pytest.raises(ValueError, match="every"):
+            gap(law, surface, state, every=every)
+
+
+def test_distributions_have_the_same_bits_on_any_number_of_cores(rough, monkeypatch):
+    surface, law, state = rough
+    bits = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        gaps = gap_distribution(law, surface, state)
+        cover = contact_cover(surface, state.spots)
+        bits.append(gaps.density.tobytes() + np.array(gaps.overlap_fraction).tobytes() + cover.tobytes())
+    assert bits[0] == bits[1]
+
+
+def test_spots_of_no_radius_cover_nothing():
+    surface = Surface(np.random.default_rng(0).normal(size=(16, 16)), 1.0)
+    both, one = spots_of([[0.5, 0.5], [0.3, 0.3]], [0.0, 0.1]), spots_of([[0.3, 0.3]], [0.1])
+    np.testing.assert_array_equal(contact_cover(surface, both), contact_cover(surface, one))
 
 
 def test_gap_distribution_around_one_hertz_spot():
