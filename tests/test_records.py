@@ -6,6 +6,7 @@ import pytest
 import small_campaign as small
 import xarray as xr
 
+from icha import Surface
 from icha.campaign import RunLabels, campaign_tree, run_labels, select_run
 from icha.records import read_campaign, read_dataset, read_run, read_surface, write_dataset, write_surface
 
@@ -92,6 +93,21 @@ def test_surface_round_trip_keeps_heights_and_axes(tmp_path):
     assert dataset["height"].dims == ("y", "x")
     assert float(dataset["hurst"]) == 0.8
     np.testing.assert_allclose(float(dataset["rms_slope"]), 1.0, rtol=1e-12)
+
+
+def test_heights_of_a_large_surface_are_kept_plain_and_to_the_last_bit(tmp_path):
+    n = 2048
+    surface = Surface(np.random.default_rng(0).normal(size=(n, n)), 1.0)
+    for name in ("one.nc", "two.nc"):
+        write_surface(tmp_path / name, surface, name="rough", seed=1)
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+    with netCDF4.Dataset(tmp_path / "one.nc") as file:
+        assert not file["height"].filters()["zlib"]
+        assert file["height"].chunking() == "contiguous"
+        np.testing.assert_array_equal(file["height"][::97], surface.heights[::97])
+    write_surface(tmp_path / "small.nc", small.surface(), name="rough", seed=1)
+    with netCDF4.Dataset(tmp_path / "small.nc") as file:
+        assert file["height"].filters()["zlib"] == (small.surface().grid >= 64)
 
 
 def test_no_fill_values_and_no_coordinate_in_pascal(tmp_path):
