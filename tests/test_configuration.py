@@ -20,6 +20,7 @@ from icha.configuration.load import ConfigurationError, load_configuration
 from icha.configuration.schema import json_schema, readme_with_tables
 from icha.configuration.units import to_number, to_si
 from icha.labels import number_label
+from icha.reference.literature import literature
 
 REPOSITORY = Path(__file__).parents[1]
 SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])
@@ -114,6 +115,44 @@ def test_the_papers_campaign():
     assert challenge.cells_per_short_wave == pytest.approx(8)
     ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][2:]
     assert ratios == pytest.approx([8.333e-9, 4.0e-9, 1.905e-9], rel=1e-3)
+
+
+def test_the_whole_challenge():
+    challenge = literature("contact_mechanics_challenge")
+    campaign = load_configuration(REPOSITORY / "config/campaigns/cmc_full.yaml").campaign
+    surface, study = campaign.surfaces["challenge"], campaign.studies["challenge"]
+    for name in ("period", "rolloff_wavelength", "short_wavelength"):
+        assert getattr(surface, name) == pytest.approx(challenge[f"{name}_m"])
+    assert (surface.hurst, study.rms_slopes) == (challenge["hurst"], [challenge["rms_slope"]])
+    assert surface.cells_per_short_wave >= 8
+    cmc = campaign.materials["cmc"]
+    assert cmc.contact_modulus == challenge["contact_modulus_Pa"]
+    assert cmc.surface_energy == challenge["surface_energy_J_m2"]
+    assert cmc.interaction_range == challenge["interaction_range_m"]
+    assert campaign.materials["cmc_adhesionless"].surface_energy == 0
+    areas = np.array(study.targets.area_fractions)
+    assert len(areas) == 20 and areas[-1] == 0.1
+    np.testing.assert_allclose(np.diff(np.log(areas)), np.log(areas[-1] / areas[0]) / 19, rtol=0.03)
+    pressure = challenge["reference_pressure_Pa"] / challenge["contact_modulus_Pa"] / challenge["rms_slope"]
+    assert [snapshot.target for snapshot in study.snapshots] == [("reduced_pressure", pytest.approx(pressure))]
+
+
+def test_tabor_parameters_of_the_tabor_campaign():
+    challenge = literature("contact_mechanics_challenge")
+    campaign = load_configuration(REPOSITORY / "config/campaigns/tabor.yaml").campaign
+    whole = load_configuration(REPOSITORY / "config/campaigns/cmc_full.yaml").campaign
+    assert campaign.surfaces == whole.surfaces
+    found = []
+    for name in campaign.studies["tabor"].materials:
+        material = campaign.materials[name]
+        length = material.surface_energy / material.contact_modulus
+        mu = np.cbrt(length**2 * challenge["rms_curvature_radius_m"]) / material.interaction_range
+        if name == "adhesionless":
+            assert mu == 0
+        else:
+            assert float(name.removeprefix("mu_").replace("_", ".")) == pytest.approx(mu, rel=2e-3)
+            found.append(mu)
+    np.testing.assert_allclose(found, np.arange(1, 5.1, 0.5), rtol=2e-3)
 
 
 def test_a_study_is_a_product_of_its_lists(load):
@@ -266,6 +305,13 @@ def test_figures_of_snapshots_need_one(load):
     load({"figures": figures})
     with pytest.raises(ConfigurationError, match=r"fig3_distributions\.study: 'one' keeps no snapshot to draw"):
         load({"figures": figures, "studies.one.snapshots": []})
+
+
+def test_the_figure_of_tabor_parameters_needs_adhesion(load):
+    figures = {"fig9_tabor": {"study": "one"}}
+    load({"figures": figures})
+    with pytest.raises(ConfigurationError, match=r"fig9_tabor\.study: 'one' has no material with adhesion"):
+        load({"figures": figures, "materials.soft.surface_energy": "0 J/m^2"})
 
 
 def test_random_surfaces_and_files_need_studies_of_their_own(load, tmp_path):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import small_campaign as small
 
-from icha.campaign import campaign_tree
+import icha
+from icha.campaign import RunLabels, campaign_tree
 from icha.figures import (
     fig1_jkr,
     fig2_area_and_gap,
@@ -13,10 +14,13 @@ from icha.figures import (
     fig4_contact_map,
     fig5_multi_slope,
     fig6_spots_by_slope,
+    fig7_stiffness,
+    fig8_patch_sizes,
+    fig9_tabor,
 )
 from icha.figures.select import find_snapshot, path_steps
 from icha.figures.spots import periodic_circles
-from icha.figures.style import number, quantity, save, unit_for
+from icha.figures.style import material_label, number, quantity, save, unit_for
 from icha.records import read_dataset, write_surface
 from icha.reference import reference_dataset
 
@@ -41,10 +45,19 @@ def draw(name, surface):
         "fig5_one": lambda: fig5_multi_slope.figure(tree, study="single"),
         "fig6": lambda: fig6_spots_by_slope.figure(tree, study="slopes", material="hertz"),
         "fig6_one": lambda: fig6_spots_by_slope.figure(tree, study="single", seed=2),
+        "fig7": lambda: fig7_stiffness.figure(tree, reference_dataset(small.SPECTRUM), study="slopes"),
+        "fig7_alone": lambda: fig7_stiffness.figure(tree, study="single"),
+        "fig8": lambda: fig8_patch_sizes.figure(tree, study="slopes"),
+        "fig8_one": lambda: fig8_patch_sizes.figure(tree, study="single", kind="area_fraction"),
+        "fig9": lambda: fig9_tabor.figure(tree, study="slopes"),
+        "fig9_one": lambda: fig9_tabor.figure(tree, study="single", kind="area_fraction"),
     }[name]()
 
 
 NAMES = ["fig1", "fig2", "fig2_alone", "fig3", "fig3_one", "fig4", "fig5", "fig5_one", "fig6", "fig6_one"]
+NAMES += ["fig7", "fig7_alone", "fig8", "fig8_one", "fig9", "fig9_one"]
+FIGURES = [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope]
+FIGURES += [fig7_stiffness, fig8_patch_sizes, fig9_tabor]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -109,6 +122,41 @@ def test_fig4_refuses_the_surface_of_another_run(tmp_path, surface):
         fig4_contact_map.figure(small.tree(), surface.assign(period=surface["period"] * 2), study="slopes")
 
 
+def test_fig4_draws_means_of_large_topographies():
+    rng = np.random.default_rng(5)
+    for n in (3000, 2048, 1024, 7):
+        heights = rng.normal(size=(n, n)) if n < 3000 else np.add.outer(np.arange(n) ** 2.0, np.arange(n) * 10.0)
+        drawn = fig4_contact_map._means(heights)
+        assert drawn.shape == (min(n, 1024),) * 2
+        if n == 2048:
+            assert drawn[3, 5] == pytest.approx(heights[6:8, 10:12].mean())
+        if n == 3000:
+            # A block of nodes from 3000 k/1024 to the next.
+            rows, columns = np.arange(2929, 2932), np.arange(1464, 1467)
+            assert drawn[1000, 500] == pytest.approx(np.add.outer(rows**2.0, columns * 10.0).mean())
+
+
+def test_fig4_enlarges_small_spots_more_and_stays_small(tmp_path):
+    rng = np.random.default_rng(4)
+    grid, count = 1500, 5000
+    surface = icha.Surface(rng.normal(size=(grid, grid)) * 1e-8, period=100e-6)
+    write_surface(tmp_path / "s.nc", surface, name="rough", seed=1)
+    run = small.run().drop_dims("spot")
+    radius = rng.uniform(0.05e-6, 0.1e-6, count)
+    spots = {"spot_x": rng.uniform(0, 1e-4, count), "spot_y": rng.uniform(0, 1e-4, count), "spot_radius": radius}
+    spots |= {"spot_snapshot": np.zeros(count, int)}
+    run = run.assign({name: ("spot", values, small.run()[name].attrs) for name, values in spots.items()})
+    run["grid"] = run["grid"].copy(data=grid)
+    tree = campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)])
+    figure = fig4_contact_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="one")
+    whole, enlarged = (np.ptp(axes.get_xlim()) for axes in figure.axes[:2])
+    assert whole == pytest.approx(100)
+    # 40 radii are 3.2 um or so, but 64 cells are more.
+    assert enlarged == pytest.approx(100 / 16)
+    save(figure, tmp_path / "a.png", tmp_path / "a.pdf")
+    assert (tmp_path / "a.pdf").stat().st_size < 2e6
+
+
 def test_circles_continue_across_borders():
     circles = list(periodic_circles([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0))
     assert sorted((round(x, 9), round(y, 9)) for x, y, _ in circles) == [
@@ -146,12 +194,96 @@ def test_fig5_slope_orders_the_curves_at_equal_load():
     np.testing.assert_allclose(flat, 0.2 * steep, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    "module", [fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig6_spots_by_slope], ids=lambda m: m.__name__
-)
+@pytest.mark.parametrize("module", set(FIGURES) - {fig1_jkr, fig4_contact_map}, ids=lambda m: m.__name__)
 def test_unknown_studies_are_named(module):
     with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, single"):
         module.figure(small.tree(), study="nothing")
+
+
+def test_fig7_is_the_slope_of_fig2_whatever_the_rms_slope():
+    # Without adhesion p* against u/h_rms is one curve for all slopes of a topography, and so is its derivative.
+    one, other = (
+        dict(zip(*np.round(fig7_stiffness.stiffness_points(small.run(rms_slope=s, material="hertz")), 12), strict=True))
+        for s in (1.0, 0.2)
+    )
+    common = sorted(set(one) & set(other))
+    assert len(common) >= len(small.PRESSURES)
+    np.testing.assert_allclose([one[p] for p in common], [other[p] for p in common], rtol=1e-6)
+    left, right = fig7_stiffness.figure(small.tree(), study="single").axes
+    p, stiffness = fig7_stiffness.stiffness_points(path_steps(small.run(seed=2)))
+    assert any(np.array_equal(line.get_ydata(), stiffness) for line in left.get_lines())
+    assert any(np.array_equal(line.get_ydata(), stiffness / p) for line in right.get_lines())
+
+
+def test_fig7_leaves_out_what_has_no_logarithm():
+    run = small.run().copy(deep=True)
+    run["contact_stiffness"].values[0] *= -1
+    run["reduced_pressure"].values[1] = -1e-4
+    p, stiffness = fig7_stiffness.stiffness_points(run)
+    assert len(p) == len(stiffness) == run.sizes["step"] - 2
+    run["contact_stiffness"].values[:] = -1.0
+    with pytest.raises(ValueError, match="study one: no stop with a positive load and a positive stiffness"):
+        fig7_stiffness.figure(campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)]), study="one")
+
+
+def test_fig8_density_and_counts_of_a_known_distribution():
+    # Quantiles of n(A) ~ A^-2 between 1 and 1000, on a nominal area of 50.
+    count, nominal = 20000, 50.0
+    area = np.sort(1 / (1 - (np.arange(count) + 0.5) / count * (1 - 1e-3)))
+    at, density = fig8_patch_sizes.patch_density(area, nominal)
+    exact = count / nominal / (1 - 1e-3) / at**2
+    np.testing.assert_allclose(density[at < 100], exact[at < 100], rtol=0.03)
+    at, above = fig8_patch_sizes.patches_above(area, nominal)
+    assert at[0] == area[0] and at[-1] == area[-1] and len(at) <= 300
+    np.testing.assert_allclose(above * nominal, [np.count_nonzero(area >= a) for a in at])
+
+
+@pytest.mark.parametrize("areas", [[], [2.0], [2.0, 2.0], [1.0, 2.0, 5.0]])
+def test_fig8_of_few_patches(areas):
+    at, density = fig8_patch_sizes.patch_density(np.array(areas), 10.0)
+    above = fig8_patch_sizes.patches_above(np.array(areas), 10.0)
+    assert len(at) == min(len(areas), 1) and np.all(np.isfinite(density))
+    assert [len(each) for each in above] == [len(areas)] * 2
+
+
+def test_fig8_counts_the_spots_of_the_snapshot():
+    run = small.run()
+    for at in range(run.sizes["snapshot"]):
+        step = int(run["snapshot_step"].values[at])
+        areas = fig8_patch_sizes.patch_areas(run, at)
+        assert len(areas) == int(run["spot_count"].values[step])
+        share = areas.sum() / float(run["period"]) ** 2
+        assert share == pytest.approx(float(run["contact_area_fraction"].values[step]), rel=1e-9)
+
+
+def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
+    ranges = {"long": 4e-9, "short": 1e-9, "bare": 2e-9}
+    runs = {}
+    for name, reach in ranges.items():
+        material = icha.Material(25e6, 0.0 if name == "bare" else 0.05, reach)
+        path = icha.Path(reduced_pressures=[1e-2], max_step=0.2)
+        runs[name] = icha.simulate(small.surface(), material, path, seed=1)
+    tree = campaign_tree([(RunLabels("tabor", "rough", 1, 1.0, name), run) for name, run in runs.items()])
+    left, right = fig9_tabor.figure(tree, study="tabor").axes
+    for axes, name in ((left, "contact_area_fraction"), (right, "reduced_separation")):
+        curve, bare = axes.get_lines()
+        own = [runs["long"], runs["short"]]
+        np.testing.assert_array_equal(curve.get_xdata(), [float(run["tabor_parameter"]) for run in own])
+        np.testing.assert_array_equal(curve.get_ydata(), [float(run[name].values[-1]) for run in own])
+        assert set(bare.get_ydata()) == {float(runs["bare"][name].values[-1])}
+    assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
+    assert len({text.get_text() for text in left.get_legend().get_texts()}) == 2
+    tree = campaign_tree([(RunLabels("tabor", "rough", 1, 1.0, "bare"), runs["bare"])])
+    with pytest.raises(ValueError, match="study tabor: no run with adhesion"):
+        fig9_tabor.figure(tree, study="tabor")
+
+
+def test_materials_that_differ_in_range_alone_are_told_apart_by_it():
+    study = small.tree()["slopes"].to_dataset()
+    assert "range" not in material_label(study, "soft")
+    alike = study.sel(material=["soft", "soft"]).assign_coords(material=["soft", "longer"])
+    alike["interaction_range"] = ("material", [2e-9, 4e-9])
+    assert material_label(alike, "longer").endswith("range 4 nm")
 
 
 def test_what_is_not_there_is_named_with_what_is():
@@ -167,11 +299,7 @@ def test_incomplete_campaigns_are_drawn_with_what_they_have():
     assert len(lines(fig5_multi_slope.figure(tree, study="slopes").axes[0])) == 3
 
 
-@pytest.mark.parametrize(
-    "module",
-    [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope],
-    ids=lambda module: module.__name__,
-)
+@pytest.mark.parametrize("module", FIGURES, ids=lambda module: module.__name__)
 def test_captions_are_sentences(module):
     assert len(module.CAPTION) > 100 and module.CAPTION.endswith(".")
 

@@ -111,7 +111,7 @@ def test_a_figure_runs_itself_and_the_report(project):
 def test_the_style_runs_all_figures(project):
     add_statement(project / "icha/figures/style.py")
     jobs, _ = planned(project)
-    assert jobs == {"figure": 6, "report_page": 1}
+    assert jobs == {"figure": 9, "report_page": 1}
 
 
 def test_the_page_template_runs_the_report(project):

@@ -49,8 +49,9 @@ def test_everything_that_was_promised_is_there(smoke):
         "publish/dataset/smoke.nc",
     ):
         assert name in files
-    figures = ("fig1_jkr", "fig2_area_and_gap", "fig3_distributions", "fig4_contact_map", "fig5_multi_slope")
-    for figure in (*figures, "fig6_spots_by_slope"):
+    figures = sorted(file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py"))
+    assert len(figures) == 9
+    for figure in figures:
         assert f"figures/{figure}.png" in files and f"figures/{figure}.pdf" in files
     jobs = [file for file in files if file.startswith(("surfaces", "runs"))]
     for job in jobs:

@@ -11,6 +11,8 @@ from icha.figures.select import path_steps, study_runs
 from icha.figures.style import COLOURS, MARKERS, material_label
 
 PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"
+AREA_LABEL = r"contact area  $A/A_0$"
+SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
 
 
 class Curve(NamedTuple):

@@ -7,7 +7,14 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from icha.figures.curves import PRESSURE_LABEL, add_legends, extra_height, study_curves
+from icha.figures.curves import (
+    AREA_LABEL,
+    PRESSURE_LABEL,
+    SEPARATION_LABEL,
+    add_legends,
+    extra_height,
+    study_curves,
+)
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, new_figure, panel_label, styled
 
 CAPTION = (
@@ -17,9 +24,6 @@ CAPTION = (
     "the linear law of Bush, Gibson and Thomas where few summits touch. Crosses: adhesionless Green's function "
     "molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no roll-off), reduced from published data."
 )
-
-AREA_LABEL = r"contact area  $A/A_0$"
-SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
 
 
 @styled

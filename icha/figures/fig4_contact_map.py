@@ -23,10 +23,13 @@ _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
 # More cells a side than this cannot be told apart in a panel.
 _MOST_CELLS = 1024
-# Outlines of spots that are smaller than this part of the period would hide them; more spots than this are drawn as an
-# image in PDF files as well.
-_LEAST_OUTLINED = 2.5e-3
+# More spots than this are drawn as an image in PDF files as well.
 _MANY_SPOTS = 2000
+# Outline of a spot in the map, as part of its radius, so that it does not hide small ones, and at most, in points; and
+# points to the side of the map, about.
+_OUTLINE = 0.25
+_WIDEST_OUTLINE = 0.35
+_PANEL = 190
 
 
 @styled
@@ -112,9 +115,9 @@ def figure(
         ax.set_xlabel(f"x ({length_unit})")
         ax.tick_params(direction="out", top=False, right=False)
     circles = periodic_circles(spots["spot_x"].values * length, spots["spot_y"].values * length, radius * length, side)
-    outline = 0.35 if typical > _LEAST_OUTLINED * period else 0.0
+    outlines = np.minimum(_OUTLINE * _PANEL / side * circles[:, 2], _WIDEST_OUTLINE)
     many = len(circles) > _MANY_SPOTS
-    draw_spots(left, circles, facecolor=(0.9, 0.0, 0.05, 0.85), edgecolor="black", lw=outline, rasterized=many)
+    draw_spots(left, circles, facecolor=(0.9, 0.0, 0.05, 0.85), edgecolor="black", lw=outlines, rasterized=many)
     near = np.all(np.abs(circles[:, :2] - (corner + window / 2)) < window / 2 + circles[:, 2:], axis=1)
     draw_spots(right, circles[near], facecolor=(0.9, 0.0, 0.05, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
     left.set_xlim(0, side)

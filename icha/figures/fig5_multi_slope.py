@@ -10,8 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from icha.figures.curves import PRESSURE_LABEL
-from icha.figures.fig2_area_and_gap import AREA_LABEL
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL
 from icha.figures.select import path_steps, study_runs
 from icha.figures.style import (
     BLACK,

@@ -46,7 +46,7 @@ def figure(
     runs = first_line_runs(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     fig = new_figure(TWO_COLUMNS, 3.1)
-    left, right = fig.subplots(1, 2)
+    left, right = fig.subplots(1, 2, sharex=True)
     for k, (labels, run, at) in enumerate(runs):
         factor, unit = unit_for(float(run["period"]), "m")
         cell = (float(run["period"]) * factor) ** 2

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.fig2_area_and_gap import AREA_LABEL, SEPARATION_LABEL
+from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL
 from icha.figures.select import find_snapshot, snapshot_label, study_runs
 from icha.figures.style import COLOURS, GREY, MARKERS, TWO_COLUMNS, new_figure, panel_label, quantity, styled
 from icha.simulation import WU_RANGE
