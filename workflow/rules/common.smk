@@ -64,10 +64,24 @@ def height_map(wildcards):
     return {"height_map": surface.path} if surface.kind == "file" else {}
 
 
+def points_of(surface):
+    """Nodes of a surface's grid; a guess where only its file knows."""
+    return getattr(CAMPAIGN.surfaces[surface], "grid", 2048) ** 2
+
+
 def memory_of(surface):
-    """Megabytes that a surface and its sweeps need: some arrays of its size, and the program."""
-    points = getattr(CAMPAIGN.surfaces[surface], "grid", 2048) ** 2
-    return 600 + 20 * 8 * points // 10**6
+    """Megabytes that making a surface, or a sweep of it, needs: some arrays of its size, and the program."""
+    return 600 + 14 * 8 * points_of(surface) // 10**6
+
+
+def threads_of(surface):
+    """Cores for a surface and its sweeps: one, with sweeps side by side, but where transforms of large arrays pay."""
+    return 2 if points_of(surface) >= 2048**2 else 1
+
+
+def figure_memory(name):
+    """Megabytes that a figure needs: the map holds a topography."""
+    return 2000 + (16 * max(map(points_of, CAMPAIGN.surfaces)) // 10**6 if name == "fig4_contact_map" else 0)
 
 
 def case_of(wildcards):

@@ -15,7 +15,7 @@ rule figure:
         "../envs/icha.yaml"
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=lambda wildcards: figure_memory(wildcards.name),
         runtime=10,
     params:
         options=lambda wildcards: figure_options(wildcards.name),

@@ -12,7 +12,7 @@ rule surface:
         f"{BENCHMARKS}/surfaces/{{surface}}/seed{{seed}}.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
+    threads: lambda wildcards: threads_of(wildcards.surface)
     resources:
         mem_mb=lambda wildcards: memory_of(wildcards.surface),
         runtime=30,
