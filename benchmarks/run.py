@@ -38,8 +38,8 @@ SWEEPS = (
     ("tamaas", 2, True, "gap"),
 )
 CODES = tuple(dict.fromkeys(code for code, *_ in SWEEPS))
-# Patches along a side of the surfaces of the scaling; a patch has about a thousand spots at the end of the sweep.
-PATCHES = (1, 2, 3, 4, 6, 10)
+# Patches along a side of the surfaces of the scaling; a patch has some 470 spots at the end of the sweep.
+PATCHES = (1, 2, 3, 5, 8, 15)
 
 
 def interpreter(code: str) -> str:

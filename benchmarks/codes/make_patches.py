@@ -8,7 +8,7 @@ import numpy as np
 import icha
 from icha.asperities import find_summits
 
-GRID, CELLS_PER_SHORT_WAVE, SEEDS = 1024, 8, 16
+GRID, CELLS_PER_SHORT_WAVE, SEEDS = 512, 8, 16
 
 
 def main(folder):

@@ -1,0 +1,461 @@
+"""Write docs/benchmarks.md and its figures from what benchmarks/run.py kept; nothing is measured here."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+HERE = Path(__file__).resolve().parent
+DOCS = HERE.parent / "docs"
+MINUTE, MIB, GIB = 60.0, 2.0**20, 2.0**30
+LEAST_SPOTS = 1000  # below, fixed costs hide the exponent
+
+
+def read_results(folder: Path) -> dict[str, dict]:
+    """All results by name."""
+    return {path.stem: json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))}
+
+
+def chosen(results, prefix, **wanted) -> list[dict]:
+    """The results whose name starts so and whose entries are those."""
+    return [
+        result
+        for name, result in results.items()
+        if name.startswith(prefix) and all(result.get(key) == value for key, value in wanted.items())
+    ]
+
+
+def grids(results) -> list[int]:
+    """The grids of the sweeps."""
+    return sorted({result["grid"] for result in chosen(results, "sweep-")})
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A table, numbers to the right."""
+    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def seconds(value: float) -> str:
+    return f"{value:.2f} s" if value < 10 else f"{value:.0f} s"
+
+
+def times(ratio: float) -> str:
+    return f"{ratio:.2g}" if ratio < 10 else f"{ratio:.0f}"
+
+
+def mib(value: float) -> str:
+    return f"{value / MIB:.0f} MiB"
+
+
+def percent(value: float) -> str:
+    return f"{100 * value:+.1f} %"
+
+
+# --- (a) the sweep ------------------------------------------------------------------------------------------------
+
+
+def rival(results, result) -> dict | None:
+    """ICHA's sweep with the stops of another code's."""
+    found = chosen(
+        results,
+        "sweep-icha-",
+        grid=result["grid"],
+        adhesion=result["adhesion"],
+        control=result["control"],
+        outcome="complete",
+    )
+    return found[0] if found else None
+
+
+def computation(result) -> float:
+    """Seconds from the end of the imports to the last stop that was reached."""
+    return result["stops"][-1]["seconds"]
+
+
+def speed_up(results, result) -> float | None:
+    """How many times ICHA's time another code took (at least, if it was stopped); None where there is none."""
+    icha = rival(results, result)
+    if icha is None or result["outcome"] == "failed":
+        return None
+    return result["processor"] / icha["processor"]
+
+
+def differences(results, result) -> list[str]:
+    """ICHA's area and gap, or load, against another code's, over their common stops."""
+    icha = rival(results, result)
+    pairs = list(zip(icha["stops"], result.get("stops", []), strict=False)) if icha else []
+    if not pairs:
+        return ["", ""]
+    rms_height = results[f"task-{result['grid']}"]["rms_height"]
+
+    def spread(values):
+        values = np.array(values)
+        return f"{percent(np.median(values))} ({percent(values.min())} to {percent(values.max())})"
+
+    area = spread([mine["area_fraction"] / theirs["area_fraction"] - 1 for mine, theirs in pairs])
+    if result["control"] == "gap":
+        return [area, "load " + spread([mine["pressure"] / theirs["pressure"] - 1 for mine, theirs in pairs])]
+    gap = np.array([(mine["mean_gap"] - theirs["mean_gap"]) / rms_height for mine, theirs in pairs])
+    return [area, f"gap {np.median(gap):+.3f} ({gap.min():+.3f} to {gap.max():+.3f}) h_rms"]
+
+
+def sweep_rows(results, grid, adhesion) -> list[list[str]]:
+    """A row per code, ICHA first."""
+    rows = []
+    order = sorted(
+        chosen(results, "sweep-", grid=grid, adhesion=adhesion),
+        key=lambda r: (r["code"] != "icha", r["control"] != "load", r["code"], r["threads"]),
+    )
+    for result in order:
+        name = result["code"] + (", given gaps" if result["control"] == "gap" else "")
+        name += f", {result['threads']} threads" if result["threads"] > 1 else ""
+        if result["outcome"] == "failed":
+            rows.append([name, f"failed: {result['last_words']}"])
+            continue
+        stopped = result["outcome"] == "over time"
+        more = "> " if stopped else ""
+        compute = seconds(computation(result)) if result.get("stops") else ""
+        if stopped:
+            compute = f"{len(result.get('stops', []))} stops in {compute or 'none'}"
+        ratios = ["1", "1", "1", "", ""]
+        if result["code"] != "icha" and (icha := rival(results, result)):
+            ratios = [more + times(result["processor"] / icha["processor"])]
+            ratios += [more + times(computation(result) / computation(icha)) if result.get("stops") else ""]
+            ratios += [times(result["peak"] / icha["peak"]), *differences(results, result)]
+        rows.append(
+            [
+                name,
+                more + seconds(result["wall"]),
+                more + seconds(result["processor"]),
+                compute,
+                mib(result["peak"]),
+                *ratios,
+            ]
+        )
+    return [row + [""] * (10 - len(row)) for row in rows]
+
+
+def fastest(results, grid, adhesion) -> tuple[float, str, bool] | None:
+    """The smallest speed-up over another code at one thread, that code, and whether it was stopped at its limit."""
+    ratios = [
+        (ratio, result["code"], result["outcome"] == "over time")
+        for result in chosen(results, "sweep-", grid=grid, adhesion=adhesion, threads=1)
+        if result["code"] != "icha" and (ratio := speed_up(results, result)) is not None
+    ]
+    return min(ratios) if ratios else None
+
+
+# --- (b) the scaling ----------------------------------------------------------------------------------------------
+
+
+def points(results, adhesion) -> np.ndarray:
+    """Rows (spots, seconds, memory) of the complete runs of the scaling, with growing number of spots."""
+    rows = [
+        (run["stops"][-1]["spots"], run["stops"][-1]["seconds"], run["stops"][-1]["peak"] - run["memory_before"])
+        for run in chosen(results, "scaling-", adhesion=adhesion, outcome="complete")
+    ]
+    return np.array(sorted(rows)).reshape(-1, 3)
+
+
+def exponent(results, adhesion, column: int) -> float | None:
+    """Slope of the logarithm of time (column 1) or memory (2) over that of the number of spots, by least squares."""
+    data = points(results, adhesion)
+    data = data[data[:, 0] >= LEAST_SPOTS]
+    if len(data) < 2 or np.any(data[:, column] <= 0):
+        return None
+    return float(np.polyfit(np.log(data[:, 0]), np.log(data[:, column]), 1)[0])
+
+
+# --- the targets --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A target, what was measured (empty: nothing), and whether it is reached."""
+
+    target: str
+    measured: str
+    reached: bool | None
+
+    def row(self) -> list[str]:
+        word = {True: "reached", False: "**not reached**", None: "not measured"}[self.reached]
+        return [self.target, self.measured or "–", word]
+
+
+WITH = {False: "without adhesion", True: "with adhesion"}
+
+
+def verdicts(results) -> list[Verdict]:
+    """The targets against what was measured."""
+    found = []
+    for adhesion in (False, True):
+        target = f"full challenge surface, {WITH[adhesion]}: at most 5 min and 8 GiB"
+        full = chosen(results, "stages-challenge-", adhesion=adhesion)
+        if full and full[0]["outcome"] == "complete":
+            (run,) = full[:1]
+            reached = run["wall"] <= 5 * MINUTE and run["peak"] <= 8 * GIB and run["stops"] == run["stops_asked"]
+            text = f"{run['wall'] / MINUTE:.1f} min, {run['peak'] / GIB:.1f} GiB"
+            if run["failure"]:
+                text += f"; {run['stops']} of {run['stops_asked']} stops: {run['failure']}"
+            found.append(Verdict(target, text, reached))
+        else:
+            text = f"{full[0]['outcome']} after {full[0]['wall'] / MINUTE:.1f} min" if full else ""
+            found.append(Verdict(target, text, False if full else None))
+    for adhesion in (False, True):
+        target = f"20 loads at 512², {WITH[adhesion]}: at most 1 s of computation"
+        run = chosen(results, "sweep-icha-", grid=512, adhesion=adhesion, control="load", outcome="complete")
+        value = computation(run[0]) if run else None
+        found.append(Verdict(target, seconds(value) if run else "", value <= 1 if run else None))
+    for adhesion, wanted in ((False, 30), (True, 100)):
+        target = f"at 1024², {WITH[adhesion]}: at least {wanted} times faster than the fastest other code"
+        best = fastest(results, 1024, adhesion)
+        text = f"{'more than ' if best[2] else ''}{best[0]:.1f} times ({best[1]})" if best else ""
+        found.append(Verdict(target, text, best[0] >= wanted if best else None))
+    for adhesion in (False, True):
+        value = exponent(results, adhesion, 1)
+        target = f"time over number of spots, {WITH[adhesion]}: exponent at most 1.2"
+        failed = [r for r in chosen(results, "scaling-", adhesion=adhesion) if r["outcome"] != "complete"]
+        text = "" if value is None else f"{value:.2f}" + (f"; {len(failed)} runs did not end" if failed else "")
+        found.append(Verdict(target, text, None if value is None else value <= 1.2 and not failed))
+    residuals = [
+        stop["residual"] for name, result in results.items() for stop in _stops(result) if "residual" in stop
+    ] + [result["residual"] for result in chosen(results, "stages-") if "residual" in result]
+    target = "equilibrium residual at every stop: at most 1e-8 h_rms"
+    worst = max(residuals, default=None)
+    found.append(Verdict(target, f"{worst:.1e}" if residuals else "", worst <= 1e-8 if residuals else None))
+    digests = {}
+    for result in chosen(results, "stages-512-", outcome="complete"):
+        digests.setdefault(result["adhesion"], {})[result["threads"]] = result["digest"]
+    compared = [set(by_threads.values()) for by_threads in digests.values() if len(by_threads) > 1]
+    same = all(len(values) == 1 for values in compared)
+    text = ("same" if same else "different") + " bytes with 1 and 2 threads at 512²" if compared else ""
+    found.append(Verdict("the number of threads never changes a byte", text, same if compared else None))
+    return found
+
+
+def _stops(result) -> list[dict]:
+    stops = result.get("stops", [])
+    return stops if isinstance(stops, list) else []
+
+
+# --- the page -----------------------------------------------------------------------------------------------------
+
+
+def page(results: dict[str, dict]) -> str:
+    """The page as Markdown."""
+    machine = results["machine"]
+    versions = machine["versions"] | {
+        r["code"]: r["version"] for r in chosen(results, "sweep-") if r["code"] != "icha" and "version" in r
+    }
+    parts = [
+        "# Benchmarks",
+        "Measured by `make benchmarks`, which installs the boundary-element codes in an environment of their own "
+        "(`.venv-benchmarks`; `aspher` is built from its source and needs a C++17 compiler and Eigen, on Debian "
+        "`apt install libeigen3-dev`), runs one process at a time, keeps what it measured in `benchmarks/results` and "
+        "writes this page from it. Part of it is measured again by, say, "
+        "`make benchmarks OPTIONS='--only icha --parts sweep'`.",
+        f"Machine: {machine['processor']}, {machine['cores']} cores, {machine['memory'] / GIB:.0f} GiB, "
+        f"{machine['system']}, Python {machine['python']}; "
+        + ", ".join(f"{name} {number}" for name, number in sorted(versions.items()))
+        + ".",
+        "## Targets",
+        table(["target", "measured", ""], [verdict.row() for verdict in verdicts(results)]).replace("---:", "---"),
+        "## One sweep against boundary-element codes",
+        SWEEP_TEXT,
+        _surfaces(results),
+        _settings(results),
+    ]
+    head = ["code", "wall", "processor", "computation", "memory", "time / ICHA's", "computation / ICHA's"]
+    head += ["memory / ICHA's", "ICHA's area", "and gap or load"]
+    for grid in grids(results):
+        for adhesion in (False, True):
+            rows = sweep_rows(results, grid, adhesion)
+            if rows:
+                parts += [f"### {grid}², {WITH[adhesion]}", table(head, rows)]
+    parts += ["![Time of a sweep](images/benchmark_sweep.png)", "## Number of spots", SCALING_TEXT, _scaling(results)]
+    parts += ["![Time and memory over the number of spots](images/benchmark_scaling.png)"]
+    parts += ["## Where the time goes", STAGES_TEXT, _stages(results)]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+SWEEP_TEXT = """\
+Every code is given the same heights and the same 20 stops and is measured as a whole process, imports and reading
+included, on one thread unless the table says otherwise. *Computation* is the time from when everything is imported to
+the last stop. *Time / ICHA's* is the ratio of processor times of whole processes, which on one thread is the wall
+time of a quiet machine, and that of the computations alone (wall time); *memory* is the largest resident memory. The
+loads are 20 reduced pressures p\\* = p/(E\\* h'_rms) from 5e-4 to 8e-2 in geometric progression. The surfaces have
+the challenge's spectrum (period 100 µm, roll-off 20 µm, Hurst exponent 0.8, rms slope 1) down to waves of eight grid
+cells, so that every grid carries all the waves that it can hold at the resolution recommended for ICHA.
+
+Speed is worth something only beside the error: the last two columns say how far ICHA's area lies from the other
+code's at the same stop, and its mean gap (in h_rms) or, where the gap is given, its load; the median over the stops
+and the range. The areas of the boundary-element codes are corrected by the perimeter of the contact (Yastrebov,
+Anciaux & Molinari, Tribol. Int. 114 (2017) 161-171).
+
+With adhesion, a boundary-element code has to resolve the range ρ of the attraction (exponential, energy 50 mJ/m²,
+E\\* = 25 MPa): on a grid of spacing Δ, Δ ≤ 8 ρ² E\\*/(3π γ) and √(γ Δ/E\\*)/ρ < 0.5. These grids resolve only ranges
+much longer than the challenge's 2.07 nm, and all codes are given the same one. The Tabor parameter is then far below
+2, where ICHA's law of jump-in was not verified, which is part of the differences in area. `adhesion` is given the
+loads; `tamaas`, which does not find equilibria at a given load with adhesion, the mean gaps of ICHA's states at those
+loads, and ICHA is measured with both."""
+
+SCALING_TEXT = """\
+The solver alone, from asperities to the last of the same 20 loads, on one thread, with the challenge's material. The
+surfaces are k × k patches of asperities side by side: a patch is a realisation of the spectrum above cut at 1/64 of
+its period (512², period 100 µm), shifted at random, 16 realisations serving in turn, so that the surfaces differ in
+size only. Heights do not join at the seams, of which a solver that is given asperities knows nothing. *Memory* is
+what the sweep adds to the process that has read the asperities."""
+
+STAGES_TEXT = """\
+One process, two threads unless said otherwise: the surface, its summits, the path, the fields of a snapshot at p\\* =
+0.01 (challenge only), and the rest, which is the dataset, tangents for the stiffness and the file. At 512² the path
+has the 20 loads above; on the full challenge surface (8192², all waves from 100 µm to 0.1 µm, challenge's material)
+20 contact areas from 0.1 % to 10 % of the nominal one. Memory is the largest resident memory during the stage."""
+
+
+def _surfaces(results) -> str:
+    rows = [
+        [
+            f"{task['grid']}²",
+            f"{task['short_wavelength'] * 1e6:.3g} µm",
+            f"{task['rms_height'] * 1e6:.3g} µm",
+            f"{task['interaction_range'] * 1e9:.3g} nm",
+            f"{task['tabor_parameter']:.2f}",
+        ]
+        for task in sorted(chosen(results, "task-"), key=lambda task: task["grid"])
+    ]
+    return table(["grid", "shortest wave", "h_rms", "range ρ", "Tabor parameter"], rows)
+
+
+def _settings(results) -> str:
+    used = {(r["code"], r["settings"]) for r in chosen(results, "sweep-") if r["code"] != "icha" and r.get("settings")}
+    lines = [f"- `{code}`: {settings}." for code, settings in sorted(used)]
+    limits = sorted({r["limit"] for r in chosen(results, "sweep-")})
+    lines += [f"- Time limit of a process: {', '.join(f'{limit / MINUTE:g}' for limit in limits)} min."]
+    return "\n".join(lines)
+
+
+def _scaling(results) -> str:
+    rows = []
+    for run in sorted(chosen(results, "scaling-"), key=lambda run: (run["adhesion"], run["patches"])):
+        last = run["stops"][-1] if run.get("stops") else None
+        if run["outcome"] == "complete":
+            end = f"{last['area_fraction']:.3f}"
+        else:
+            end = f"{run['outcome']} after {len(run.get('stops', []))} stops {run['last_words']}".strip()
+        rows.append(
+            [
+                WITH[run["adhesion"]],
+                str(run["patches"]),
+                str(run.get("asperities", "")),
+                str(last["spots"]) if last else "",
+                seconds(last["seconds"]) if last else "",
+                mib(last["peak"] - run["memory_before"]) if last else "",
+                end,
+            ]
+        )
+    head = ["", "k", "asperities", "spots at the end", "time", "memory", "A/A0 at the end"]
+    text = [table(head, rows)] if rows else []
+    for adhesion in (False, True):
+        time, memory = (exponent(results, adhesion, column) for column in (1, 2))
+        if time is not None:
+            text.append(
+                f"From {LEAST_SPOTS} spots on, {WITH[adhesion]}: time grows with the number of spots to the power of "
+                f"{time:.2f}" + (f", memory to that of {memory:.2f}." if memory is not None else ".")
+            )
+    return "\n\n".join(text)
+
+
+def _stages(results) -> str:
+    tables = []
+    for surface, title in (("512", "512²"), ("challenge", "full challenge surface, 8192²")):
+        for adhesion in (False, True):
+            runs = chosen(results, f"stages-{surface}-", adhesion=adhesion)
+            runs = sorted(runs, key=lambda run: -run["threads"])[:1]
+            for run in runs:
+                tables.append(f"### {title}, {WITH[adhesion]}")
+                if run["outcome"] != "complete":
+                    tables.append(f"{run['outcome']} after {run['wall']:.0f} s: {run['last_words']}")
+                    continue
+                order = ("surface", "summits", "path", "fields of the snapshot", "dataset")
+                rows = [[s, seconds(run["seconds"][s]), mib(run["peaks"][s])] for s in order if s in run["seconds"]]
+                rows.append(["whole process", seconds(run["wall"]), mib(run["peak"])])
+                tables.append(table(["stage", "time", "memory"], rows))
+                counts = ", ".join(f"{count} {what}" for what, count in run["counts"].items())
+                text = (
+                    f"{run['threads']} threads; {run['asperities']} asperities; {run['stops']} of {run['stops_asked']} "
+                    f"stops, at the last one {run['spots']} spots and A/A0 = {run['area_fraction']:.3f}; "
+                    f"{counts}; residual at most {run['residual']:.1e} h_rms."
+                )
+                tables.append(text + (f" {run['failure']}" if run["failure"] else ""))
+    return "\n\n".join(tables)
+
+
+# --- the figures --------------------------------------------------------------------------------------------------
+
+
+def draw_sweep(results, path: Path) -> None:
+    """Processor time of a sweep over the nodes along a side, one line per code."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), sharey=True, layout="constrained")
+    for axis, adhesion in zip(axes, (False, True), strict=True):
+        runs = chosen(results, "sweep-", adhesion=adhesion, threads=1, outcome="complete")
+        for code, control in sorted({(run["code"], run["control"]) for run in runs}):
+            line = sorted(
+                (run["grid"], run["processor"]) for run in runs if (run["code"], run["control"]) == (code, control)
+            )
+            style = {"lw": 2.5, "color": "black"} if code == "icha" else {}
+            style |= {"ls": "--"} if control == "gap" else {}
+            axis.loglog(*zip(*line, strict=True), "o-", label=f"{code}, given {control}s", **style)
+        axis.set_title(WITH[adhesion])
+        axis.set_xlabel("nodes along a side")
+        axis.set_xticks(grids(results), [str(grid) for grid in grids(results)], minor=False)
+        axis.set_xticks([], minor=True)
+        axis.grid(alpha=0.3)
+        if runs:
+            axis.legend(fontsize=8)
+    axes[0].set_ylabel("processor time of the process, s")
+    _save(figure, path)
+
+
+def draw_scaling(results, path: Path) -> None:
+    """Time and memory of the solver over the number of spots."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+    for column, axis, label in ((1, axes[0], "time, s"), (2, axes[1], "memory, MiB")):
+        for adhesion, marker in ((False, "o-"), (True, "s-")):
+            data = points(results, adhesion)
+            if len(data):
+                value = data[:, column] / (MIB if column == 2 else 1)
+                slope = exponent(results, adhesion, column)
+                power = "" if slope is None else f", exponent {slope:.2f}"
+                axis.loglog(data[:, 0], value, marker, label=WITH[adhesion] + power)
+        axis.set_xlabel("spots at the last load")
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+        if axis.lines:
+            axis.legend(fontsize=8)
+    _save(figure, path)
+
+
+def _save(figure, path):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+    plt.close(figure)
+
+
+def write(results: dict[str, dict], docs: Path) -> None:
+    """Write the page and its figures below `docs`."""
+    draw_sweep(results, docs / "images" / "benchmark_sweep.png")
+    draw_scaling(results, docs / "images" / "benchmark_scaling.png")
+    (docs / "benchmarks.md").write_text(page(results), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write(read_results(HERE / "results"), DOCS)
