@@ -178,7 +178,8 @@ class _Group:
 
 def smooth_half(y, moments):
     """Sum over k of moments[..., k] Lap^k (erf(x)/x), Lap in the plane, at y = x^2 (m, n); moments (m, 4)."""
-    multipole, gauss, series = (np.einsum("mk,kj->mj", moments, table) for table in (_MULTIPOLE, _GAUSS, _SERIES))
+    coefficients = np.einsum("mk,kj->mj", moments, _SMOOTH_HALF)
+    multipole, gauss, series = np.split(coefficients, [_MOMENTS, 3 * _MOMENTS - 2], axis=1)
     safe = np.maximum(y, _SERIES_BELOW)
     inverse = 1 / safe
     value = _horner(multipole[:, :, None], inverse)
@@ -205,12 +206,13 @@ def _horner(coefficients, x):
     return value
 
 
-def _smooth_half_tables():
-    """Coefficients of Lap^k (erf(x)/x), k = 0..3, in powers of y = x^2.
+def _smooth_half_table():
+    """Coefficients of Lap^k (erf(x)/x), k = 0..3 (rows), in powers of y = x^2: (1) of the factor of erf(x)/x, falling
+    from y^0, (2) of that of exp(-y), from y^-3 to y^2, and (3) of the whole, rising from y^0.
 
     Lap^k (erf(x)/x) = (d_k y^-k) erf(x)/x - exp(-y) g_k(y) with Laurent polynomials g_k. In the plane
     Lap y^j = 4 j^2 y^(j-1), from which d_(k+1) = (2k+1)^2 d_k, and with 2/sqrt(pi) exp(-y) the derivative of erf
-    the recurrence for g_k below. Columns of the second table are the powers y^-3 to y^2.
+    the recurrence for g_k below.
     """
     multipole = np.zeros((_MOMENTS, _MOMENTS))
     gauss = np.zeros((_MOMENTS, 2 * _MOMENTS - 2))
@@ -231,10 +233,10 @@ def _smooth_half_tables():
     series = [2 / math.sqrt(math.pi) * (-1.0) ** power / ([math.factorial(j) for j in power] * (2 * power + 1))]
     for _ in range(_MOMENTS - 1):
         series.append(np.append((4 * power**2 * series[-1])[1:], 0.0))
-    return multipole, gauss, np.array(series)[:, :_SERIES_LENGTH]
+    return np.hstack([multipole, gauss, np.array(series)[:, :_SERIES_LENGTH]])
 
 
-_MULTIPOLE, _GAUSS, _SERIES = _smooth_half_tables()
+_SMOOTH_HALF = _smooth_half_table()
 
 
 @dataclass(frozen=True, eq=False)
