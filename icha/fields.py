@@ -2,9 +2,9 @@
 
 The sum over spots and images is split as in `icha.elasticity`: a smooth half through its Fourier series and a
 short-ranged half around every spot. A field has as many targets as nodes, so that the area of the windows around the
-spots is what it costs. Four moments of a spot's pressure instead of two represent it from five radii on instead of
-sixteen; in return the smooth half of a large spot must be smooth on the scale of that spot: spots are put into groups
-of like size, every group with a Fourier series of its own length.
+spots is what it costs, and many moments of a spot's pressure pay: four of them represent it from five radii on. In
+return the smooth half of a large spot must be smooth on the scale of that spot: spots are put into groups of like
+size, every group with a Fourier series of its own length.
 
 With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot far away displaces by sum_k M_k Lap^k (1/(pi E* r)),
 and its Fourier transform is that of a point with sum_k M_k (-q^2)^k in the place of its force.
@@ -28,7 +28,7 @@ from icha.jkr import JKR
 # Cut of both halves of the Ewald sum: erfc(4.6) = 8e-11.
 _CUT = 4.6
 _NUFFT_TOLERANCE = 1e-12
-# Radii of a spot from which its moments represent it, with an error below 1e-8 of the displacement at its edge.
+# Radii of a spot from which its moments represent it, with an error of 1e-8 of the displacement at its edge.
 _WINDOW = 5.0
 _MOMENTS = 4
 # Ratio of the windows of neighbouring groups of spots.
