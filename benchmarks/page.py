@@ -288,8 +288,8 @@ def page(results: dict[str, dict]) -> str:
 
 SWEEP_TEXT = """\
 Every code is given the same heights and the same 20 stops and is measured as a whole process, imports and reading
-included, on one thread unless the table says otherwise. *Computation* is the time from when everything is imported to
-the last stop. *Time / ICHA's* is the ratio of processor times of whole processes, which on one thread is the wall
+included, on one thread unless the table says otherwise. *Computation* is the time from when everything is imported
+to the last stop. *Time / ICHA's* is the ratio of processor times of whole processes, which on one thread is the wall
 time of a quiet machine, and that of the computations alone (wall time); *memory* is the largest resident memory. The
 loads are 20 reduced pressures p\\* = p/(E\\* h'_rms) from 5e-4 to 8e-2 in geometric progression. The surfaces have
 the challenge's spectrum (period 100 µm, roll-off 20 µm, Hurst exponent 0.8, rms slope 1) down to waves of eight grid
@@ -304,8 +304,8 @@ With adhesion, a boundary-element code has to resolve the range ρ of the attrac
 E\\* = 25 MPa): on a grid of spacing Δ, Δ ≤ 8 ρ² E\\*/(3π γ) and √(γ Δ/E\\*)/ρ < 0.5. These grids resolve only ranges
 much longer than the challenge's 2.07 nm, and all codes are given the same one. The Tabor parameter is then far below
 2, where ICHA's law of jump-in was not verified, which is part of the differences in area. `adhesion` is given the
-loads; `tamaas`, which does not find equilibria at a given load with adhesion, the mean gaps of ICHA's states at those
-loads, and ICHA is measured with both."""
+loads; `tamaas`, which at a given load does not find the adhesive equilibria reliably, the mean gaps of ICHA's states
+at those loads, and ICHA is measured with both."""
 
 SCALING_TEXT = """\
 The solver alone, from asperities to the last of the same 20 loads, on one thread, with the challenge's material. The
@@ -315,10 +315,11 @@ size only. Heights do not join at the seams, of which a solver that is given asp
 what the sweep adds to the process that has read the asperities."""
 
 STAGES_TEXT = """\
-One process, two threads unless said otherwise: the surface, its summits, the path, the fields of a snapshot at p\\* =
-0.01 (challenge only), and the rest, which is the dataset, tangents for the stiffness and the file. At 512² the path
-has the 20 loads above; on the full challenge surface (8192², all waves from 100 µm to 0.1 µm, challenge's material)
-20 contact areas from 0.1 % to 10 % of the nominal one. Memory is the largest resident memory during the stage."""
+One process, two threads unless said otherwise: the surface, its summits, the path, the fields of a snapshot at p\\*
+= 0.01 (challenge only), and the rest, which is the dataset, tangents for the stiffness and the file. At 512² the
+path has the 20 loads above; on the full challenge surface (8192², all waves from 100 µm to 0.1 µm, challenge's
+material) 20 contact areas from 0.1 % to 10 % of the nominal one. Memory is the largest resident memory during the
+stage."""
 
 
 def _surfaces(results) -> str:

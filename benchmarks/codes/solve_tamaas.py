@@ -1,7 +1,7 @@
 """tamaas: Polonsky & Keer's conjugate gradients; with adhesion in the gap, at given mean gap (Rey et al. 2017).
 
 Without adhesion every load starts from the pressures of the last, which tamaas scales to the new load. With adhesion
-its load control does not find the equilibria, so the mean gap is given.
+its load control ends in other states at some loads, with a small error; so the mean gap is given.
 """
 
 import numpy as np
