@@ -392,8 +392,8 @@ def _stages(results) -> str:
                 tables.append(table(["stage", "time", "memory"], rows))
                 counts = ", ".join(f"{count} {what}" for what, count in run["counts"].items())
                 text = (
-                    f"{run['threads']} threads; {run['asperities']} asperities; {run['stops']} of {run['stops_asked']} "
-                    f"stops, at the last one {run['spots']} spots and A/A0 = {run['area_fraction']:.3f}; "
+                    f"Threads: {run['threads']}; {run['asperities']} asperities; "
+                    f"{run['stops']} of {run['stops_asked']} stops, at the last one {run['spots']} spots and A/A0 = {run['area_fraction']:.3f}; "
                     f"{counts}; residual at most {run['residual']:.1e} h_rms."
                 )
                 tables.append(text + (f" {run['failure']}" if run["failure"] else ""))
@@ -413,8 +413,8 @@ def draw_sweep(results, path: Path) -> None:
                 (run["grid"], run["processor"]) for run in runs if (run["code"], run["control"]) == (code, control)
             )
             style = {"lw": 2.5, "color": "black"} if code == "icha" else {}
-            style |= {"ls": "--"} if control == "gap" else {}
-            axis.loglog(*zip(*line, strict=True), "o-", label=f"{code}, given {control}s", **style)
+            style |= {"marker": "o", "ls": "--" if control == "gap" else "-"}
+            axis.loglog(*zip(*line, strict=True), label=f"{code}, given {control}s", **style)
         axis.set_title(WITH[adhesion])
         axis.set_xlabel("nodes along a side")
         axis.set_xticks(grids(results), [str(grid) for grid in grids(results)], minor=False)
