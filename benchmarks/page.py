@@ -393,7 +393,8 @@ def _stages(results) -> str:
                 counts = ", ".join(f"{count} {what}" for what, count in run["counts"].items())
                 text = (
                     f"Threads: {run['threads']}; {run['asperities']} asperities; "
-                    f"{run['stops']} of {run['stops_asked']} stops, at the last one {run['spots']} spots and A/A0 = {run['area_fraction']:.3f}; "
+                    f"{run['stops']} of {run['stops_asked']} stops, "
+                    f"at the last one {run['spots']} spots and A/A0 = {run['area_fraction']:.3f}; "
                     f"{counts}; residual at most {run['residual']:.1e} h_rms."
                 )
                 tables.append(text + (f" {run['failure']}" if run["failure"] else ""))
