@@ -74,11 +74,15 @@ def figure(
         for ax, value in zip(panels, state, strict=True):
             name = "no adhesion" if len(bare) == 1 or line == next(iter(bare)) else None
             ax.axhline(value, color=GREY, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
+    parameters = [mu for points in curves.values() for mu, *_ in points]
+    smallest, largest = min(parameters), max(parameters)
     for ax, letter, label in zip(panels, "ab", (AREA_LABEL, SEPARATION_LABEL), strict=True):
         low, high = ax.get_xlim()
-        for start, end in ((low, WU_RANGE[0]), (WU_RANGE[1], high)):
-            if end > start:
-                ax.axvspan(start, end, color="0.93", lw=0, zorder=0)
+        # A range of attraction that was rounded does not leave what was verified.
+        if smallest < WU_RANGE[0] / 1.01:
+            ax.axvspan(low, WU_RANGE[0], color="0.93", lw=0, zorder=0)
+        if largest > WU_RANGE[1] * 1.01:
+            ax.axvspan(WU_RANGE[1], high, color="0.93", lw=0, zorder=0)
         ax.set_xlim(low, high)
         ax.set_xlabel(r"Tabor parameter  $\mu$")
         ax.set_ylabel(label)
