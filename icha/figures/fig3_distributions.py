@@ -20,6 +20,7 @@ CAPTION = (
 
 # Sampled gaps per plotted point: bins with less are joined with their neighbours.
 _LEAST_CELLS = 100
+_MOST_MARKERS = 40
 
 
 @styled
@@ -52,7 +53,7 @@ def figure(
         look = line_look(k, adhesive=float(run["surface_energy"]) > 0)
         look["label"] = material_label(dataset, labels.material)
         u, density = gap_points(run, at)
-        left.loglog(u, density, **look)
+        left.loglog(u, density, markevery=1 + len(u) // _MOST_MARKERS, **look)
         p, density = pressure_points(run, at)
         right.semilogy(p, density, markevery=3, **look)
         if len(density):  # before first contact there is no pressure
@@ -72,9 +73,9 @@ def figure(
     if top > 0:
         right.set_ylim(top * 5e-5, top * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
-    left.text(0.04, 0.95, snapshot_label(run, at), transform=left.transAxes, va="top")
+    left.set_title(snapshot_label(run, at), loc="right")
     left.legend(loc="lower left")
-    right.legend(loc="lower right")
+    right.legend(loc="lower center", frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)
     for ax, letter in ((left, "a"), (right, "b")):
         panel_label(ax, letter)
     return fig
