@@ -71,7 +71,7 @@ def points_of(surface):
 
 def memory_of(surface):
     """Megabytes that making a surface, or a sweep of it, needs: some arrays of its size, and the program."""
-    return 600 + 14 * 8 * points_of(surface) // 10**6
+    return 600 + 4 * 8 * points_of(surface) // 10**6
 
 
 def threads_of(surface):
