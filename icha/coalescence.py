@@ -39,9 +39,14 @@ def overlapping_pairs(position, a, period):
     r = np.hypot(*periodic_difference(position[first], position[second], period).T)
     depth = a[first] + a[second] - r
     deep = depth > 0
-    first, second, depth = first[deep], second[deep], depth[deep]
-    rank = np.empty(len(a), dtype=int)
-    rank[np.lexsort((position[:, 1], position[:, 0]))] = np.arange(len(a))
+    return deepest_first(first[deep], second[deep], depth[deep], position)
+
+
+def deepest_first(first, second, depth, position):
+    """Pairs (k, 2) of spots in the order of falling depth (k,); equal depths by position (n, 2)."""
+    involved = np.unique(np.concatenate([first, second]))
+    rank = np.empty(len(position), dtype=int)
+    rank[involved[np.lexsort((position[involved, 1], position[involved, 0]))]] = np.arange(len(involved))
     lower, upper = np.minimum(rank[first], rank[second]), np.maximum(rank[first], rank[second])
     order = np.lexsort((upper, lower, -depth))
     return np.stack([first[order], second[order]], axis=1)
@@ -65,3 +70,25 @@ def equivalent_spots(position_i, a_i, R_i, position_j, a_j, R_j, period):
     centre = np.mod(position_i + share[:, None] * offset, period)
     centre[centre >= period] = 0.0
     return centre, np.hypot(a_i, a_j), np.hypot(R_i, R_j)
+
+
+def covering_spot(points, position, a, period, larger_than=None):
+    """For every point (k, 2) the spot (m,) whose contact covers it deepest, -1 where none does: (k,) of int.
+
+    larger_than (k,): for points that are spots themselves, at the same indices: only larger ones count, and of
+    equal ones the first.
+    """
+    covering = np.full(len(points), -1)
+    if not len(points) or not len(position):
+        return covering
+    tree, spots = cKDTree(np.mod(points, period), boxsize=period), cKDTree(np.mod(position, period), boxsize=period)
+    found = tree.sparse_distance_matrix(spots, min(np.max(a), 0.5 * period), output_type="ndarray")
+    i, j = found["i"], found["j"]
+    depth = a[j] - found["v"]
+    inside = depth > 0
+    if larger_than is not None:
+        inside &= (a[j] > larger_than[i]) | ((a[j] == larger_than[i]) & (j < i))
+    i, j, depth = i[inside], j[inside], depth[inside]
+    order = np.lexsort((-j, depth))
+    covering[i[order]] = j[order]  # the deepest comes last and stays
+    return covering

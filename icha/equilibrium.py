@@ -6,37 +6,66 @@ The unknowns are the local approaches delta_i of the spots in contact:
 
 with w_i the displacement by all other spots and all images (eq. 4) and u the mean separation. Below the jump-off
 approach a spot keeps its jump-off radius while the equations are solved (zero for Hertz's law), so that they are
-defined everywhere and, without adhesion, smooth: a spot of radius zero exerts nothing, and no decision about who is
-in contact has to be taken inside the iteration.
+defined everywhere and, without adhesion, smooth.
+
+Newton's method with an inexact Krylov solver runs over sites: the spots and, without adhesion, the asperities that may
+come into contact; there a negative approach exerts nothing, and who is in contact comes out of the iteration. With
+adhesion contact forms and breaks in jumps. As soon as the iteration is close to an equilibrium, all jumps and unions
+that apply happen at once, and it goes on from there.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
-from scipy.spatial import cKDTree
 
 from icha.asperities import Asperities
-from icha.coalescence import disjoint_pairs, equivalent_spots, overlapping_pairs
-from icha.elasticity import Interaction, periodic_difference
+from icha.coalescence import covering_spot, deepest_first, disjoint_pairs, equivalent_spots
+from icha.elasticity import HalfSpace, Interaction, displacement_at
 from icha.jkr import JKR
 
 # Largest equilibrium error in units of h_rms at which an equilibrium counts as found.
-RESIDUAL_TOLERANCE = 1e-10
+RESIDUAL_TOLERANCE = 1e-9
 # Relative error of a load or an area that was asked for.
 TARGET_TOLERANCE = 1e-11
 # One weighs as much as the other in a solve.
 _MISS_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
+# Error in h_rms below which jumps and unions happen; one that hangs by less than ten times the error waits.
+_EVENT_TOLERANCE = 3e-4
+_EVENT_MARGIN = 10.0
+# Newton steps between two events.
 _MAX_NEWTON_STEPS = 60
-_LINEAR_TOLERANCE = 1e-3
-_LINEAR_TOLERANCE_TANGENT = 1e-10
-_FREE = -1
+_MAX_HALVINGS = 8
+# Relative errors of the linear solves: of most, and of those repeated with the exact operator.
+_LINEAR_TOLERANCE = 3e-3
+_EXACT_TOLERANCE = 1e-6
+_RESPONSE_TOLERANCE = 1e-6
+# Largest dimension of a Krylov space.
+_KRYLOV = 50
+# Free asperities are looked at that can have come into contact since they were last looked at: their approach grows by
+# at most so many times the fall of the separation; and, as spots jump, by so much at once, in h_rms and in the largest
+# jump-off approach: on the way to an equilibrium that is a guess, at the equilibrium a bound.
+_FASTEST_APPROACH = 3.0
+_SUDDEN_GUESS = 0.02, 2.0
+_SUDDEN_BOUND = 1.0, 10.0
+# Sites are arranged anew when they have grown by this factor, or so large a part of them is gone.
+_GROWTH = 1.5
+_GONE_PART = 0.25
+# Contact area fraction at which the spots have lost all meaning.
+_FULL_CONTACT = 0.5
+
+_CONTACT, _TRIAL, _GONE = 1, 2, 3
 
 
 class NotConverged(Exception):
     """An equilibrium was not found; the message says what happened."""
+
+
+class FullContact(NotConverged):
+    """The contact spread over the whole surface."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,22 +86,6 @@ class Spots:
         """Number of spots."""
         return len(self.height)
 
-    def take(self, index) -> Spots:
-        """The spots at `index`."""
-        return Spots(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
-
-    def append(self, other: Spots) -> Spots:
-        """These spots, then the others."""
-        return Spots(
-            *(np.concatenate([getattr(self, name), getattr(other, name)]) for name in self.__dataclass_fields__)
-        )
-
-
-def no_spots() -> Spots:
-    """An empty set of spots."""
-    empty = np.empty(0)
-    return Spots(np.empty((0, 2)), empty, empty, empty, empty, np.empty(0, dtype=int))
-
 
 @dataclass(frozen=True, eq=False)
 class Contact:
@@ -92,38 +105,97 @@ class Contact:
         """Nominal contact area A0, m^2."""
         return self.asperities.period**2
 
-    def interaction(self, spots: Spots, targets=None) -> Interaction:
-        """The elastic interaction of spots, its windows wide enough for a moderate growth."""
-        return Interaction(
-            self.law,
-            self.asperities.period,
-            spots.position,
-            1.25 * spots.contact_radius,
-            spots.radius_of_curvature,
-            targets,
-        )
+    @property
+    def adhesive(self) -> bool:
+        """Whether contact forms and breaks in jumps."""
+        return self.law.material.surface_energy > 0
+
+
+@dataclass(frozen=True, eq=False)
+class _Sites:
+    """Places where contact is or may come out of the iteration. Arrays of length n.
+
+    position (n, 2), height, radius (of curvature), jump_off: m. asperity: its index, -1 for united spots.
+    members: asperities united in it. arranged: number of sites when the half-space was made.
+    """
+
+    position: np.ndarray
+    height: np.ndarray
+    radius: np.ndarray
+    jump_off: np.ndarray
+    asperity: np.ndarray
+    members: np.ndarray
+    half_space: HalfSpace
+    arranged: int
+
+    _ARRAYS = ("position", "height", "radius", "jump_off", "asperity", "members")
+
+    def __len__(self) -> int:
+        return len(self.height)
+
+    def extended(self, **more) -> _Sites:
+        """With more sites after the present ones."""
+        arrays = {name: np.concatenate([getattr(self, name), more[name]]) for name in self._ARRAYS}
+        if not len(self):
+            return self._arranged(arrays)
+        return _Sites(**arrays, half_space=self.half_space.extended(more["position"]), arranged=self.arranged)
+
+    def taken(self, index) -> _Sites:
+        """The sites at `index`, arranged anew."""
+        return self._arranged({name: getattr(self, name)[index] for name in self._ARRAYS})
+
+    def _arranged(self, arrays):
+        ewald = self.half_space.ewald
+        half_space = HalfSpace.at(arrays["position"], ewald.period, ewald.contact_modulus)
+        return _Sites(**arrays, half_space=half_space, arranged=len(arrays["height"]))
 
 
 @dataclass(frozen=True, eq=False)
 class ContactState:
-    """An equilibrium of the contact.
+    """An equilibrium.
 
-    owner (n,): for every asperity the index of the spot that it is, or is part of, or lies under; -1 where free.
-    separation_response (m,): d(delta)/du of every spot, good enough to predict the next step. Event counts
-    accumulate along the path.
+    separation: mean separation u in m. sites, with arrays of their length n: approach (m), radius (contact radius, m,
+    zero where there is no contact), status and response d(delta)/du. Arrays of the asperities' length: holder, the
+    site that an asperity is, or is part of, or was found under, -1 where free; seen, its approach (m) when it was last
+    looked at, at the separation seen_at (m).
+    Event counts accumulate along the path.
     pending: free asperities beyond their jump-in approach that were left free because they had broken contact at
     the same separation before.
     """
 
     separation: float
-    spots: Spots
-    owner: np.ndarray
-    separation_response: np.ndarray
+    sites: _Sites
+    approach: np.ndarray
+    radius: np.ndarray
+    status: np.ndarray
+    response: np.ndarray
+    holder: np.ndarray
+    seen: np.ndarray
+    seen_at: np.ndarray
     residual: float = 0.0
     jump_ins: int = 0
     jump_offs: int = 0
     coalescences: int = 0
     pending: int = 0
+
+    @cached_property
+    def _in_contact(self):
+        return np.flatnonzero(self.status == _CONTACT)
+
+    @cached_property
+    def spots(self) -> Spots:
+        """The sites in contact."""
+        sites, c = self.sites, self._in_contact
+        return Spots(
+            sites.position[c], sites.height[c], sites.radius[c], self.radius[c], self.approach[c], sites.members[c]
+        )
+
+    @cached_property
+    def owner(self) -> np.ndarray:
+        """For every asperity the index of the spot that it is, or is part of, or lies under; -1 where free."""
+        spot = np.full(len(self.sites) + 1, -1)
+        spot[self._in_contact] = np.arange(len(self._in_contact))
+        return spot[self.holder]  # a holder -1 looks up the last
 
     def same_contacts(self, other: ContactState) -> bool:
         """Whether both states have the same spots made of the same asperities."""
@@ -142,27 +214,32 @@ def area_fraction(contact: Contact, spots: Spots) -> float:
 
 def contact_stiffness(contact: Contact, state: ContactState) -> float:
     """-dp/du of the present spots, Pa/m, from the tangent of the equilibrium."""
-    spots, law = state.spots, contact.law
-    R, a = spots.radius_of_curvature, spots.contact_radius
-    response = _separation_response(contact, spots, _LINEAR_TOLERANCE_TANGENT)
-    growth = _radius_response(law, a, R, spots.approach) * response
-    return 0.0 - float(np.sum(law.force_derivative(a, R) * growth)) / contact.area
+    return 0.0 - Control("pressure", 0.0).slope(contact, state)
 
 
 def untouched(contact: Contact) -> ContactState:
     """The state at which the first asperity is about to make contact."""
+    asperities, none = contact.asperities, np.empty(0)
+    separation = float(np.max(asperities.height - contact.jump_in))
+    nowhere, nobody = np.empty((0, 2)), np.empty(0, dtype=int)
+    half_space = HalfSpace.at(nowhere, asperities.period, contact.law.material.contact_modulus)
     return ContactState(
-        separation=float(np.max(contact.asperities.height - contact.jump_in)),
-        spots=no_spots(),
-        owner=np.full(len(contact.asperities), _FREE),
-        separation_response=np.empty(0),
+        separation=separation,
+        sites=_Sites(nowhere, none, none, none, nobody, nobody, half_space, 0),
+        approach=none,
+        radius=none,
+        status=np.empty(0, dtype=np.int8),
+        response=none,
+        holder=np.full(len(asperities), -1),
+        seen=asperities.height - separation,
+        seen_at=np.full(len(asperities), separation),
     )
 
 
-def _radius_response(law: JKR, a, R, approach):
+def _radius_response(law: JKR, a, R, approach, jump_off):
     """da/d(delta), zero for spots past jump-off; bounded close to it, where it is infinite."""
     slope = np.zeros(len(a))
-    touching = (a > 0) & (approach > law.jump_off_approach(R))
+    touching = (a > 0) & (approach > jump_off)
     slope[touching] = 1 / np.maximum(law.approach_derivative(a[touching], R[touching]), 1e-3 * (a / R)[touching])
     return slope
 
@@ -174,110 +251,30 @@ class Control:
     quantity: str
     target: float
 
-    def value_and_gradient(self, contact: Contact, a, R):
-        """Value of the quantity and its derivative with respect to the contact radii (m,)."""
+    def value(self, contact: Contact, a, R) -> float:
+        """The quantity for contact radii a."""
         if self.quantity == "pressure":
-            gradient = contact.law.force_derivative(a, R) / contact.area
-            return float(np.sum(contact.law.force(a, R))) / contact.area, gradient
-        return float(np.sum(np.pi * a**2)) / contact.area, 2 * np.pi * a / contact.area
+            return float(np.sum(contact.law.force(a, R))) / contact.area
+        return float(np.sum(np.pi * a**2)) / contact.area
+
+    def gradient(self, contact: Contact, a, R):
+        """Its derivative with respect to the contact radii."""
+        if self.quantity == "pressure":
+            return contact.law.force_derivative(a, R) / contact.area
+        return 2 * np.pi * a / contact.area
+
+    def slope(self, contact: Contact, state: ContactState) -> float:
+        """Its derivative with respect to the mean separation, at unchanged contacts."""
+        sites, c = state.sites, state._in_contact
+        a, R = state.radius[c], sites.radius[c]
+        growth = _radius_response(contact.law, a, R, state.approach[c], sites.jump_off[c]) * state.response[c]
+        return float(np.sum(self.gradient(contact, a, R) * growth))
 
 
-def balance(contact: Contact, spots: Spots, separation: float, control: Control | None = None):
-    """Solve the equations of a fixed set of spots by Newton-Krylov with a line search.
-
-    Parameters
-    ----------
-    spots : the set; their approaches are the first guess.
-    separation : mean separation u in m; the first guess for it when `control` is given.
-    control : a load or an area to hold instead of the separation.
-
-    Returns
-    -------
-    spots, separation, residual (largest error over h_rms).
-
-    Raises
-    ------
-    NotConverged
-        If the error stays above RESIDUAL_TOLERANCE.
-    """
-    law, R = contact.law, spots.radius_of_curvature
-    if not len(spots):
-        return spots, separation, 0.0
-    interaction = contact.interaction(spots)
-
-    def evaluate(delta, u):
-        a = law.contact_radius(delta, R)
-        error = delta + interaction.displacement(a) + u - spots.height
-        if control is None:
-            return a, error, 0.0, None
-        value, gradient = control.value_and_gradient(contact, a, R)
-        return a, error, value - control.target, gradient
-
-    def worst(error, miss):
-        size = float(np.max(np.abs(error))) / contact.rms_height
-        return size if control is None else max(size, abs(miss) / abs(control.target) * _MISS_WEIGHT)
-
-    delta, u = spots.approach.copy(), separation
-    a, error, miss, gradient = evaluate(delta, u)
-    size = worst(error, miss)
-    for _ in range(_MAX_NEWTON_STEPS):
-        if size <= RESIDUAL_TOLERANCE:
-            break
-        solve, response_of = _linearised(law, interaction, a, R, delta)
-        step, du = solve(-error, _LINEAR_TOLERANCE), 0.0
-        if control is not None:
-            along = solve(-np.ones(len(a)), _LINEAR_TOLERANCE)
-            slope = float(np.sum(gradient * response_of * along))
-            if slope == 0:
-                raise NotConverged(f"{control.quantity} does not depend on the separation")
-            du = -(miss + float(np.sum(gradient * response_of * step))) / slope
-            du = float(np.clip(du, -0.2 * contact.rms_height, 0.2 * contact.rms_height))
-            step = step + du * along
-        for halving in range(12):
-            fraction = 0.5**halving
-            trial = delta + fraction * step
-            new = evaluate(trial, u + fraction * du)
-            new_size = worst(new[1], new[2])
-            if new_size < (1 - 0.1 * fraction) * size:
-                break
-        else:
-            raise NotConverged(f"no descent from an equilibrium error of {size:.2e} h_rms with {len(a)} spots")
-        delta, u = trial, u + fraction * du
-        (a, error, miss, gradient), size = new, new_size
-    else:
-        raise NotConverged(f"equilibrium error {size:.2e} h_rms after {_MAX_NEWTON_STEPS} Newton steps")
-    residual = float(np.max(np.abs(error))) / contact.rms_height
-    return replace(spots, contact_radius=a, approach=delta), u, residual
-
-
-def _separation_response(contact: Contact, spots: Spots, tolerance: float):
-    """d(delta)/du of every spot (m,) at an equilibrium."""
-    if not len(spots):
-        return np.empty(0)
-    a, R = spots.contact_radius, spots.radius_of_curvature
-    solve, _ = _linearised(contact.law, contact.interaction(spots), a, R, spots.approach)
-    return solve(-np.ones(len(a)), tolerance)
-
-
-def _linearised(law, interaction, a, R, delta):
-    """A solver of the linearised equilibrium, (1 + W' da/d(delta)) x = b, and da/d(delta)."""
-    radius_response = _radius_response(law, a, R, delta)
-    # A spot of radius zero has no tangent; one too small to matter stands for it, and its radius_response is zero.
-    tangent = interaction.tangent(np.where(a > 0, a, np.finfo(float).tiny ** 0.25))
-    size = len(a)
-    operator = LinearOperator((size, size), matvec=lambda x: x + tangent(radius_response * x), dtype=float)
-
-    def solve(b, tolerance):
-        x, failed = gmres(operator, b, rtol=tolerance, atol=0.0, restart=min(size, 80), maxiter=20)
-        if failed or not np.all(np.isfinite(x)):
-            raise NotConverged(f"the linear solve for {size} spots did not converge")
-        return x
-
-    return solve, radius_response
-
-
-def equilibrium(contact: Contact, state: ContactState, separation: float) -> ContactState:
-    """Bring the contact from one state to another mean separation.
+def equilibrium(
+    contact: Contact, state: ContactState, separation: float, control: Control | None = None
+) -> ContactState:
+    """Bring the contact from one state to another mean separation, or to a given load or area.
 
     Spots past jump-off are dropped, free asperities beyond jump-in join, asperities under a spot are taken into it
     and overlapping spots coalesce, all that apply at once, until nothing changes. That ends: without adhesion spots
@@ -285,169 +282,417 @@ def equilibrium(contact: Contact, state: ContactState, separation: float) -> Con
     that has broken contact here may not make it again at this separation (`pending` counts those that would, and
     without adhesion those left by a united spot that let go).
 
+    Parameters
+    ----------
+    separation : m; a first guess if there is a `control`.
+    control : a load or an area to hold instead of the separation.
+
     Raises
     ------
     NotConverged
-        If one of the equilibria is not found.
+        If the equilibrium is not found.
+    FullContact
+        If the contact spreads over the whole surface.
     """
-    law, asperities, period = contact.law, contact.asperities, contact.asperities.period
-    adhesive = law.material.surface_energy > 0
-    owner = state.owner.copy()
-    spots = replace(
-        state.spots,
-        approach=state.spots.approach + state.separation_response * (separation - state.separation),
-    )
-    spots = replace(spots, contact_radius=law.contact_radius(spots.approach, spots.radius_of_curvature))
-    locked = np.zeros(len(asperities), dtype=bool)
-    jump_ins, jump_offs, coalescences = state.jump_ins, state.jump_offs, state.coalescences
+    return _Search(contact, state, separation, control).run()
 
-    while True:
-        spots, _, residual = balance(contact, spots, separation)
+
+class _Search:
+    """The iteration from one state to the next."""
+
+    def __init__(self, contact, state, separation, control):
+        self.contact, self.control, self.separation = contact, control, separation
+        self.law, self.adhesive = contact.law, contact.adhesive
+        self.sites, self.height = state.sites, state.sites.height.copy()
+        self.status, self.holder = state.status.copy(), state.holder.copy()
+        self.approach = state.approach + state.response * (separation - state.separation)
+        self.response = state.response
+        self.seen, self.seen_at = state.seen.copy(), state.seen_at.copy()
+        self.jump_ins, self.jump_offs, self.coalescences = state.jump_ins, state.jump_offs, state.coalescences
+        self.pending = 0
+        self.locked = np.zeros(len(contact.asperities), dtype=bool)
+        self.known = state.status == _CONTACT  # spots that were there before
+        self.fresh = np.empty(0, dtype=int)  # united spots whose heights follow from the next evaluation
+        self.interaction = None
+        self.is_site = np.zeros(len(contact.asperities), dtype=bool)
+        single = (self.sites.asperity >= 0) & (self.status != _GONE)
+        self.is_site[self.sites.asperity[single]] = True
+        largest_jump = -self.law.jump_off_approach(np.max(contact.asperities.radius))
+        self.sudden_guess, self.sudden_bound = (
+            heights * contact.rms_height + jumps * largest_jump for heights, jumps in (_SUDDEN_GUESS, _SUDDEN_BOUND)
+        )
+        self._arrange_if_needed()
+        if not self.adhesive:
+            expected = self.seen + np.maximum(self.seen_at - separation, 0.0)
+            self._admit(np.flatnonzero((expected > 0) & self._free()), _TRIAL)
+
+    # --- the sites ------------------------------------------------------------------------------------------
+
+    def _free(self):
+        """Whether an asperity is neither a site nor part of one (asperities,)."""
+        return (self.holder < 0) & ~self.is_site
+
+    def _admit(self, asperity, status):
+        """Make sites of free asperities (k,)."""
+        if not len(asperity):
+            return
+        asperities = self.contact.asperities
+        self.is_site[asperity] = True
+        if status == _CONTACT:
+            self.holder[asperity] = len(self.sites) + np.arange(len(asperity))
+        self._append(
+            position=asperities.position[asperity],
+            height=asperities.height[asperity],
+            radius=asperities.radius[asperity],
+            asperity=asperity,
+            members=np.ones(len(asperity), dtype=int),
+            status=status,
+            approach=self.seen[asperity],
+            known=False,
+        )
+
+    def _append(self, *, status, approach, known, **more):
+        count = len(approach)
+        self.sites = self.sites.extended(**more, jump_off=self.law.jump_off_approach(more["radius"]))
+        self.height = np.concatenate([self.height, more["height"]])
+        self.status = np.concatenate([self.status, np.full(count, status, dtype=np.int8)])
+        self.approach = np.concatenate([self.approach, approach])
+        self.response = np.concatenate([self.response, np.full(count, -1.0)])
+        self.known = np.concatenate([self.known, np.full(count, known)])
+        self.interaction = None
+
+    def _arrange_if_needed(self):
+        """Forget sites that are gone when they are many; choose the near field for the number of the others."""
+        gone = self.status == _GONE
+        if len(gone) <= _GROWTH * self.sites.arranged and np.count_nonzero(gone) <= _GONE_PART * len(gone):
+            return
+        stay = np.flatnonzero(~gone)
+        index = np.full(len(gone) + 1, -1)
+        index[stay] = np.arange(len(stay))
+        self.holder = index[self.holder]  # -1 looks up the last
+        self.sites = self.sites.taken(stay)
+        self.height, self.status, self.known = self.height[stay], self.status[stay], self.known[stay]
+        self.approach, self.response = self.approach[stay], self.response[stay]
+
+    # --- the equations --------------------------------------------------------------------------------------
+
+    def _evaluate(self, approach, separation):
+        """The equations at given approaches (n,) and separation, m."""
+        part, R = self.status != _GONE, self.sites.radius
+        a = np.zeros(len(self.sites))
+        a[part] = self.law.contact_radius(approach[part], R[part])
+        if self.interaction is None or np.any(a > self.interaction.windows.radius):
+            ahead = np.where(part, approach + 0.02 * self.contact.rms_height, 0.0)
+            largest = np.where(part, 1.2 * self.law.contact_radius(ahead, R), 0.0)
+            self.interaction = Interaction.between(self.law, self.sites.half_space, R, largest)
+        w = self.interaction.displacement(a)
+        if len(self.fresh):
+            self.height[self.fresh] = approach[self.fresh] + w[self.fresh] + separation
+            self.fresh = np.empty(0, dtype=int)
+        error = np.where(part, approach + w + separation - self.height, 0.0)
+        miss = 0.0
+        if self.control is not None:
+            miss = self.control.value(self.contact, a[part], R[part]) - self.control.target
+        return _Point(approach, separation, a, error, miss)
+
+    def _size(self, point):
+        """Largest error in units of h_rms, the control's miss in its own."""
+        size = float(np.max(np.abs(point.error), initial=0.0)) / self.contact.rms_height
+        if self.control is None:
+            return size
+        return max(size, abs(point.miss) / abs(self.control.target) * _MISS_WEIGHT)
+
+    def _linearised(self, point):
+        """Where the unknowns are, da/d(delta) there, and the products of W' da/d(delta), exact and approximate."""
+        part = np.flatnonzero(self.status != _GONE)
+        a, R = point.a[part], self.sites.radius[part]
+        slope = _radius_response(self.law, a, R, point.approach[part], self.sites.jump_off[part])
+        tangent = self.interaction.tangent(point.a)
+
+        def spread(x):
+            full = np.zeros(len(self.sites))
+            full[part] = slope * x
+            return full
+
+        return part, slope, lambda x: tangent(spread(x))[part], lambda x: tangent.nearly(spread(x))[part]
+
+    def _newton_step(self, point, exact):
+        """Change of the approaches (n,) and of the separation."""
+        part, slope, *products = self._linearised(point)
+        product, tolerance = (products[0], _EXACT_TOLERANCE) if exact else (products[1], _LINEAR_TOLERANCE)
+        size = len(part)
+        step, du = np.zeros(len(self.sites)), 0.0
+        if self.control is None:
+            step[part] = _solve(lambda x: x + product(x), -point.error[part], tolerance)
+            return step, du
+        # The separation is an unknown too; in terms of what the last response leaves, the bordered matrix is near one.
+        response = self.response[part]
+        gradient = slope * self.control.gradient(self.contact, point.a[part], self.sites.radius[part])
+        rate = float(np.sum(gradient * response))
+        if rate == 0:
+            raise NotConverged(f"{self.control.quantity} does not depend on the separation")
+
+        def bordered(x):
+            y = x[:size] + x[size] * response
+            return np.append(y + product(y) + x[size], np.sum(gradient * y) / rate)
+
+        x = _solve(bordered, np.append(-point.error[part], -point.miss / rate), tolerance)
+        longest = 0.2 * self.contact.rms_height
+        du = float(np.clip(x[size], -longest, longest))
+        step[part] = x[:size] + du * response
+        return step, du
+
+    def _descend(self, point, size):
+        """A Newton step, shortened until the error falls; None if it does not."""
+        for exact in (False, True):
+            step, du = self._newton_step(point, exact)
+            for halving in range(_MAX_HALVINGS):
+                fraction = 0.5**halving
+                new = self._evaluate(point.approach + fraction * step, point.separation + fraction * du)
+                if self._size(new) < (1 - 0.1 * fraction) * size:
+                    return new
+        return None
+
+    # --- the iteration --------------------------------------------------------------------------------------
+
+    def run(self) -> ContactState:
+        """Iterate to the new equilibrium."""
+        point = self._evaluate(self.approach, self.separation)
+        steps, quiet = 0, False
+        while True:
+            if self._swallow(point):
+                point = self._evaluate(self.approach, point.separation)
+            size = self._size(point)
+            margin = _EVENT_MARGIN * float(np.max(np.abs(point.error), initial=0.0))
+            changed = False
+            if size <= RESIDUAL_TOLERANCE:
+                changed = self._events(point, 0.0)
+                if not changed:
+                    return self._finish(point)
+            elif size <= _EVENT_TOLERANCE and not quiet:
+                changed = self._events(point, margin)
+                quiet = not changed  # what hangs by less waits for the equilibrium
+            if not changed:
+                if steps == _MAX_NEWTON_STEPS:
+                    raise NotConverged(f"equilibrium error {size:.2e} h_rms after {steps} Newton steps")
+                nearer = self._descend(point, size)
+                if nearer is not None:
+                    point = nearer
+                    steps += 1
+                    continue
+                # Where one spot's edge runs through another the equations are singular: they must unite first.
+                self.approach = point.approach
+                windows = self.interaction.windows
+                if not self._unite(point.a, windows, margin) and not self._unite(point.a, windows, deep=True):
+                    raise NotConverged(
+                        f"no descent from an equilibrium error of {size:.2e} h_rms with "
+                        f"{np.count_nonzero(point.a)} spots"
+                    )
+            point = self._evaluate(self.approach, point.separation)
+            steps, quiet = 0, False
+
+    def _events(self, point, margin):
+        """All jumps and unions that hang by more than the margin (m); whether there were any."""
+        covered = float(np.sum(np.pi * point.a**2)) / self.contact.area
+        if covered > _FULL_CONTACT:
+            raise FullContact(f"the contact area reached {covered:.2f} of the nominal one")
+        self.approach = point.approach
         changed = False
-
-        if adhesive:
-            off = _broken(law, spots)
+        if self.adhesive:
+            off = (self.status == _CONTACT) & (point.approach < self.sites.jump_off - margin)
             if off.any():
                 changed = True
-                jump_offs += int(np.count_nonzero(off))
-                locked |= (owner != _FREE) & off[owner]
-                spots, owner = _remove(spots, owner, off)
+                self.jump_offs += int(np.count_nonzero(off))
+                self.locked |= self._let_go(off)
+        windows = self.interaction.windows
+        # Without adhesion only who was not expected is missing, which may wait for the equilibrium.
+        if self.adhesive or margin == 0:
+            changed |= self._join(point, margin)
+        return self._unite(point.a, windows, margin=margin) or changed
 
-        free = np.flatnonzero(owner == _FREE)
-        w = contact.interaction(spots, asperities.position[free]).displacement(spots.contact_radius)
-        approach = asperities.height[free] - separation - w
-        under = _covering_spot(spots, asperities.position[free], period)
-        owner[free[under >= 0]] = under[under >= 0]
-        ready = (approach >= contact.jump_in[free]) & (under < 0)
-        if not adhesive:
-            ready &= approach > 0
-        pending = int(np.count_nonzero(ready & locked[free]))
-        ready &= ~locked[free]
-        if ready.any():
-            changed = True
-            joining = free[ready]
-            jump_ins += len(joining)
-            owner[joining] = len(spots) + np.arange(len(joining))
-            R = asperities.radius[joining]
-            spots = spots.append(
-                Spots(
-                    position=asperities.position[joining],
-                    height=asperities.height[joining],
-                    radius_of_curvature=R,
-                    contact_radius=law.contact_radius(approach[ready], R),
-                    approach=approach[ready],
-                    members=np.ones(len(joining), dtype=int),
-                )
-            )
-        else:
-            pairs = disjoint_pairs(overlapping_pairs(spots.position, spots.contact_radius, period))
-            if len(pairs):
-                changed = True
-                coalescences += len(pairs)
-                spots, owner = coalesce(contact, spots, owner, pairs, separation)
-        if not changed:
-            break
+    def _let_go(self, off):
+        """Free the asperities of spots (n,), and say whose (asperities,)."""
+        freed = np.append(off, False)[self.holder]  # -1 looks up the last
+        self.holder[freed] = -1
+        self.is_site[freed] = False
+        self.seen_at[freed] = np.inf  # their approach is not known
+        self.status[off] = _GONE
+        return freed
 
-    if not adhesive:
-        idle = _broken(law, spots)
-        if idle.any():
-            jump_offs += int(np.count_nonzero(idle))
-            freed = np.flatnonzero((owner != _FREE) & idle[owner])
-            spots, owner = _remove(spots, owner, idle)
+    def _join(self, point, margin):
+        """Make sites of the free asperities that are in contact; whether there were any."""
+        contact, asperities = self.contact, self.contact.asperities
+        reach = self.seen + _FASTEST_APPROACH * np.abs(self.seen_at - point.separation)
+        reach += self.sudden_guess if margin > 0 else self.sudden_bound
+        looked_at = np.flatnonzero((reach >= contact.jump_in) & self._free())
+        spots = np.flatnonzero((point.a > 0) & (self.status != _GONE))
+        a, R, there = point.a[spots], self.sites.radius[spots], self.sites.position[spots]
+        w = displacement_at(
+            self.law, asperities.period, asperities.position[looked_at], there, a, R, self.sites.half_space.ewald.once
+        )
+        self.seen[looked_at] = asperities.height[looked_at] - point.separation - w
+        self.seen_at[looked_at] = point.separation
+        ready = self.seen[looked_at] >= contact.jump_in[looked_at] + margin
+        if not self.adhesive:
+            ready &= self.seen[looked_at] > 0
+        ready = looked_at[ready]
+        locked = self.locked[ready]
+        self.pending = int(np.count_nonzero(locked))
+        ready = ready[~locked]
+        under = covering_spot(asperities.position[ready], there, a, asperities.period)
+        self.holder[ready[under >= 0]] = spots[under[under >= 0]]
+        ready = self._first_of_each_group(ready[under < 0])
+        if not len(ready):
+            return False
+        self.jump_ins += len(ready) if self.adhesive else 0
+        self._admit(ready, _CONTACT if self.adhesive else _TRIAL)
+        return True
+
+    def _first_of_each_group(self, joining):
+        """Of asperities (k,) that would lie in each other's contacts, the largest; the others have to wait."""
+        asperities = self.contact.asperities
+        if len(joining) < 2:
+            return joining
+        position = asperities.position[joining]
+        a = self.law.contact_radius(self.seen[joining], asperities.radius[joining])
+        under = covering_spot(position, position, a, asperities.period, larger_than=a)
+        return joining[under < 0]
+
+    def _swallow(self, point):
+        """Take new contacts back that lie in another's contact area: they are under it; whether there were any.
+
+        The equations are singular where one spot's edge runs through another's centre.
+        """
+        a, windows, known = point.a, self.interaction.windows, self.known
+        i, j = windows.target, windows.source
+        inside = np.flatnonzero((windows.r < a[j]) & (a[i] > 0) & ~known[i])
+        inside = inside[known[j[inside]] | (a[i[inside]] < a[j[inside]])]
+        if not len(inside):
+            return False
+        inside = inside[np.argsort((a[j] - windows.r)[inside], kind="stable")]
+        i, j = i[inside], j[inside]
+        self.jump_ins -= int(np.count_nonzero(self.status[np.unique(i)] == _CONTACT))
+        self.holder[self.sites.asperity[i]] = j  # the deepest comes last and stays
+        self.is_site[self.sites.asperity[i]] = False
+        self.status[i] = _GONE
+        self.approach = point.approach
+        return True
+
+    def _unite(self, a, windows, margin=0.0, deep=False):
+        """Replace overlapping spots by their equivalents; whether there were any.
+
+        margin : error of the approaches in m, beyond whose effect they have to overlap.
+        deep : only those of which one covers the other's centre.
+        """
+        sites, period = self.sites, self.contact.asperities.period
+        first, second = windows.source, windows.target
+        depth = a[first] + a[second] - windows.r
+        part = (a > 0) & (self.status[: len(a)] != _GONE)
+        touch = np.flatnonzero((depth > 0) & part[first] & part[second])
+        if margin > 0 and len(touch):
+            # An error of the approach is one of the radius, about R/(2a) times as large.
+            i, j = first[touch], second[touch]
+            touch = touch[depth[touch] > margin * 0.5 * (sites.radius[i] / a[i] + sites.radius[j] / a[j])]
+        if deep:
+            touch = touch[windows.r[touch] < np.maximum(a[first[touch]], a[second[touch]])]
+        if not len(touch):
+            return False
+        first, second, depth = first[touch], second[touch], depth[touch]
+        once = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
+        pairs = disjoint_pairs(deepest_first(first[once], second[once], depth[once], sites.position))
+        i, j = pairs.T
+        centre, radius, R = equivalent_spots(
+            sites.position[i], a[i], sites.radius[i], sites.position[j], a[j], sites.radius[j], period
+        )
+        # Without adhesion a site may have come into contact only now.
+        arrived = pairs[self.status[pairs] == _TRIAL]
+        self.jump_ins += len(arrived)
+        self.holder[sites.asperity[arrived]] = arrived
+        single = sites.asperity[pairs]
+        self.is_site[single[single >= 0]] = False
+        self.status[pairs] = _GONE
+        index = np.append(np.arange(len(sites)), -1)
+        index[pairs] = len(sites) + np.arange(len(pairs))[:, None]
+        self.holder = index[self.holder]  # -1 looks up the last
+        self.coalescences += len(pairs)
+        self.fresh = len(sites) + np.arange(len(pairs))
+        self._append(
+            position=centre,
+            height=np.zeros(len(pairs)),
+            radius=R,
+            asperity=np.full(len(pairs), -1),
+            members=sites.members[i] + sites.members[j],
+            status=_CONTACT,
+            approach=self.law.approach(radius, R),
+            known=True,
+        )
+        return True
+
+    def _finish(self, point) -> ContactState:
+        approach, sites = point.approach, self.sites
+        response = self._response(point)
+        if not self.adhesive:
+            made = np.flatnonzero((self.status == _TRIAL) & (approach > 0))
+            self.status[made] = _CONTACT
+            self.holder[sites.asperity[made]] = made
+            self.jump_ins += len(made)
+            idle = (self.status == _CONTACT) & (approach <= 0)
+            self.jump_offs += int(np.count_nonzero(idle))
             # Asperities of a united spot that let go may lie in the half-space; the next equilibrium takes them up.
-            w = contact.interaction(spots, asperities.position[freed]).displacement(spots.contact_radius)
-            pending = int(np.count_nonzero(asperities.height[freed] - separation - w > 0))
-    response = _separation_response(contact, spots, _LINEAR_TOLERANCE)
-    return ContactState(separation, spots, owner, response, residual, jump_ins, jump_offs, coalescences, pending)
+            self.pending = int(np.count_nonzero(self._let_go(idle & (sites.asperity < 0))))
+            single = idle & (sites.asperity >= 0)
+            self.status[single] = _TRIAL
+            self.holder[sites.asperity[single]] = -1
+        return ContactState(
+            separation=point.separation,
+            sites=replace(sites, height=self.height),
+            approach=approach,
+            radius=np.where(self.status == _CONTACT, point.a, 0.0),
+            status=self.status,
+            response=response,
+            holder=self.holder,
+            seen=self.seen,
+            seen_at=self.seen_at,
+            residual=float(np.max(np.abs(point.error), initial=0.0)) / self.contact.rms_height,
+            jump_ins=self.jump_ins,
+            jump_offs=self.jump_offs,
+            coalescences=self.coalescences,
+            pending=self.pending,
+        )
+
+    def _response(self, point):
+        """d(delta)/du of every site (n,): the solution of (1 + W' da/d(delta)) x = -1."""
+        response = np.full(len(self.sites), -1.0)
+        part, _, exact, product = self._linearised(point)
+        if not len(part):
+            return response
+        x = self.response[part]
+        for attempt in range(12):
+            defect = -1.0 - x - exact(x)
+            if np.max(np.abs(defect)) <= _RESPONSE_TOLERANCE:
+                response[part] = x
+                return response
+            operator, tolerance = (product, _LINEAR_TOLERANCE) if attempt < 8 else (exact, _EXACT_TOLERANCE)
+            x = x + _solve(lambda y, operator=operator: y + operator(y), defect, tolerance)
+        raise NotConverged(f"the response of {len(part)} spots to the separation was not found")
 
 
-def hold(contact: Contact, state: ContactState, control: Control) -> ContactState:
-    """The equilibrium of the same spots at a given load or area: the separation is an unknown.
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """One evaluation of the equations: approaches, radii and errors (n,) in m, the separation, and the miss."""
 
-    Spots that end past jump-off are dropped.
-
-    Raises
-    ------
-    NotConverged
-        If it is not found.
-    """
-    spots, owner, separation, jump_offs = state.spots, state.owner, state.separation, state.jump_offs
-    while True:
-        spots, separation, residual = balance(contact, spots, separation, control)
-        off = _broken(contact.law, spots)
-        if not off.any():
-            break
-        spots, owner = _remove(spots, owner, off)
-        jump_offs += int(np.count_nonzero(off))
-        if not len(spots):
-            raise NotConverged(f"all contacts break before {control.quantity} = {control.target:.6g}")
-    return replace(
-        state,
-        spots=spots,
-        owner=owner,
-        separation=separation,
-        separation_response=_separation_response(contact, spots, _LINEAR_TOLERANCE),
-        residual=residual,
-        jump_offs=jump_offs,
-    )
+    approach: np.ndarray
+    separation: float
+    a: np.ndarray
+    error: np.ndarray
+    miss: float
 
 
-def coalesce(contact: Contact, spots: Spots, owner, pairs, separation: float):
-    """Replace disjoint pairs (k, 2) of spots by their equivalents, whose heights keep the radius a_eq at hand.
-
-    Returns the new spots (the others first, in their order) and the asperities' new owners.
-    """
-    first, second = spots.take(pairs[:, 0]), spots.take(pairs[:, 1])
-    centre, a, R = equivalent_spots(
-        first.position,
-        first.contact_radius,
-        first.radius_of_curvature,
-        second.position,
-        second.contact_radius,
-        second.radius_of_curvature,
-        contact.asperities.period,
-    )
-    approach = contact.law.approach(a, R)
-    merged = Spots(centre, np.zeros(len(a)), R, a, approach, first.members + second.members)
-    gone = np.zeros(len(spots), dtype=bool)
-    gone[pairs] = True
-    index = np.cumsum(~gone) - 1
-    index[pairs] = np.count_nonzero(~gone) + np.arange(len(pairs))[:, None]
-    owner = np.append(index, _FREE)[owner]  # owner -1 looks up the last
-    spots = spots.take(~gone).append(merged)
-    w = contact.interaction(spots).displacement(spots.contact_radius)
-    height = spots.height.copy()
-    height[-len(a) :] = separation + approach + w[-len(a) :]
-    return replace(spots, height=height), owner
-
-
-def _broken(law, spots):
-    """Whether each spot lies past jump-off, where it has no contact: (m,) of bool."""
-    off = law.jump_off_approach(spots.radius_of_curvature)
-    return spots.approach < off if law.material.surface_energy > 0 else spots.approach <= 0
-
-
-def _remove(spots, owner, gone):
-    """The spots without those marked, whose asperities become free."""
-    index = np.append(np.where(gone, _FREE, np.cumsum(~gone) - 1), _FREE)  # owner -1 looks up the last
-    return spots.take(~gone), index[owner]
-
-
-def _covering_spot(spots, points, period):
-    """For every point the spot whose contact it lies in (the one with the deepest cover), -1 where none."""
-    covering = np.full(len(points), _FREE)
-    if not len(points) or not len(spots):
-        return covering
-    tree = cKDTree(np.mod(points, period), boxsize=period)
-    found = tree.query_ball_point(
-        np.mod(spots.position, period), np.minimum(spots.contact_radius, 0.5 * period), return_sorted=True
-    )
-    best = np.zeros(len(points))
-    for spot in np.flatnonzero([len(f) > 0 for f in found]):
-        index = np.asarray(found[spot], dtype=int)
-        r = np.hypot(*periodic_difference(points[index], spots.position[spot], period).T)
-        depth = spots.contact_radius[spot] - r
-        deeper = depth > best[index]
-        covering[index[deeper]] = spot
-        best[index[deeper]] = depth[deeper]
-    return covering
+def _solve(apply, b, tolerance):
+    """Solve apply(x) = b roughly; the caller sees how good the answer is by what becomes of the equations."""
+    size = len(b)
+    operator = LinearOperator((size, size), matvec=apply, dtype=float)
+    x, _ = gmres(operator, b, rtol=tolerance, atol=0.0, restart=min(size, _KRYLOV), maxiter=2)
+    if not np.all(np.isfinite(x)):
+        raise NotConverged(f"the linear equations of {size} unknowns have no finite solution")
+    return x

@@ -6,14 +6,16 @@ import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from icha.equilibrium import (
     Contact,
     ContactState,
     Control,
+    FullContact,
     NotConverged,
     area_fraction,
     equilibrium,
-    hold,
     mean_pressure,
     untouched,
 )
@@ -30,6 +32,8 @@ KINDS = (REDUCED_PRESSURE, RELATIVE_LOAD, AREA_FRACTION, MEAN_SEPARATION)
 _SMALLEST_STEP = 2.0**-14
 # Two separations closer than this (in h_rms) bracket a jump, not a root.
 _SAME_SEPARATION = 1e-10
+# Relative excess over a target that is rounding.
+_SAME_EXCESS = 1e-9
 # How far past the covered area the path looks for a target before it gives up.
 _AREA_MARGIN = 1.5
 
@@ -75,7 +79,7 @@ class Path:
         *,
         snapshots=None,
         unload=False,
-        max_step=0.1,
+        max_step=0.15,
     ):
         """Check the values and build the list of stops."""
         given = {
@@ -145,6 +149,10 @@ def _stops(name, kind, values):
     return values
 
 
+class InsideJump(NotConverged):
+    """The target is passed in a jump, and there is no equilibrium at it."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Stop:
     """A target turned into a function of the state that rises along the path through zero at the target."""
@@ -162,44 +170,58 @@ class _Stop:
             return area_fraction(self.contact, state.spots) / value - 1
         return mean_pressure(self.contact, state.spots) / (value * self.pressure_scale) - 1
 
+    @property
+    def control(self) -> Control | None:
+        """What a solve has to hold to meet the target; None for a separation."""
+        if self.target.kind == MEAN_SEPARATION:
+            return None
+        if self.target.kind == AREA_FRACTION:
+            return Control("area_fraction", self.target.value)
+        return Control("pressure", self.target.value * self.pressure_scale)
+
+    def expected_separation(self, state: ContactState) -> float:
+        """The separation at which the target may be met: load and area grow about exponentially; -inf if unknown."""
+        if self.target.kind == MEAN_SEPARATION:
+            return self.target.value
+        value, slope = 1 + self.excess(state), self.control.slope(self.contact, state) / self.control.target
+        return state.separation - np.log(value) / (slope / value) if value > 0 and slope < 0 else -np.inf
+
+    def meet(self, state: ContactState, separation: float) -> ContactState:
+        """The equilibrium at the target, from a state not far away; the separation is a first guess."""
+        return equilibrium(self.contact, state, separation, self.control)
+
     def reach(self, before: ContactState, beyond: ContactState) -> ContactState:
         """The state at the target, which lies between two states of the path.
 
-        The contacts of the state beyond are held at the target; if the path from the state before meets the same
-        contacts at that separation, this is the answer. Otherwise the bracket shrinks. When it closes on a jump
-        (an event that carries the quantity past its target), the target is met on the branch after the event, where
-        load control would be.
+        The bracket is halved until the target is met inside it. When it closes on a jump (an event that carries the
+        quantity past its target), the target is met on the branch after the event, where load control would be.
         """
-        contact, target = self.contact, self.target
-        if target.kind == MEAN_SEPARATION:
-            return equilibrium(contact, before, target.value)
-        control = (
-            Control("area_fraction", target.value)
-            if target.kind == AREA_FRACTION
-            else Control("pressure", target.value * self.pressure_scale)
-        )
-        for attempt in range(80):
+        if self.control is None:
+            return self.meet(before, self.target.value)
+        for _ in range(80):
             width = before.separation - beyond.separation
+            if width <= _SAME_SEPARATION * self.contact.rms_height:
+                try:
+                    return self.meet(beyond, beyond.separation)
+                except NotConverged:
+                    raise InsideJump(
+                        f"{self.target.kind} = {self.target.value:g} lies inside a jump: at a mean separation of "
+                        f"{beyond.separation / self.contact.rms_height:.4f} h_rms the contact area jumps from "
+                        f"{area_fraction(self.contact, before.spots):.3g} to "
+                        f"{area_fraction(self.contact, beyond.spots):.3g} of the nominal one, and its far side "
+                        "does not reach back to the target"
+                    ) from None
             try:
-                held = hold(contact, beyond, control)
+                met = self.meet(before, max(self.expected_separation(before), beyond.separation))
+                if beyond.separation <= met.separation < before.separation:
+                    return met
             except NotConverged:
-                held = None
-            if width <= _SAME_SEPARATION * contact.rms_height:
-                if held is None:
-                    raise NotConverged("the target lies in a jump whose far side does not reach back to it")
-                return held
-            inside = held is not None and beyond.separation <= held.separation < before.separation
-            # The secant of the bracket converges fast on a smooth path, its middle surely on a jumping one.
-            u = held.separation if inside and attempt < 12 else beyond.separation + 0.5 * width
-            if u == beyond.separation or u == before.separation:
-                return held
-            trial = equilibrium(contact, before, u)
-            if inside and u == held.separation and trial.same_contacts(held):
-                return held
-            if self.excess(trial) >= 0:
-                beyond = trial
+                pass
+            middle = equilibrium(self.contact, before, beyond.separation + 0.5 * width)
+            if self.excess(middle) >= 0:
+                beyond = middle
             else:
-                before = trial
+                before = middle
         raise NotConverged("the search for the target did not end")
 
 
@@ -236,40 +258,22 @@ def load(
         if not len(state.spots) and state.separation > first_contact.separation:
             state = first_contact  # nothing happens on the way there
         try:
-            beyond = equilibrium(contact, state, state.separation - step)
-            passed = [stop for stop in waiting if stop.excess(beyond) >= 0]
-            reached = None
-            # The first of the targets between the two states is the one met at the largest separation.
-            for stop in passed:
-                candidate = (stop, stop.reach(state, beyond))
-                if reached is None or candidate[1].separation > reached[1].separation:
-                    reached = candidate
+            reached = _aim(waiting, state, step) or _step(waiting, contact, state, step)
         except NotConverged as failure:
             step /= 2
-            if step < _SMALLEST_STEP * longest:
-                area, pressure = area_fraction(contact, state.spots), mean_pressure(contact, state.spots)
-                tension = "; the load is still tensile, adhesion may be pulling the surfaces into full contact"
-                raise NotConverged(
-                    f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, A/A0 = {area:.3g}, "
-                    f"after {total - len(waiting)} of {total} stops: {failure}{tension if pressure < 0 else ''}"
-                ) from failure
+            if step < _SMALLEST_STEP * longest or isinstance(failure, InsideJump):
+                raise NotConverged(_epitaph(contact, state, waiting, total, failure)) from failure
             continue
         step = min(longest, 2 * step)
-        if reached is None:
-            state = beyond
-            if state.separation <= 0:
-                raise NotConverged(
-                    f"the mean planes met before {waiting[0].target.kind} = {waiting[0].target.value:g}: "
-                    "the target lies beyond what the model covers"
-                )
-            if area_fraction(contact, state.spots) > _AREA_MARGIN * MAX_AREA_FRACTION:
-                raise NotConverged(
-                    f"the contact area reached {area_fraction(contact, state.spots):.2f} of the nominal one before "
-                    f"{waiting[0].target.kind} = {waiting[0].target.value:g}: adhesion pulls the surfaces together, "
-                    "or the target lies beyond what the model covers"
-                )
-            continue
         stop, state = reached
+        if stop is None:
+            if state.separation <= 0:
+                failure = NotConverged(f"the mean planes met before {_name(waiting[0])}, beyond what the model covers")
+                raise NotConverged(_epitaph(contact, state, waiting, total, failure))
+            if area_fraction(contact, state.spots) > _AREA_MARGIN * MAX_AREA_FRACTION:
+                failure = FullContact(f"{_name(waiting[0])} lies beyond what the model covers")
+                raise NotConverged(_epitaph(contact, state, waiting, total, failure))
+            continue
         waiting.remove(stop)
         if progress is not None:
             progress(
@@ -278,3 +282,51 @@ def load(
                 f"A/A0 {area_fraction(contact, state.spots):.4e}, {len(state.spots)} spots"
             )
         yield stop.target, state
+
+
+def _aim(waiting, state, step):
+    """Go straight to the next stop, if it seems no farther than a step; None if it is not met there after all."""
+    expected = {stop: stop.expected_separation(state) for stop in waiting}
+    stop = max(expected, key=expected.get)
+    if expected[stop] < state.separation - step:
+        return None
+    try:
+        met = stop.meet(state, expected[stop])
+    except NotConverged:
+        return None
+    same = _SAME_SEPARATION * stop.contact.rms_height
+    if stop.control and not state.separation - step <= met.separation <= state.separation + same:
+        return None
+    if any(other.excess(met) > _SAME_EXCESS for other in waiting if other is not stop):
+        return None
+    return stop, met
+
+
+def _step(waiting, contact, state, step):
+    """A step of the separation: the stop that it passes first, and its state; or None and the state after it."""
+    beyond = equilibrium(contact, state, state.separation - step)
+    reached = None, beyond
+    for stop in waiting:
+        if stop.excess(beyond) >= 0:
+            # The first of the targets between the two states is the one met at the largest separation.
+            met = stop.reach(state, beyond)
+            if reached[0] is None or met.separation > reached[1].separation:
+                reached = stop, met
+    return reached
+
+
+def _name(stop):
+    return f"{stop.target.kind} = {stop.target.value:g}"
+
+
+def _epitaph(contact, state, waiting, total, failure):
+    """Where the path ended and why; a surface that sticks together by itself is called so."""
+    area, pressure = area_fraction(contact, state.spots), mean_pressure(contact, state.spots)
+    sticky = ""
+    if contact.adhesive and (pressure < 0 or isinstance(failure, FullContact)):
+        pull = "is still tensile" if pressure < 0 else "is small"
+        sticky = f"; the load {pull}: the surface is sticky, adhesion is pulling it towards full contact"
+    return (
+        f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, A/A0 = {area:.3g}, "
+        f"after {total - len(waiting)} of {total} stops: {failure}{sticky}"
+    )

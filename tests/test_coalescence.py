@@ -5,8 +5,8 @@ import pytest
 
 from icha import Material
 from icha.asperities import Asperities
-from icha.coalescence import disjoint_pairs, equivalent_spots, overlapping_pairs
-from icha.equilibrium import Contact, Spots, balance, coalesce
+from icha.coalescence import covering_spot, disjoint_pairs, equivalent_spots, overlapping_pairs
+from icha.equilibrium import Contact, equilibrium, untouched
 from icha.jkr import JKR
 
 PERIOD = 1.0
@@ -101,65 +101,80 @@ def test_every_spot_merges_at_most_once_at_a_time():
     assert disjoint_pairs(np.empty((0, 2), dtype=int)).shape == (0, 2)
 
 
-def contact_and_spots(energy, order=(0, 1, 2, 3, 4)):
-    position = np.array([[0.20, 0.30], [0.23, 0.31], [0.70, 0.72], [0.72, 0.69], [0.5, 0.1]])[list(order)]
-    a = np.array([0.02, 0.018, 0.03, 0.015, 0.01])[list(order)]
-    R = np.array([0.5, 0.8, 1.1, 0.4, 0.7])[list(order)]
-    law = JKR(Material(2.0, energy, 1e-3))
-    contact = Contact(law, Asperities(position, np.zeros(5), R, PERIOD), rms_height=1e-2)
-    spots = Spots(position, np.zeros(5), R, a, law.approach(a, R), np.array([1, 2, 1, 3, 1])[list(order)])
-    separation = 0.013
-    height = separation + spots.approach + contact.interaction(spots).displacement(a)
-    return contact, Spots(position, height, R, a, spots.approach, spots.members), separation
+def two_bumps(energy, order=(0, 1)):
+    """Two asperities near each other, which unite when pressed, and one far away."""
+    position = np.array([[0.40, 0.50], [0.43, 0.51]])[list(order)]
+    height = np.array([1.0e-3, 0.9e-3])[list(order)]
+    R = np.array([0.5, 0.8])[list(order)]
+    law = JKR(Material(2.0, energy, 1e-5))
+    return Contact(law, Asperities(position, height, R, PERIOD), rms_height=1e-3)
 
 
-@pytest.mark.parametrize("energy", [0.0, 1e-5])
-def test_the_height_holds_the_merged_radius_at_this_separation(energy):
-    contact, spots, separation = contact_and_spots(energy)
-    pairs = np.array([[0, 1], [2, 3]])
-    merged, owner = coalesce(contact, spots, np.arange(5), pairs, separation)
-    assert len(merged) == 3
-    np.testing.assert_array_equal(owner, [1, 1, 2, 2, 0])
-    np.testing.assert_array_equal(merged.members, [1, 3, 4])
-    area = np.pi * spots.contact_radius**2
-    np.testing.assert_allclose(np.pi * merged.contact_radius[1:] ** 2, [area[:2].sum(), area[2:4].sum()], rtol=1e-14)
-    # h_eq - u = delta(a_eq, R_eq) + w of all others, as they now are.
-    approach = contact.law.approach(merged.contact_radius, merged.radius_of_curvature)
-    w = contact.interaction(merged).displacement(merged.contact_radius)
-    np.testing.assert_allclose((merged.height - separation - approach - w)[1:], 0, atol=1e-15)
-    # The equilibrium keeps that radius but for the answer of the spot that did not merge.
-    settled, _, residual = balance(contact, merged, separation)
-    assert residual < 1e-10
-    np.testing.assert_allclose(settled.contact_radius[1:], merged.contact_radius[1:], rtol=1e-3)
+def states_around_the_union(contact):
+    """The last state with two spots and the first with one, a billionth of the separation's way apart."""
+    before = equilibrium(contact, untouched(contact), 0.9e-3)
+    separation, step = before.separation, 5e-5
+    while step > 1e-13:
+        after = equilibrium(contact, before, separation - step)
+        if after.coalescences:
+            step /= 2
+        else:
+            before, separation = after, separation - step
+    return before, equilibrium(contact, before, separation - 2 * step)
 
 
-def test_two_lone_spots_keep_their_merged_radius_exactly():
-    contact, spots, separation = contact_and_spots(1e-5)
-    two = spots.take(np.array([0, 1]))
-    merged, _ = coalesce(contact, two, np.array([0, 1, -1, -1, -1]), np.array([[0, 1]]), separation)
-    settled, _, _ = balance(contact, merged, separation)
-    np.testing.assert_allclose(settled.contact_radius, np.hypot(*two.contact_radius), rtol=1e-9)
+@pytest.mark.parametrize("energy", [0.0, 1e-9])
+def test_a_union_keeps_the_area_at_this_separation(energy):
+    contact = two_bumps(energy)
+    before, after = states_around_the_union(contact)
+    assert len(before.spots) == 2 and len(after.spots) == 1 and after.coalescences == 1
+    two, one = before.spots, after.spots
+    # They touched, and the equivalent spot is as the paper defines it, in equilibrium at this separation.
+    assert np.sum(two.contact_radius) == pytest.approx(np.hypot(0.03, 0.01), rel=1e-7)
+    assert one.contact_radius[0] == pytest.approx(np.hypot(*two.contact_radius), rel=1e-7)
+    assert one.radius_of_curvature[0] == pytest.approx(np.hypot(*two.radius_of_curvature), rel=1e-14)
+    volume = two.contact_radius**4 / two.radius_of_curvature
+    np.testing.assert_allclose(one.position[0], volume @ two.position / np.sum(volume), rtol=1e-7)
+    assert one.members.tolist() == [2]
+    np.testing.assert_array_equal(after.owner, [0, 0])
+    # From here on it is a spot of that height: h - u = delta + w of its own images.
+    law, E = contact.law, 2.0
+    w = -3.900265 * law.force(one.contact_radius, one.radius_of_curvature) / (np.pi * E * PERIOD)
+    error = one.height - after.separation - one.approach - w
+    assert abs(error[0]) < 1e-4 * abs(one.approach[0])
 
 
-@pytest.mark.parametrize("energy", [0.0, 1e-5])
+@pytest.mark.parametrize("energy", [0.0, 1e-9])
 def test_the_order_of_the_input_does_not_matter(energy):
+    rng = np.random.default_rng(3)
+    position, height, R = rng.random((40, 2)), 1e-3 * rng.random(40), rng.uniform(1, 5, 40)
     results = []
-    for order in ([0, 1, 2, 3, 4], [3, 1, 4, 0, 2], [4, 3, 2, 1, 0]):
-        contact, spots, separation = contact_and_spots(energy, order)
-        pairs = disjoint_pairs(overlapping_pairs(spots.position, spots.contact_radius, PERIOD))
-        assert len(pairs) == 2
-        merged, owner = coalesce(contact, spots, np.arange(5), pairs, separation)
-        rank = np.argsort(merged.position[:, 0])
-        values = (
-            merged.position[:, 0],
-            merged.height,
-            merged.radius_of_curvature,
-            merged.contact_radius,
-            merged.members,
-        )
-        results.append([value[rank] for value in values])
-        # Every asperity still belongs to the spot nearest to it.
-        np.testing.assert_array_equal(np.sort(owner), [0, 1, 1, 2, 2])
+    for seed in (None, 1, 2):
+        order = np.arange(40) if seed is None else np.random.default_rng(seed).permutation(40)
+        asperities = Asperities(position[order], height[order], R[order], PERIOD)
+        contact = Contact(JKR(Material(2.0, energy, 1e-5)), asperities, rms_height=3e-4)
+        state = untouched(contact)
+        for separation in np.arange(0.9e-3, 0, -5e-5):
+            state = equilibrium(contact, state, separation)
+        assert state.coalescences >= 3
+        spots = state.spots
+        rank = np.argsort(spots.position[:, 0])
+        results.append([spots.position[rank, 0], spots.height[rank], spots.contact_radius[rank], spots.members[rank]])
+        # Every asperity belongs to the spot into which those near it were united.
+        members = np.bincount(state.owner[state.owner >= 0], minlength=len(spots))
+        assert np.all(members >= spots.members)
     for other in results[1:]:
         for value, reference in zip(other, results[0], strict=True):
-            np.testing.assert_allclose(value, reference, rtol=1e-10)
+            np.testing.assert_allclose(value, reference, rtol=1e-6)
+
+
+def test_the_deepest_cover_counts():
+    points = np.array([[0.5, 0.5], [0.1, 0.1], [0.98, 0.5]])
+    spots, a = np.array([[0.52, 0.5], [0.45, 0.5], [0.01, 0.5]]), np.array([0.03, 0.07, 0.05])
+    np.testing.assert_array_equal(covering_spot(points, spots, a, PERIOD), [1, -1, 2])
+    # Spots among themselves: only in a larger one, and of two equal ones the second in the first.
+    twins = np.array([[0.2, 0.2], [0.205, 0.2], [0.21, 0.2]])
+    a = np.array([0.02, 0.02, 0.01])
+    np.testing.assert_array_equal(covering_spot(twins, twins, a, PERIOD, larger_than=a), [-1, 0, 1])
+    assert len(covering_spot(points[:0], spots, a, PERIOD)) == 0
+    np.testing.assert_array_equal(covering_spot(points, spots[:0], a[:0], PERIOD), [-1, -1, -1])

@@ -181,7 +181,7 @@ def test_area_against_load_lies_where_the_literature_has_it():
 @BOTH
 @pytest.mark.parametrize("change", ["shift", "turn", "mirror"])
 def test_shifts_quarter_turns_and_mirrors_change_nothing(material, change):
-    # Positions differ by rounding only, but the far field's tolerance of 1e-11 and the stop's are position-dependent.
+    # Positions differ by rounding only, but the far field's tolerance of 1e-9 is position-dependent.
     surface = rough()
     heights = {
         "shift": np.roll(surface.heights, (13, -29), axis=(0, 1)),
@@ -190,8 +190,8 @@ def test_shifts_quarter_turns_and_mirrors_change_nothing(material, change):
     }[change]
     one, other = run_of(surface, material), run_of(Surface(heights, PERIOD), material)
     for name in DIMENSIONLESS:
-        np.testing.assert_allclose(other[name], one[name], rtol=1e-10, err_msg=name)
-    np.testing.assert_allclose(np.sort(other.spot_radius), np.sort(one.spot_radius), rtol=1e-9)
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-9, err_msg=name)
+    np.testing.assert_allclose(np.sort(other.spot_radius), np.sort(one.spot_radius), rtol=1e-8)
 
 
 @BOTH
@@ -275,7 +275,7 @@ def test_a_surface_that_pulls_itself_together_is_reported_with_what_was_computed
     assert str(data.step_kind[0].item()) == "mean_separation"
     assert float(data.mean_separation[0]) == pytest.approx(3.2 * surface.rms_height, rel=1e-9)
     assert np.all(data.converged == 1)
-    assert np.all(data.residual <= 1e-10)
+    assert np.all(data.residual <= 1e-8)
     # It crosses process borders whole.
     again = pickle.loads(pickle.dumps(caught.value))
     assert str(again) == str(caught.value)
