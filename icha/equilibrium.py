@@ -49,6 +49,7 @@ _KRYLOV = 50
 # at most so many times the fall of the separation; and, as spots jump, by so much at once, in h_rms and in the largest
 # jump-off approach: on the way to an equilibrium that is a guess, at the equilibrium a bound.
 _FASTEST_APPROACH = 3.0
+_PROBABLE_APPROACH = 1.2
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
 # Sites are arranged anew when they have grown by this factor, or so large a part of them is gone.
@@ -323,8 +324,10 @@ class _Search:
         )
         self._arrange_if_needed()
         if not self.adhesive:
-            expected = self.seen + np.maximum(self.seen_at - separation, 0.0)
-            self._admit(np.flatnonzero((expected > 0) & self._free()), _TRIAL)
+            fall = self.seen_at - separation
+            hopeful = self.seen + _PROBABLE_APPROACH * fall + self.sudden_guess > 0
+            trial = np.flatnonzero(hopeful & self._free())
+            self._admit(trial, _TRIAL, (self.seen + fall)[trial])
 
     # --- the sites ------------------------------------------------------------------------------------------
 
@@ -332,8 +335,8 @@ class _Search:
         """Whether an asperity is neither a site nor part of one (asperities,)."""
         return (self.holder < 0) & ~self.is_site
 
-    def _admit(self, asperity, status):
-        """Make sites of free asperities (k,)."""
+    def _admit(self, asperity, status, approach):
+        """Make sites of free asperities (k,) with approaches (k,), m."""
         if not len(asperity):
             return
         asperities = self.contact.asperities
@@ -347,7 +350,7 @@ class _Search:
             asperity=asperity,
             members=np.ones(len(asperity), dtype=int),
             status=status,
-            approach=self.seen[asperity],
+            approach=approach,
             known=False,
         )
 
@@ -395,12 +398,12 @@ class _Search:
             miss = self.control.value(self.contact, a[part], R[part]) - self.control.target
         return _Point(approach, separation, a, error, miss)
 
-    def _size(self, point):
-        """Largest error in units of h_rms, the control's miss in its own."""
+    def _size(self, point, miss_weight=_MISS_WEIGHT):
+        """Largest error in units of h_rms, the control's relative miss with its weight."""
         size = float(np.max(np.abs(point.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:
             return size
-        return max(size, abs(point.miss) / abs(self.control.target) * _MISS_WEIGHT)
+        return max(size, abs(point.miss) / abs(self.control.target) * miss_weight)
 
     def _linearised(self, point):
         """Where the unknowns are, da/d(delta) there, and the products of W' da/d(delta), exact and approximate."""
@@ -463,13 +466,15 @@ class _Search:
             if self._swallow(point):
                 point = self._evaluate(self.approach, point.separation)
             size = self._size(point)
-            margin = _EVENT_MARGIN * float(np.max(np.abs(point.error), initial=0.0))
+            # A missed load is one of the separation, about the same part of h_rms.
+            closeness = self._size(point, 1.0)
+            margin = _EVENT_MARGIN * closeness * self.contact.rms_height
             changed = False
             if size <= RESIDUAL_TOLERANCE:
                 changed = self._events(point, 0.0)
                 if not changed:
                     return self._finish(point)
-            elif size <= _EVENT_TOLERANCE and not quiet:
+            elif closeness <= _EVENT_TOLERANCE and not quiet:
                 changed = self._events(point, margin)
                 quiet = not changed  # what hangs by less waits for the equilibrium
             if not changed:
@@ -545,7 +550,7 @@ class _Search:
         if not len(ready):
             return False
         self.jump_ins += len(ready) if self.adhesive else 0
-        self._admit(ready, _CONTACT if self.adhesive else _TRIAL)
+        self._admit(ready, _CONTACT if self.adhesive else _TRIAL, self.seen[ready])
         return True
 
     def _first_of_each_group(self, joining):

@@ -4,5 +4,6 @@
 # adhesion meet.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
-# Longest step of the mean separation, in h_rms.
+# Longest step of the mean separation, in h_rms, that may be asked for, and the one taken if none is.
 MAX_STEP = 0.5
+DEFAULT_STEP = 0.15

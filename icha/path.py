@@ -19,7 +19,7 @@ from icha.equilibrium import (
     mean_pressure,
     untouched,
 )
-from icha.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
 from icha.validation import positive
 
 REDUCED_PRESSURE = "reduced_pressure"
@@ -79,7 +79,7 @@ class Path:
         *,
         snapshots=None,
         unload=False,
-        max_step=0.15,
+        max_step=DEFAULT_STEP,
     ):
         """Check the values and build the list of stops."""
         given = {

@@ -23,7 +23,7 @@ from pydantic import (
 )
 
 from icha.configuration.units import PATTERN, PHYSICAL_NAMES, conversion_factor, to_number, to_si
-from icha.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
 
 NAME_PATTERN = r"^[a-z0-9_-]+$"
 # Rounding of the quotient of two lengths must not decide whether a wave has its cells.
@@ -286,7 +286,7 @@ class Study(Section):
         description="States of which spots and distributions are kept; each is hit exactly. Left out: the last target.",
     )
     max_step: _number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
-        default=0.1, description="Longest change of mean separation between two equilibria, in units of h_rms."
+        default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
     )
 
     @field_validator("snapshots")
