@@ -327,7 +327,9 @@ class _Search:
             fall = self.seen_at - separation
             hopeful = self.seen + _PROBABLE_APPROACH * fall + self.sudden_guess > 0
             trial = np.flatnonzero(hopeful & self._free())
-            self._admit(trial, _TRIAL, (self.seen + fall)[trial])
+            # Where contact was lost the approach is not known, but small.
+            expected = np.where(np.isfinite(fall), self.seen + fall, 0.0)
+            self._admit(trial, _TRIAL, expected[trial])
 
     # --- the sites ------------------------------------------------------------------------------------------
 

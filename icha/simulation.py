@@ -107,7 +107,10 @@ VARIABLES = {
 
 
 class ConvergenceError(RuntimeError):
-    """The path could not be followed to its end. `dataset` holds the stops that were reached."""
+    """The path could not be followed to its end.
+
+    `dataset` holds the stops that were reached, and the reason in its attribute `incomplete`.
+    """
 
     def __init__(self, message: str, dataset: xr.Dataset):
         """Keep the message and what was computed."""
@@ -182,7 +185,7 @@ def simulate(
             failure = f"the path ends {error}"
         dataset = _dataset(surface, material, contact, steps, snapshots, seed)
     if failure is not None:
-        raise ConvergenceError(failure, dataset) from None
+        raise ConvergenceError(failure, dataset.assign_attrs(incomplete=failure)) from None
     return dataset
 
 

@@ -392,6 +392,10 @@ def test_states_along_a_path_are_consistent(energy):
         state = equilibrium(contact, state, level * contact.rms_height)
         assert_consistent(contact, state)
     assert state.jump_offs > 0
+    # And down again, where they are made anew.
+    for level in np.arange(2.6, 0.6, -0.3):
+        state = equilibrium(contact, state, level * contact.rms_height)
+        assert_consistent(contact, state)
 
 
 def test_too_few_newton_steps_are_reported_not_passed_off(monkeypatch):
