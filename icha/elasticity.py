@@ -182,6 +182,11 @@ class Ewald:
         """The smooth sum, to a thousandth."""
         return _SmoothSum(self.period, self.alpha, self.contact_modulus, _LOOSE_CUT, _LOOSE_NUFFT_TOLERANCE)
 
+    @property
+    def loose_reach(self):
+        """Radius of the near field that matters to the loose sum, m."""
+        return self.reach * _LOOSE_CUT / _CUT
+
     @cached_property
     def once(self):
         """The split for a sum whose pairs serve only once."""
@@ -229,6 +234,7 @@ class HalfSpace:
     pairs : near pairs as (later, earlier, distance), each pair once.
     near : three (n, n) lower triangular matrices, the short-ranged displacement by the moments k = 0, 1, 2.
     near_transposed : their transposes.
+    near_loose : the displacement by forces, what matters to a thousandth, and its transpose.
     """
 
     ewald: Ewald
@@ -236,6 +242,7 @@ class HalfSpace:
     pairs: tuple
     near: tuple
     near_transposed: tuple
+    near_loose: tuple
 
     @classmethod
     def at(cls, points, period, contact_modulus) -> HalfSpace:
@@ -272,7 +279,10 @@ class HalfSpace:
             kernels = [np.concatenate([m.data, k]) for m, k in zip(before.near, kernels, strict=True)]
             later, earlier, r = (np.concatenate(p) for p in zip(before.pairs, (later, earlier, r), strict=True))
         near = tuple(scipy.sparse.csr_matrix((k, earlier, start), shape=(n, n)) for k in kernels)
-        return cls(ewald, points, (later, earlier, r), near, tuple(matrix.T for matrix in near))
+        counts = r <= ewald.loose_reach
+        ends = np.append(0, np.cumsum(counts))[start]
+        loose = scipy.sparse.csr_matrix((kernels[0][counts], earlier[counts], ends), shape=(n, n))
+        return cls(ewald, points, (later, earlier, r), near, tuple(matrix.T for matrix in near), (loose, loose.T))
 
     def displacement(self, force, moment, fourth):
         """Displacement (n,) in m by forces (N), second (N m^2) and fourth moments (N m^4), each (n,)."""
@@ -288,8 +298,8 @@ class HalfSpace:
     def nearly(self, force):
         """Displacement by forces alone, to a thousandth: enough for the operator of a linear solve."""
         w = self.ewald.loose(self.points, self.points, force)
-        w += self.near[0] @ force
-        w += self.near_transposed[0] @ force
+        for half in self.near_loose:
+            w += half @ force
         w -= self.ewald.own_smooth[0] * force
         w -= self.ewald.mean * np.sum(force)
         return w
