@@ -579,9 +579,14 @@ class _Search:
         inside = inside[np.argsort((a[j] - windows.r)[inside], kind="stable")]
         i, j = i[inside], j[inside]
         self.jump_ins -= int(np.count_nonzero(self.status[np.unique(i)] == _CONTACT))
-        self.holder[self.sites.asperity[i]] = j  # the deepest comes last and stays
+        self.holder[self.sites.asperity[i]] = i
         self.is_site[self.sites.asperity[i]] = False
         self.status[i] = _GONE
+        index = np.append(np.arange(len(self.sites)), -1)
+        index[i] = j  # the deepest comes last and stays
+        while np.any(index[index] != index):  # who takes one in may be taken in itself, by a larger one
+            index = index[index]
+        self.holder = index[self.holder]  # -1 looks up the last
         self.approach = point.approach
         return True
 

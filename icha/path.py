@@ -32,6 +32,8 @@ KINDS = (REDUCED_PRESSURE, RELATIVE_LOAD, AREA_FRACTION, MEAN_SEPARATION)
 _SMALLEST_STEP = 2.0**-14
 # Two separations closer than this (in h_rms) bracket a jump, not a root.
 _SAME_SEPARATION = 1e-10
+# A solve that fails in a bracket narrower than this (in h_rms) fails at a jump, where spots have infinite slopes.
+_CLOSE_TO_A_JUMP = 1e-4
 # Relative excess over a target that is rounding.
 _SAME_EXCESS = 1e-9
 # How far past the covered area the path looks for a target before it gives up.
@@ -204,25 +206,32 @@ class _Stop:
                 try:
                     return self.meet(beyond, beyond.separation)
                 except NotConverged:
-                    raise InsideJump(
-                        f"{self.target.kind} = {self.target.value:g} lies inside a jump: at a mean separation of "
-                        f"{beyond.separation / self.contact.rms_height:.4f} h_rms the contact area jumps from "
-                        f"{area_fraction(self.contact, before.spots):.3g} to "
-                        f"{area_fraction(self.contact, beyond.spots):.3g} of the nominal one, and its far side "
-                        "does not reach back to the target"
-                    ) from None
+                    raise self._inside_jump(before, beyond) from None
             try:
                 met = self.meet(before, max(self.expected_separation(before), beyond.separation))
                 if beyond.separation <= met.separation < before.separation:
                     return met
             except NotConverged:
                 pass
-            middle = equilibrium(self.contact, before, beyond.separation + 0.5 * width)
+            try:
+                middle = equilibrium(self.contact, before, beyond.separation + 0.5 * width)
+            except NotConverged:
+                if width > _CLOSE_TO_A_JUMP * self.contact.rms_height:
+                    raise
+                raise self._inside_jump(before, beyond) from None
             if self.excess(middle) >= 0:
                 beyond = middle
             else:
                 before = middle
         raise NotConverged("the search for the target did not end")
+
+    def _inside_jump(self, before, beyond):
+        areas = (area_fraction(self.contact, state.spots) for state in (before, beyond))
+        return InsideJump(
+            f"{_name(self)} lies inside a jump: at a mean separation of "
+            f"{beyond.separation / self.contact.rms_height:.4f} h_rms the contact area jumps from {next(areas):.3g} to "
+            f"{next(areas):.3g} of the nominal one, and its far side does not reach back to the target"
+        )
 
 
 def load(

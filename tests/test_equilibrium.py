@@ -308,6 +308,7 @@ def assert_consistent(contact, state):
     # The sum over the spots alone is split otherwise than that over the sites of the solve.
     assert np.max(np.abs(error), initial=0) <= 2e-7 * contact.rms_height
     assert len(overlapping_pairs(spots.position, spots.contact_radius, period)) == 0
+    assert np.all(np.isin(state.holder[state.holder >= 0], np.flatnonzero(state.radius > 0)))
     # Every spot has an owner, and no free asperity is left beyond its jump-in but the pending ones.
     assert set(state.owner[state.owner >= 0]) == set(range(len(spots)))
     free = state.owner < 0
