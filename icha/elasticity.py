@@ -5,10 +5,11 @@ counter-pressure that keeps the mean displacement zero, the sum is split as Ewal
 erf(alpha r)/r goes through its Fourier series, (2/(E* q)) erfc(q/(2 alpha)) per mode and cell area, by non-uniform
 FFTs; the rest is short-ranged and pairwise.
 
-A spot is no point. Within six of its radii its exact displacement is taken; farther away an axisymmetric pressure acts
-by its moments, integral of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4, 9/64, whose fields fall as 1/r, 1/r^3 and
-1/r^5. The third is only needed where the field is summed pairwise. What depends on the positions alone, nearly
-everything, is computed once; only the windows of exact displacement follow the radii.
+A spot is no point. Within eight of its radii its exact displacement is taken; farther away an axisymmetric pressure
+acts by its moments, integral of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4, 9/64, whose fields fall as 1/r, 1/r^3
+and 1/r^5. The third is only needed where the field is summed pairwise. Images farther than half the cell act by the
+first two. What depends on the positions alone, nearly everything, is computed once; only the windows of exact
+displacement follow the radii.
 """
 
 from __future__ import annotations

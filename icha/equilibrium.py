@@ -31,6 +31,8 @@ from icha.jkr import JKR
 RESIDUAL_TOLERANCE = 1e-9
 # Relative error of a load or an area that was asked for.
 TARGET_TOLERANCE = 1e-11
+# Of what a load is made up of, the part below which it counts as none when its error is measured.
+_SMALLEST_LOAD = 1e-4
 # One weighs as much as the other in a solve.
 _MISS_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
 # Error in h_rms below which jumps and unions happen; one that hangs by less than ten times the error waits.
@@ -395,17 +397,21 @@ class _Search:
             self.height[self.fresh] = approach[self.fresh] + w[self.fresh] + separation
             self.fresh = np.empty(0, dtype=int)
         error = np.where(part, approach + w + separation - self.height, 0.0)
-        miss = 0.0
+        miss = gross = 0.0
         if self.control is not None:
             miss = self.control.value(self.contact, a[part], R[part]) - self.control.target
-        return _Point(approach, separation, a, error, miss)
+            if self.control.quantity == "pressure":
+                gross = float(np.sum(self.law.repulsive_force(a[part], R[part]))) / self.contact.area
+        return _Point(approach, separation, a, error, miss, gross)
 
     def _size(self, point, miss_weight=_MISS_WEIGHT):
         """Largest error in units of h_rms, the control's relative miss with its weight."""
         size = float(np.max(np.abs(point.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:
             return size
-        return max(size, abs(point.miss) / abs(self.control.target) * miss_weight)
+        # A load that is next to nothing beside the attraction and repulsion that make it up is met as well as they are.
+        unit = max(abs(self.control.target), _SMALLEST_LOAD * point.gross)
+        return max(size, abs(point.miss) / unit * miss_weight)
 
     def _linearised(self, point):
         """Where the unknowns are, da/d(delta) there, and the products of W' da/d(delta), exact and approximate."""
@@ -691,13 +697,17 @@ class _Search:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """One evaluation of the equations: approaches, radii and errors (n,) in m, the separation, and the miss."""
+    """One evaluation of the equations: approaches, radii and errors (n,) in m, the separation, and the control's miss.
+
+    gross: pressure by the repulsive parts of the forces alone, Pa.
+    """
 
     approach: np.ndarray
     separation: float
     a: np.ndarray
     error: np.ndarray
     miss: float
+    gross: float
 
 
 def _solve(apply, b, tolerance):

@@ -12,7 +12,6 @@ from icha.equilibrium import (
     Contact,
     ContactState,
     Control,
-    FullContact,
     NotConverged,
     area_fraction,
     equilibrium,
@@ -58,9 +57,10 @@ class Path:
     reduced_pressures : p/(E* h'_rms), increasing, in (0, 0.15].
     area_fractions : A/A0, increasing, in (0, 0.25].
     mean_separations : u in m, decreasing, positive. Exactly one of these three lists is given.
-    snapshots : pairs (kind, value) of states whose fields and spots are kept, with kind one of "reduced_pressure",
-        "relative_load" (F/(E* A0)), "area_fraction" and "mean_separation" (m). A snapshot is a stop of its own, unless
-        the list holds the same kind and value. None: the last stop of the list.
+    snapshots : pairs (kind, value), in any order, of states whose fields and spots are kept, with kind one of
+        "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" and "mean_separation" (m). A snapshot is a stop
+        of its own, unless the list holds the same kind and value; the dataset has them in the order in which they are
+        met. None: the last stop of the list.
     unload : not available yet; must be False.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in (0, 0.5].
 
@@ -152,7 +152,12 @@ def _stops(name, kind, values):
 
 
 class InsideJump(NotConverged):
-    """The target is passed in a jump, and there is no equilibrium at it."""
+    """The target is passed in a jump, and there is no equilibrium at it. `before` is the state just before the jump."""
+
+    def __init__(self, message: str, stop: _Stop, before: ContactState):
+        """Keep which stop, and where the path can go on."""
+        super().__init__(message)
+        self.stop, self.before = stop, before
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,11 +231,14 @@ class _Stop:
         raise NotConverged("the search for the target did not end")
 
     def _inside_jump(self, before, beyond):
-        areas = (area_fraction(self.contact, state.spots) for state in (before, beyond))
+        low, high = (area_fraction(self.contact, state.spots) for state in (before, beyond))
         return InsideJump(
             f"{_name(self)} lies inside a jump: at a mean separation of "
-            f"{beyond.separation / self.contact.rms_height:.4f} h_rms the contact area jumps from {next(areas):.3g} to "
-            f"{next(areas):.3g} of the nominal one, and its far side does not reach back to the target"
+            f"{beyond.separation / self.contact.rms_height:.4f} h_rms the contact area jumps from {low:.3g} to "
+            f"{high:.3g} of the nominal one, and its far side does not reach back to the target; leave it out, or give "
+            "the path by mean separations",
+            self,
+            before,
         )
 
 
@@ -254,7 +262,8 @@ def load(
     Raises
     ------
     NotConverged
-        If an equilibrium is not found even with short steps, or a target lies beyond what the model covers.
+        If an equilibrium is not found even with short steps, or a target lies beyond what the model covers. Stops that
+        lie inside a jump are left out; those after them are yielded before the error is raised.
     """
     scale = {REDUCED_PRESSURE: pressure_unit, RELATIVE_LOAD: contact_modulus}
     waiting = [_Stop(target, contact, scale.get(target.kind, 1.0)) for target in path.targets]
@@ -263,34 +272,47 @@ def load(
     state = first_contact
     longest = path.max_step * contact.rms_height
     step = longest
+    missed, reached = [], 0
+
+    def end(*failures):
+        return NotConverged(_epitaph(contact, state, reached, total, [*missed, *failures]))
+
     while waiting:
         if not len(state.spots) and state.separation > first_contact.separation:
             state = first_contact  # nothing happens on the way there
         try:
-            reached = _aim(waiting, state, step) or _step(waiting, contact, state, step)
+            stop, beyond = _aim(waiting, state, step) or _step(waiting, contact, state, step)
+        except InsideJump as jump:
+            waiting.remove(jump.stop)
+            missed.append(jump)
+            state = jump.before
+            continue
         except NotConverged as failure:
             step /= 2
-            if step < _SMALLEST_STEP * longest or isinstance(failure, InsideJump):
-                raise NotConverged(_epitaph(contact, state, waiting, total, failure)) from failure
+            if step < _SMALLEST_STEP * longest:
+                raise end(failure) from failure
             continue
         step = min(longest, 2 * step)
-        stop, state = reached
+        area = area_fraction(contact, beyond.spots)
+        if area > _AREA_MARGIN * MAX_AREA_FRACTION:
+            what = f"the contact area runs to {area:.2f} of the nominal one, beyond what the model covers,"
+            raise end(NotConverged(f"{what} before {_name(stop or waiting[0])}"))
+        state = beyond
         if stop is None:
             if state.separation <= 0:
-                failure = NotConverged(f"the mean planes met before {_name(waiting[0])}, beyond what the model covers")
-                raise NotConverged(_epitaph(contact, state, waiting, total, failure))
-            if area_fraction(contact, state.spots) > _AREA_MARGIN * MAX_AREA_FRACTION:
-                failure = FullContact(f"{_name(waiting[0])} lies beyond what the model covers")
-                raise NotConverged(_epitaph(contact, state, waiting, total, failure))
+                raise end(NotConverged(f"the mean planes met before {_name(waiting[0])}, beyond what the model covers"))
             continue
         waiting.remove(stop)
+        reached += 1
         if progress is not None:
             progress(
-                f"stop {total - len(waiting)} of {total}: {stop.target.kind} = {stop.target.value:.6g}, "
+                f"stop {reached} of {total}: {stop.target.kind} = {stop.target.value:.6g}, "
                 f"separation {state.separation / contact.rms_height:.4f} h_rms, "
-                f"A/A0 {area_fraction(contact, state.spots):.4e}, {len(state.spots)} spots"
+                f"A/A0 {area:.4e}, {len(state.spots)} spots"
             )
         yield stop.target, state
+    if missed:
+        raise end()
 
 
 def _aim(waiting, state, step):
@@ -328,14 +350,16 @@ def _name(stop):
     return f"{stop.target.kind} = {stop.target.value:g}"
 
 
-def _epitaph(contact, state, waiting, total, failure):
+def _epitaph(contact, state, reached, total, failures):
     """Where the path ended and why; a surface that sticks together by itself is called so."""
-    area, pressure = area_fraction(contact, state.spots), mean_pressure(contact, state.spots)
+    pressure = mean_pressure(contact, state.spots)
     sticky = ""
-    if contact.adhesive and (pressure < 0 or isinstance(failure, FullContact)):
-        pull = "is still tensile" if pressure < 0 else "is small"
-        sticky = f"; the load {pull}: the surface is sticky, adhesion is pulling it towards full contact"
+    # Without a load, adhesion alone has spread the contact, or the very first one does not come to rest.
+    lone = not len(state.spots) and not any(isinstance(failure, InsideJump) for failure in failures)
+    if contact.adhesive and (pressure < 0 or lone):
+        sticky = "; the load is not yet compressive: the surface is sticky, adhesion is pulling it towards full contact"
     return (
-        f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, A/A0 = {area:.3g}, "
-        f"after {total - len(waiting)} of {total} stops: {failure}{sticky}"
+        f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
+        f"A/A0 = {area_fraction(contact, state.spots):.3g}, after {reached} of {total} stops: "
+        f"{'; '.join(map(str, failures))}{sticky}"
     )

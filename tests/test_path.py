@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, simulate
+from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.asperities import find_summits
 from icha.checks import check_run
 from icha.equilibrium import (
@@ -246,3 +246,42 @@ def test_a_snapshot_before_first_contact_is_all_gap(surface):
     assert all(check.passed for check in check_run(run))
     with pytest.raises(ValueError, match=r"path: a snapshot at a mean separation of 1\.0 m"):
         simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-3], snapshots=[("mean_separation", 1.0)]))
+
+
+def egg_box(waves=4, grid=64):
+    """Equal summits, all of which jump into contact at once."""
+    x = 2 * np.pi * waves * np.arange(grid) / grid
+    return Surface(heights=1e-6 * (np.cos(x)[None, :] + np.cos(x)[:, None]), period=PERIOD)
+
+
+def test_stops_inside_a_jump_are_left_out_and_the_others_kept():
+    surface = egg_box()
+    first_contact = untouched(contact_of(surface, ADHESIVE)).separation
+    jumped = simulate(surface, ADHESIVE, Path(mean_separations=[first_contact * (1 - 1e-9)]))
+    first = float(jumped.contact_area_fraction[0])
+    assert first > 5e-3
+    with pytest.raises(ConvergenceError, match="after 2 of 4 stops") as caught:
+        simulate(surface, ADHESIVE, Path(area_fractions=[0.2 * first, 0.4 * first, 0.05, 0.1]))
+    message, run = str(caught.value), caught.value.dataset
+    assert message.count("lies inside a jump") == 2 and f"jumps from 0 to {first:.3g}"[:24] in message
+    assert "sticky" not in message
+    np.testing.assert_allclose(run.contact_area_fraction, [0.05, 0.1], rtol=1e-9)
+    kept = simulate(surface, ADHESIVE, Path(area_fractions=[0.05, 0.1]))
+    np.testing.assert_allclose(run.mean_separation, kept.mean_separation, rtol=1e-6)
+
+
+def test_no_stop_beyond_the_covered_area_is_handed_out(surface):
+    with pytest.raises(
+        ConvergenceError, match=r"runs to 0\.\d\d of the nominal one, beyond what the model covers"
+    ) as caught:
+        simulate(surface, Material(MODULUS, 0.3, 2.071e-9), Path(mean_separations=[surface.rms_height, 1e-12]))
+    assert caught.value.dataset.sizes["step"] == 1
+
+
+def test_hardly_any_load_is_met_beside_a_large_attraction(surface):
+    # The attraction is a million times the load that is asked for.
+    run = simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-12, 1e-10]))
+    gross = ADHESIVE.surface_energy / float(surface.rms_height) * 1e-3
+    pressure = run.nominal_pressure.values
+    unit = MODULUS * surface.rms_slope
+    assert np.all(np.abs(pressure - np.array([1e-12, 1e-10]) * unit) < 1e-9 * gross)

@@ -181,7 +181,8 @@ def test_area_against_load_lies_where_the_literature_has_it():
 @BOTH
 @pytest.mark.parametrize("change", ["shift", "turn", "mirror"])
 def test_shifts_quarter_turns_and_mirrors_change_nothing(material, change):
-    # Positions differ by rounding only, but the far field's tolerance of 1e-9 is position-dependent.
+    # Positions differ by rounding only, but the far field's tolerance of 1e-9 is position-dependent, and the heights of
+    # united spots keep what it changes in the iterates at which they unite.
     surface = rough()
     heights = {
         "shift": np.roll(surface.heights, (13, -29), axis=(0, 1)),
@@ -190,8 +191,8 @@ def test_shifts_quarter_turns_and_mirrors_change_nothing(material, change):
     }[change]
     one, other = run_of(surface, material), run_of(Surface(heights, PERIOD), material)
     for name in DIMENSIONLESS:
-        np.testing.assert_allclose(other[name], one[name], rtol=1e-9, err_msg=name)
-    np.testing.assert_allclose(np.sort(other.spot_radius), np.sort(one.spot_radius), rtol=1e-8)
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-8, err_msg=name)
+    np.testing.assert_allclose(np.sort(other.spot_radius), np.sort(one.spot_radius), rtol=1e-7)
 
 
 @BOTH
