@@ -168,7 +168,7 @@ def test_a_study_is_a_product_of_its_lists(load):
     assert settings["path"] == {
         "reduced_pressures": [1e-3, 0.01],
         "snapshots": [("area_fraction", 0.02)],
-        "max_step": 0.1,
+        "max_step": 0.15,
     }
 
 

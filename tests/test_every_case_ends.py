@@ -15,7 +15,7 @@ REASONS = (
     "the surface is sticky",
     "lies inside a jump",
     "the mean planes met",
-    "lies beyond what the model covers",
+    "beyond what the model covers",
     "no descent from an equilibrium error",
     "Newton steps",
 )
