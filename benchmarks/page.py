@@ -201,8 +201,10 @@ def verdicts(results) -> list[Verdict]:
         full = chosen(results, "stages-challenge-", adhesion=adhesion)
         if full and full[0]["outcome"] == "complete":
             (run,) = full[:1]
-            reached = run["wall"] <= 5 * MINUTE and run["peak"] <= 8 * GIB and run["stops"] == run["stops_asked"]
-            text = f"{run['wall'] / MINUTE:.1f} min, {run['peak'] / GIB:.1f} GiB"
+            # Measuring the stages resets the system's record of the largest memory.
+            peak = max([run["peak"], *run["peaks"].values()])
+            reached = run["wall"] <= 5 * MINUTE and peak <= 8 * GIB and run["stops"] == run["stops_asked"]
+            text = f"{run['wall'] / MINUTE:.1f} min, {peak / GIB:.1f} GiB"
             if run["failure"]:
                 text += f"; {run['stops']} of {run['stops_asked']} stops: {run['failure']}"
             found.append(Verdict(target, text, reached))
@@ -398,7 +400,7 @@ def _stages(results) -> str:
                     continue
                 order = ("surface", "summits", "path", "fields of the snapshot", "dataset")
                 rows = [[s, seconds(run["seconds"][s]), mib(run["peaks"][s])] for s in order if s in run["seconds"]]
-                rows.append(["whole process", seconds(run["wall"]), mib(run["peak"])])
+                rows.append(["whole process", seconds(run["wall"]), mib(max(run["peak"], *run["peaks"].values()))])
                 tables.append(table(["stage", "time", "memory"], rows))
                 counts = ", ".join(f"{count} {what}" for what, count in run["counts"].items())
                 text = (
