@@ -12,38 +12,24 @@ from scipy.spatial import cKDTree
 from icha.elasticity import periodic_difference
 
 
-def overlapping_pairs(position, a, period):
-    """Pairs of spots with r_ij < a_i + a_j.
+def overlapping_pairs(position, a, first, second, r):
+    """Of near pairs, those with r_ij < a_i + a_j.
 
     Parameters
     ----------
     position : (n, 2) centres in m.
     a : (n,) contact radii in m.
-    period : m.
+    first, second, r : (p,) near pairs, in both directions (those from the larger spot count), and distances in m.
 
     Returns
     -------
     (k, 2) array of indices, the deepest overlap a_i + a_j - r_ij first; equal depths by position, so that the order
     of the input does not matter.
     """
-    if len(a) < 2:
-        return np.empty((0, 2), dtype=int)
-    position = np.mod(position, period)
-    tree = cKDTree(position, boxsize=period)
-    # Twice its radius is as far as the larger spot of a pair needs to look.
-    found = tree.query_ball_point(position, np.minimum(2 * a * (1 + 1e-12), 0.5 * period), return_sorted=True)
-    first = np.repeat(np.arange(len(a)), [len(f) for f in found])
-    second = np.concatenate([np.asarray(f, dtype=int) for f in found])
-    keep = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
-    first, second = first[keep], second[keep]
-    r = np.hypot(*periodic_difference(position[first], position[second], period).T)
     depth = a[first] + a[second] - r
-    deep = depth > 0
-    return deepest_first(first[deep], second[deep], depth[deep], position)
-
-
-def deepest_first(first, second, depth, position):
-    """Pairs (k, 2) of spots in the order of falling depth (k,); equal depths by position (n, 2)."""
+    larger = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
+    deep = np.flatnonzero((depth > 0) & larger)
+    first, second, depth = first[deep], second[deep], depth[deep]
     involved = np.unique(np.concatenate([first, second]))
     rank = np.empty(len(position), dtype=int)
     rank[involved[np.lexsort((position[involved, 1], position[involved, 0]))]] = np.arange(len(involved))

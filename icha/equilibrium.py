@@ -23,7 +23,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.asperities import Asperities
-from icha.coalescence import covering_spot, deepest_first, disjoint_pairs, equivalent_spots
+from icha.coalescence import covering_spot, disjoint_pairs, equivalent_spots, overlapping_pairs
 from icha.elasticity import HalfSpace, Interaction, displacement_at
 from icha.jkr import JKR
 
@@ -199,10 +199,6 @@ class ContactState:
         spot = np.full(len(self.sites) + 1, -1)
         spot[self._in_contact] = np.arange(len(self._in_contact))
         return spot[self.holder]  # a holder -1 looks up the last
-
-    def same_contacts(self, other: ContactState) -> bool:
-        """Whether both states have the same spots made of the same asperities."""
-        return np.array_equal(self.owner, other.owner) and len(self.spots) == len(other.spots)
 
 
 def mean_pressure(contact: Contact, spots: Spots) -> float:
@@ -615,9 +611,8 @@ class _Search:
             touch = touch[windows.r[touch] < np.maximum(a[first[touch]], a[second[touch]])]
         if not len(touch):
             return False
-        first, second, depth = first[touch], second[touch], depth[touch]
-        once = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
-        pairs = disjoint_pairs(deepest_first(first[once], second[once], depth[once], sites.position))
+        pairs = overlapping_pairs(sites.position, a, first[touch], second[touch], windows.r[touch])
+        pairs = disjoint_pairs(pairs)
         i, j = pairs.T
         centre, radius, R = equivalent_spots(
             sites.position[i], a[i], sites.radius[i], sites.position[j], a[j], sites.radius[j], period

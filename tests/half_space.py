@@ -120,3 +120,10 @@ def spectral_displacement(centres, a, R, modulus, energy, period, grid):
     w = 2 * pressure / (modulus * q * period**2) * np.exp(-half) * sum(terms)
     w[0, 0] = 0.0
     return np.fft.irfft2(w, s=(grid, grid)) * grid**2
+
+
+def all_pairs(position, period):
+    """All ordered pairs of points and their distances in the periodic cell."""
+    first, second = np.nonzero(~np.eye(len(position), dtype=bool))
+    d = position[first] - position[second]
+    return first, second, np.hypot(*(d - period * np.rint(d / period)).T)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from half_space import all_pairs
 
 from icha import Material
 from icha.asperities import Asperities
@@ -68,18 +69,19 @@ def brute_force_pairs(position, a):
 def test_overlapping_pairs_are_all_found_deepest_first(seed):
     rng = np.random.default_rng(seed)
     position, a = rng.random((60, 2)), rng.exponential(0.03, 60)
-    pairs = [frozenset(p) for p in overlapping_pairs(position, a, PERIOD).tolist()]
+    pairs = [frozenset(p) for p in overlapping_pairs(position, a, *all_pairs(position, PERIOD)).tolist()]
     assert len(pairs) > 20
     assert pairs == brute_force_pairs(position, a)
 
 
 def test_touching_spots_do_not_overlap():
     position = np.array([[0.25, 0.5], [0.5, 0.5]])
-    assert len(overlapping_pairs(position, np.array([0.125, 0.125]), PERIOD)) == 0
-    assert len(overlapping_pairs(position, np.array([0.125, 0.12500001]), PERIOD)) == 1
+    near = all_pairs(position, PERIOD)
+    assert len(overlapping_pairs(position, np.array([0.125, 0.125]), *near)) == 0
+    assert len(overlapping_pairs(position, np.array([0.125, 0.12500001]), *near)) == 1
     # A small spot wholly inside a large one.
     inside = np.array([[0.5, 0.5], [0.51, 0.5]])
-    assert len(overlapping_pairs(inside, np.array([0.1, 0.001]), PERIOD)) == 1
+    assert len(overlapping_pairs(inside, np.array([0.1, 0.001]), *all_pairs(inside, PERIOD))) == 1
 
 
 def test_equal_depths_are_ordered_by_position_not_by_input():
@@ -88,7 +90,7 @@ def test_equal_depths_are_ordered_by_position_not_by_input():
     a = np.full(5, 0.06)
     reference = None
     for order in ([0, 1, 2, 3, 4], [4, 3, 2, 1, 0], [2, 0, 4, 1, 3]):
-        pairs = disjoint_pairs(overlapping_pairs(position[order], a, PERIOD))
+        pairs = disjoint_pairs(overlapping_pairs(position[order], a, *all_pairs(position[order], PERIOD)))
         chosen = {frozenset(order[i] for i in pair) for pair in pairs.tolist()}
         reference = reference or chosen
         assert chosen == reference
