@@ -276,3 +276,27 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
         run = run.isel(step=np.isfinite(run["nominal_pressure"].values))
         run = run.isel(snapshot=np.isfinite(run["overlap_fraction"].values))
     return run.reset_coords(list(LABELS))
+
+
+def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
+    """Position of the snapshot of a kind and target; the first one of the kind, or of all, if nothing more is said.
+
+    Raises
+    ------
+    ValueError
+        If there is none; the message lists the run's snapshots.
+    """
+    kinds = [str(value) for value in run["snapshot_kind"].values]
+    targets = run["snapshot_target"].values
+    for k, (own_kind, own_target) in enumerate(zip(kinds, targets, strict=True)):
+        if kind in (None, own_kind) and (target is None or np.isclose(own_target, target, rtol=1e-9)):
+            return k
+    there = ", ".join(f"{k} {t:g}" for k, t in zip(kinds, targets, strict=True)) or "none"
+    asked = kind or "any kind"
+    raise ValueError(f"no snapshot of {asked}{'' if target is None else f' {target:g}'}; there are: {there}")
+
+
+def spots_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
+    """The spots of one snapshot of a run."""
+    own = [name for name, variable in run.variables.items() if variable.dims == ("spot",)]
+    return run[own].isel(spot=np.flatnonzero(run["spot_snapshot"].values == snapshot))

@@ -65,13 +65,20 @@ def contact_cover(surface: Surface, spots: Spots, every: int = 1) -> np.ndarray:
     around every so-manieth node.
     """
     grid = _coarse_grid(surface, every)
-    return np.concatenate(on_cores(lambda rows: _cover(surface.period, grid, spots, rows)[0], row_blocks(grid)))
+    centres, radii = spots.position, spots.contact_radius
+    parts = on_cores(lambda rows: _cover(surface.period, grid, centres, radii, rows)[0], row_blocks(grid))
+    return np.concatenate(parts)
 
 
 def covered_nodes(surface: Surface, spots: Spots) -> np.ndarray:
     """Whether each node lies inside a spot, (n, n) of bool."""
-    grid = surface.grid
-    return np.concatenate(on_cores(lambda rows: _cover(surface.period, grid, spots, rows)[1], row_blocks(grid)))
+    return nodes_in_discs(surface.period, surface.grid, spots.position, spots.contact_radius)
+
+
+def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Whether each node of a periodic grid, (n, n) of bool, lies inside a disc: centres (m, 2) and radii (m,) in m."""
+    parts = on_cores(lambda rows: _cover(period, grid, centres, radii, rows)[1], row_blocks(grid))
+    return np.concatenate(parts)
 
 
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDistribution:
@@ -93,7 +100,7 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDist
 
     def nodes_per_bin(rows, w):
         u = w + (state.separation - surface.heights[rows])
-        cover, inside = _cover(surface.period, surface.grid, spots, rows)
+        cover, inside = _cover(surface.period, surface.grid, spots.position, spots.contact_radius, rows)
         u[inside] = 0.0
         # The first place is for the overlap.
         place = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
@@ -152,18 +159,18 @@ def _coarse_grid(surface, every):
     return surface.grid // every
 
 
-def _cover(period, grid, spots, rows):
+def _cover(period, grid, centres, radii, rows):
     """Of a range of rows: the fraction of every cell in contact, and whether the node lies inside a spot."""
     spacing = period / grid
     cover = np.zeros((rows.stop - rows.start) * grid)
     inside = np.zeros(len(cover), dtype=bool)
-    # Spots of like size share the width of their windows, a power of two of cells.
-    width = 2 ** np.ceil(np.log2(spots.contact_radius / spacing + 2)).astype(int)
+    # Discs of like size share the width of their windows, a power of two of cells.
+    width = 2 ** np.ceil(np.log2(radii / spacing + 2)).astype(int)
     for cells in np.unique(width):
-        same = np.flatnonzero((width == cells) & (spots.contact_radius > 0))
-        centres, radii = spots.position[same], spots.contact_radius[same]
-        for window in windows(centres, (cells - 1) * spacing, grid, period, rows):
-            a = radii[window.spot][:, None]
+        same = np.flatnonzero((width == cells) & (radii > 0))
+        own = radii[same]
+        for window in windows(centres[same], (cells - 1) * spacing, grid, period, rows):
+            a = own[window.spot][:, None]
             left = np.concatenate([window.dx - 0.5 * spacing, window.dx[:, -1:] + 0.5 * spacing], axis=1)
             below = [_disc_below(left, (window.dy + side * spacing)[:, None], a) for side in (-0.5, 0.5)]
             np.add.at(cover, window.node.ravel(), np.diff(below[1] - below[0], axis=1).ravel() / spacing**2)

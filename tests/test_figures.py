@@ -6,7 +6,7 @@ import pytest
 import small_campaign as small
 
 import icha
-from icha.campaign import RunLabels, campaign_tree
+from icha.campaign import RunLabels, campaign_tree, find_snapshot
 from icha.figures import (
     fig1_jkr,
     fig2_area_and_gap,
@@ -18,7 +18,7 @@ from icha.figures import (
     fig8_patch_sizes,
     fig9_tabor,
 )
-from icha.figures.select import find_snapshot, path_steps
+from icha.figures.select import path_steps
 from icha.figures.spots import periodic_circles
 from icha.figures.style import material_label, number, quantity, save, unit_for
 from icha.records import read_dataset, write_surface

@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.select import find_snapshot, pick, spots_of, study_runs
+from icha.campaign import find_snapshot, spots_of
+from icha.figures.select import pick, study_runs
 from icha.figures.spots import draw_spots, periodic_circles
 from icha.figures.style import TWO_COLUMNS, new_figure, number, panel_label, styled, unit_for
 

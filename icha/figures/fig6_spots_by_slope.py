@@ -7,7 +7,8 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Wedge
 
-from icha.figures.select import find_snapshot, pick, spots_of, study_runs
+from icha.campaign import find_snapshot, spots_of
+from icha.figures.select import pick, study_runs
 from icha.figures.spots import draw_spots, periodic_circles
 from icha.figures.style import (
     BLUE,

@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.select import first_line_runs, snapshot_label, spots_of
+from icha.campaign import spots_of
+from icha.figures.select import first_line_runs, snapshot_label
 from icha.figures.style import TWO_COLUMNS, line_look, material_label, new_figure, panel_label, styled, unit_for
 
 CAPTION = (

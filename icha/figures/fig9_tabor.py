@@ -6,8 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from icha.campaign import find_snapshot
 from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL
-from icha.figures.select import find_snapshot, snapshot_label, study_runs
+from icha.figures.select import snapshot_label, study_runs
 from icha.figures.style import COLOURS, GREY, MARKERS, TWO_COLUMNS, new_figure, panel_label, quantity, styled
 from icha.simulation import WU_RANGE
 

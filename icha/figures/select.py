@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import xarray as xr
 
-from icha.campaign import RunLabels, run_labels, select_run
+from icha.campaign import RunLabels, find_snapshot, run_labels, select_run
 from icha.figures.style import number
 
 
@@ -47,24 +46,6 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
     return run.isel(step=[kind == main for kind in kinds])
 
 
-def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
-    """Position of the snapshot of a kind and target; the first one of the kind, or of all, if nothing more is said.
-
-    Raises
-    ------
-    ValueError
-        If there is none; the message lists the run's snapshots.
-    """
-    kinds = [str(value) for value in run["snapshot_kind"].values]
-    targets = run["snapshot_target"].values
-    for k, (own_kind, own_target) in enumerate(zip(kinds, targets, strict=True)):
-        if kind in (None, own_kind) and (target is None or np.isclose(own_target, target, rtol=1e-9)):
-            return k
-    there = ", ".join(f"{k} {t:g}" for k, t in zip(kinds, targets, strict=True)) or "none"
-    asked = kind or "any kind"
-    raise ValueError(f"no snapshot of {asked}{'' if target is None else f' {target:g}'}; there are: {there}")
-
-
 def first_line_runs(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[tuple[RunLabels, xr.Dataset, int]]:
@@ -96,9 +77,3 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     """At which load, area or separation a snapshot was taken, for figures."""
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
     return f"{_KIND_LABELS[kind]} = {number(value)}"
-
-
-def spots_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
-    """The spots of one snapshot of a run."""
-    own = [name for name, variable in run.variables.items() if variable.dims == ("spot",)]
-    return run[own].isel(spot=np.flatnonzero(run["spot_snapshot"].values == snapshot))
