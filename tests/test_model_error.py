@@ -1,0 +1,244 @@
+"""The error is nothing for a state compared with itself, and the exact number for one changed by a known amount."""
+
+import itertools
+
+import numpy as np
+import pytest
+import small_campaign as small
+import xarray as xr
+
+import icha
+from icha.campaign import RunLabels, campaign_tree, find_snapshot
+from icha.labels import SolutionLabels
+from icha.model_error import (
+    SHARED,
+    SUMMARISED,
+    compare_state,
+    contact_of_spots,
+    gap_distribution_distance,
+    jaccard,
+    model_error,
+    pressure_distribution_distance,
+    shared,
+    state_of,
+)
+from icha.observables import GAP_BINS, PRESSURE_BINS
+from icha.records import read_campaign, write_dataset
+from icha.reference.boundary_elements import boundary_elements
+
+PRESSURES = (3e-3, 1e-2)
+GRID = 96
+
+
+def run(seed=1, material="soft"):
+    path = icha.Path(reduced_pressures=PRESSURES, snapshots=[("reduced_pressure", p) for p in PRESSURES], max_step=0.2)
+    return icha.simulate(small.surface(seed), small.MATERIALS[material], path, seed=seed)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {
+        RunLabels("one", "rough", seed, 1.0, material): run(seed, material)
+        for seed, material in itertools.product((1, 2, 3), ("soft", "hertz"))
+    }
+
+
+@pytest.fixture(scope="module")
+def campaign(runs):
+    return campaign_tree(list(runs.items()))
+
+
+def own_solution(run, pressure, *, area=1.0, separation=1.0):
+    """A solution made of the run's own state, with area and separation multiplied by known factors."""
+    at = find_snapshot(run, "reduced_pressure", pressure)
+    state = state_of(run, at)
+    contact = contact_of_spots(run, at, GRID)
+    kept = "gap_density gap_bin_edges pressure_density pressure_bin_mean pressure_bin_edges"
+    return state[[*kept.split(), "seed", *SHARED]].assign(
+        contact=(("y", "x"), contact.astype(np.int8)),
+        contact_area_fraction=state["contact_area_fraction"] * area,
+        contact_area_fraction_raw=contact.mean(),
+        reduced_separation=state["reduced_separation"] * separation,
+        target_reduced_pressure=pressure,
+        load_error=1e-5,
+        residual=1e-9,
+        grid=GRID,
+    )
+
+
+def solutions(runs, entry="truth", **factors):
+    return [
+        (SolutionLabels(entry, *labels, pressure), own_solution(run, pressure, **factors))
+        for labels, run in runs.items()
+        for pressure in PRESSURES
+    ]
+
+
+def test_a_state_is_no_distance_from_itself(campaign, runs):
+    errors = model_error(campaign, solutions(runs))["truth"]
+    for name in ("area_error", "separation_error", "gap_distribution_distance", "pressure_distribution_distance"):
+        np.testing.assert_allclose(errors[name].values, 0, atol=1e-12)
+    for name in ("jaccard", "shared_of_icha", "shared_of_boundary_elements"):
+        np.testing.assert_array_equal(errors[name].values, 1)
+    assert errors["area_error"].dims == ("surface", "seed", "rms_slope", "material", "reduced_pressure")
+    assert errors["area_error"].shape == (1, 3, 1, 2, 2)
+
+
+def test_relative_errors_are_those_put_in(campaign, runs):
+    errors = model_error(campaign, solutions(runs, area=1.25, separation=0.8))["truth"]
+    np.testing.assert_allclose(errors["area_error"].values, 1 / 1.25 - 1, rtol=1e-12)
+    np.testing.assert_allclose(errors["separation_error"].values, 1 / 0.8 - 1, rtol=1e-12)
+    run = runs["one", "rough", 2, 1.0, "hertz"]
+    at = find_snapshot(run, "reduced_pressure", 1e-2)
+    place = {"surface": "rough", "seed": 2, "rms_slope": 1.0, "material": "hertz", "reduced_pressure": 1e-2}
+    state = errors.to_dataset().sel(place)
+    assert float(state["contact_area_fraction"]) == float(state_of(run, at)["contact_area_fraction"])
+    edges = np.diff(state["pressure_bin_edges"].values)
+    area = float(state["contact_area_fraction"])
+    assert float(np.sum(state["pressure_density"].values * edges)) == pytest.approx(area, rel=1e-9)
+
+
+def test_scatter_over_the_seeds(campaign, runs):
+    factor = {1: 1.1, 2: 1.2, 3: 1.6}
+    pairs = [
+        (SolutionLabels("truth", *labels, p), own_solution(run, p, area=factor[labels.seed]))
+        for labels, run in runs.items()
+        for p in PRESSURES
+    ]
+    errors = model_error(campaign, reversed(pairs))["truth"]
+    expected = np.array([1 / 1.1, 1 / 1.2, 1 / 1.6]) - 1
+    np.testing.assert_allclose(errors["area_error_mean"].values, expected.mean(), rtol=1e-12)
+    deviation = np.sqrt(np.sum((expected - expected.mean()) ** 2) / 2)
+    np.testing.assert_allclose(errors["area_error_deviation"].values, deviation, rtol=1e-12)
+    single = model_error(campaign, [pair for pair in pairs if pair[0].seed == 2])["truth"]
+    np.testing.assert_allclose(single["area_error_mean"].values, 1 / 1.2 - 1, rtol=1e-12)
+    assert not [f"{name}_deviation" for name in SUMMARISED if f"{name}_deviation" in single]
+
+
+def distribution(gaps=(), pressures=(), rms_height=2e-6, unit=5e6):
+    """A state whose area lies in single bins: pairs of bin and part of the nominal area."""
+    gap, pressure, mean = (
+        np.zeros(len(GAP_BINS) - 1),
+        np.zeros(len(PRESSURE_BINS) - 1),
+        np.zeros(len(PRESSURE_BINS) - 1),
+    )
+    for k, part in gaps:
+        gap[k] = part / (np.diff(GAP_BINS)[k] * rms_height)
+    for k, part, value in pressures:
+        pressure[k], mean[k] = part / (np.diff(PRESSURE_BINS)[k] * unit), value
+    return xr.Dataset(
+        {
+            "gap_density": ("gap_bin", gap),
+            "gap_bin_edges": ("gap_edge", GAP_BINS * rms_height),
+            "pressure_density": ("pressure_bin", pressure),
+            "pressure_bin_mean": ("pressure_bin", mean),
+            "pressure_bin_edges": ("pressure_edge", PRESSURE_BINS * unit),
+        }
+    )
+
+
+def test_distances_of_shifted_peaks_are_exact():
+    # All area in one bin of the gap each: what must be moved is all of it, from centre to centre.
+    centre = np.sqrt(GAP_BINS[1:] * GAP_BINS[:-1]) * 2e-6
+    one, other = distribution(gaps=[(50, 1.0)]), distribution(gaps=[(70, 1.0)])
+    assert gap_distribution_distance(one, other) == pytest.approx(centre[70] - centre[50], rel=1e-12)
+    # A tenth in contact more: it goes from the bin to gap zero.
+    other = distribution(gaps=[(50, 0.9)])
+    assert gap_distribution_distance(one, other) == pytest.approx(0.1 * centre[50], rel=1e-9)
+    # 2 % at 3 MPa and 1 % at 6 MPa carry the same: half of the area comes from zero, half goes on by 3 MPa.
+    one, other = distribution(pressures=[(200, 0.02, 3e6)]), distribution(pressures=[(230, 0.01, 6e6)])
+    assert pressure_distribution_distance(one, other) == pytest.approx(0.01 * 3e6 + 0.01 * 3e6, rel=1e-9)
+    assert pressure_distribution_distance(one, other) == pressure_distribution_distance(other, one)
+    # Tension counts as any other pressure.
+    other = distribution(pressures=[(200, 0.02, 3e6), (150, 0.01, -2e6)])
+    assert pressure_distribution_distance(one, other) == pytest.approx(0.01 * 2e6, rel=1e-9)
+
+
+def test_overlap_of_maps():
+    one, other, empty = np.zeros((3, 4, 4), bool)
+    one[0, :3], other[0, 1:] = True, True
+    assert jaccard(one, other) == jaccard(other, one) == 0.5
+    other[1] = True
+    assert shared(one, other) == pytest.approx(2 / 3) and shared(other, one) == pytest.approx(2 / 7)
+    assert jaccard(empty, empty) == 1 and jaccard(one, empty) == 0
+    assert shared(empty, one) == 1 and shared(one, empty) == 0
+
+
+def test_spots_lie_where_boundary_elements_find_contact(runs):
+    """A map that is mirrored, transposed or shifted by a few cells shares next to nothing with the solution."""
+    run = runs["one", "rough", 1, 1.0, "hertz"]
+    solution = boundary_elements(small.surface(), small.MATERIALS["hertz"], 3e-3, refinement=2, seed=1)
+    compared = compare_state(run, 0, solution)
+    assert compared["jaccard"] > 0.5
+    spots = contact_of_spots(run, 0, solution.sizes["x"])
+    contact = solution["contact"].values == 1
+    assert compared["jaccard"] == jaccard(spots, contact)
+    for other in (contact.T, contact[::-1], contact[:, ::-1], np.roll(contact, 8, 0), np.roll(contact, 8, 1)):
+        assert jaccard(spots, other) < 0.3
+    # Both carry the same load: less contact is at higher pressure, so the distance is at least the areas' difference
+    # times the lowest pressure, and it is less than twice the mean pressure in any case.
+    assert 0 < compared["pressure_distribution_distance"] < 2
+    assert abs(compared["area_error"]) < 0.3 and abs(compared["separation_error"]) < 0.1
+
+
+def test_several_entries_and_a_part_of_a_study(campaign, runs, tmp_path):
+    adhesionless = {labels: run for labels, run in runs.items() if labels.material == "hertz"}
+    soft = {labels: run for labels, run in runs.items() if labels.material == "soft" and labels.seed == 3}
+    errors = model_error(
+        campaign, [*solutions(soft, "adhesive"), *solutions(adhesionless, "bare")], attrs={"license": "CC0-1.0"}
+    )
+    assert list(errors.children) == ["adhesive", "bare"] and errors.attrs["license"] == "CC0-1.0"
+    assert errors["bare"]["material"].values.tolist() == ["hertz"]
+    assert errors["adhesive"]["seed"].values.tolist() == [3] and errors["adhesive"].attrs["study"] == "one"
+    assert float(errors["bare"]["surface_energy"].sel(material="hertz")) == 0
+    for name in ("a.nc", "b.nc"):
+        write_dataset(errors, tmp_path / name)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+    read = read_campaign(tmp_path / "a.nc")
+    np.testing.assert_array_equal(read["bare"]["jaccard"].values, errors["bare"]["jaccard"].values)
+    for variable in errors["bare"].to_dataset().variables.values():
+        assert "units" in variable.attrs and "long_name" in variable.attrs
+
+
+STATE = r"entry truth, run one/rough/seed1/slope1/soft, reduced pressure 0\.003: "
+
+
+@pytest.mark.parametrize("name", SHARED)
+def test_another_contact_is_refused(campaign, runs, name):
+    labels = RunLabels("one", "rough", 1, 1.0, "soft")
+    solution = own_solution(runs[labels], 3e-3)
+    changed = solution.assign({name: solution[name] * 1.001})
+    with pytest.raises(ValueError, match=STATE + name):
+        model_error(campaign, [(SolutionLabels("truth", *labels, 3e-3), changed)])
+
+
+def test_what_cannot_be_compared_is_named(campaign, runs):
+    labels = RunLabels("one", "rough", 1, 1.0, "soft")
+    place = SolutionLabels("truth", *labels, 3e-3)
+    solution = own_solution(runs[labels], 3e-3)
+    with pytest.raises(ValueError, match=STATE + "seed is 1 for the run, 2 for the solution"):
+        model_error(campaign, [(place, solution.assign(seed=2))])
+    with pytest.raises(ValueError, match=STATE + r"the solution is one of reduced pressure 0\.01"):
+        model_error(campaign, [(place, own_solution(runs[labels], 1e-2))])
+    with pytest.raises(ValueError, match=r"reduced pressure 0\.02: no snapshot of reduced_pressure 0\.02; there are"):
+        model_error(campaign, [(place._replace(reduced_pressure=0.02), solution)])
+    with pytest.raises(ValueError, match=r"run one/rough/seed9/slope1/soft.*no seed 9"):
+        model_error(campaign, [(place._replace(seed=9), solution)])
+    with pytest.raises(ValueError, match=STATE + "this solution is given twice"):
+        model_error(campaign, [(place, solution)] * 2)
+    with pytest.raises(ValueError, match=STATE + "boundary elements have a contact area of 0"):
+        model_error(campaign, [(place, own_solution(runs[labels], 3e-3, area=0.0))])
+    with pytest.raises(ValueError, match=r"entry truth, run .*/hertz, reduced pressure 0\.01: no solution"):
+        model_error(campaign, solutions(runs)[:-1])
+    with pytest.raises(ValueError, match="at least one"):
+        model_error(campaign, [])
+
+
+def test_runs_that_ended_early_are_not_compared(runs):
+    labels = RunLabels("one", "rough", 1, 1.0, "soft")
+    short = runs[labels].isel(step=slice(0, 1), snapshot=slice(0, 1))
+    short = short.isel(spot=np.flatnonzero(short["spot_snapshot"].values == 0))
+    members = [(labels, short), *((key, run) for key, run in runs.items() if key != labels)]
+    tree = campaign_tree(members, allow_missing=True)
+    with pytest.raises(ValueError, match=STATE + "this run is incomplete"):
+        model_error(tree, [(SolutionLabels("truth", *labels, 3e-3), own_solution(short, 3e-3))])
