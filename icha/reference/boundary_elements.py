@@ -6,12 +6,19 @@ Polonsky and L. M. Keer, Wear 231 (1999) 206, doi:10.1016/S0043-1648(99)00113-1)
 mean gap (V. Rey, G. Anciaux and J.-F. Molinari, Comput. Mech. 60 (2017) 69, doi:10.1007/s00466-017-1392-5), the
 traction being (dgamma/rho) exp(-u/rho) outside a hard wall. Its load control ends in other states when there is
 adhesion, and calls them converged; so the mean gap that carries a given load is searched for.
+
+Contact is where the gap is zero. Around it a cohesive zone pulls, of which the law of Johnson, Kendall and Roberts
+knows the energy alone: there energy falls by dgamma times the contact area. The area with which that holds at a finite
+range is the derivative of the energy to the surface energy at fixed mean gap, the integral of exp(-u/rho) over the
+surface, here the energetic area. It is larger than the area of zero gap, and both tend to JKR's as the range vanishes,
+the energetic one much sooner.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
@@ -54,6 +61,7 @@ VARIABLES = {
     "reduced_separation": ((), "1", "mean gap over rms height"),
     "contact_area_fraction": ((), "1", "real over nominal contact area, A/A0, corrected by the contact's perimeter"),
     "contact_area_fraction_raw": ((), "1", "fraction of the nodes in contact"),
+    "energetic_area_fraction": ((), "1", "energy of adhesion over that of full contact; the raw area without adhesion"),
     "contact_perimeter": ((), "m", "edges between nodes in contact and out of contact, of one cell of the surface"),
     "outside_pressure": ((), "Pa", "mean over the nominal area of the traction outside the contact"),
     "residual": ((), "1", "error of the solver: its criterion of convergence"),
@@ -90,6 +98,44 @@ class NotSolved(RuntimeError):
     """The boundary elements did not converge, or no mean gap carries the load; the message says which."""
 
 
+@dataclass(frozen=True, eq=False)
+class NodalState:
+    """A contact at the nodes of its grid.
+
+    surface : on the grid of the solution. gap, m, and traction, Pa, positive in compression, and contact, whether the
+    gap is zero: (n, n). residual : the solver's criterion of convergence, a relative error. solves : that it took.
+    """
+
+    surface: Surface
+    gap: np.ndarray
+    traction: np.ndarray
+    contact: np.ndarray
+    residual: float
+    solves: int = 1
+
+    @property
+    def mean_separation(self) -> float:
+        """Mean gap, m."""
+        return float(self.gap.mean())
+
+    @property
+    def nominal_pressure(self) -> float:
+        """Mean traction over the nominal area, attraction included, Pa."""
+        return float(self.traction.mean())
+
+    @property
+    def outside_pressure(self) -> float:
+        """Part of the nominal pressure that acts outside the contact, at most zero, Pa."""
+        return float(self.traction[~self.contact].sum()) / self.contact.size
+
+    def energetic_area_fraction(self, material: Material) -> float:
+        """Energy of adhesion over that of full contact: the mean of exp(-u/rho), 1 in contact."""
+        raw = np.count_nonzero(self.contact) / self.contact.size
+        if material.surface_energy == 0:
+            return raw
+        return raw - self.outside_pressure * material.interaction_range / material.surface_energy
+
+
 def boundary_elements(
     surface: Surface,
     material: Material,
@@ -123,89 +169,168 @@ def boundary_elements(
     NotSolved
         If the solver does not reach its tolerance, or no mean gap is found that carries the load.
     """
-    target = positive("reduced_pressure", reduced_pressure)
-    tolerance = positive("tolerance", tolerance)
+    state = contact_state(
+        surface, material, reduced_pressure, refinement=refinement, tolerance=tolerance, progress=progress
+    )
+    return _dataset(surface, material, state, reduced_pressure, tolerance, seed)
+
+
+def contact_state(
+    surface: Surface,
+    material: Material,
+    reduced_pressure: float,
+    *,
+    refinement: int = 1,
+    tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable[[str], None] | None = None,
+) -> NodalState:
+    """The state of which `boundary_elements` makes a dataset, node by node; arguments and errors are the same."""
+    target = positive("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
+    say = progress or _silent
+    fine = _resolved(surface, material, refinement, say)
+    state = _without_adhesion(fine, material, target, positive("tolerance", tolerance))
+    if material.surface_energy == 0:
+        return state
+    return _carrying(_AdhesiveContact(fine, material, tolerance, state.gap), target, state.mean_separation, say)
+
+
+def states_at_mean_separations(
+    surface: Surface,
+    material: Material,
+    mean_separations: Iterable[float],
+    *,
+    refinement: int = 1,
+    tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable[[str], None] | None = None,
+) -> Iterator[NodalState]:
+    """States of an adhesive contact at given mean gaps, in tension or compression, each from the last.
+
+    Parameters
+    ----------
+    mean_separations : m, positive, in any order: up and down show hysteresis.
+    surface, material, refinement, tolerance, progress : as for `boundary_elements`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range, the material has no adhesion, or the grid does not resolve it.
+    NotSolved
+        If the solver does not reach its tolerance.
+    """
+    if material.surface_energy == 0:
+        raise ValueError("surface_energy: 0; without adhesion the load is given, not the mean gap")
+    fine = _resolved(surface, material, refinement, progress or _silent)
+    separations = [positive("mean_separations", separation, "m") for separation in mean_separations]
+    contact = _AdhesiveContact(fine, material, positive("tolerance", tolerance))
+    return (contact.at(separation) for separation in separations)
+
+
+def _silent(line):
+    pass
+
+
+def _resolved(surface, material, refinement, say):
+    """The surface on the solution's grid, which has to resolve the attraction."""
     fine = surface.refined(integer("refinement", refinement, 1))
-    say = progress or (lambda line: None)
-    adhesive = material.surface_energy > 0
-    say(
-        f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
-        + (
+    numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
+    if material.surface_energy > 0:
+        numbers += (
             f"; with adhesion at most {longest_spacing(material):.4g} m; sqrt(dgamma dx/E*)/range = "
             f"{strength_number(material, fine.spacing):.3g}"
-            if adhesive
-            else ""
         )
-    )
+    say(numbers)
     if problem := resolution_problem(material, fine.spacing):
         raise ValueError(f"interaction_range: {problem}")
-
-    # Lengths in h_rms, pressures in E*. One thread: sums keep their order, and results their bytes.
-    tamaas.initialize(1)
-    height = surface.rms_height
-    pressure = target * surface.rms_slope
-    with tamaas.utils.log_context(tamaas.LogLevel.error):
-        state = _without_adhesion(fine, height, pressure, tolerance)
-        if adhesive:
-            state = _with_adhesion(fine, height, material, pressure, tolerance, state[0].mean(), say)
-    gap, traction, contact, residual, solves = state
-    return _dataset(surface, fine, material, target, tolerance, seed, (gap, traction, contact, residual, solves))
+    return fine
 
 
-def _model(fine, height):
-    """A half-space of E* = 1 below the nodes, and the heights of these."""
-    model = tamaas.Model(tamaas.model_type.basic_2d, [fine.period / height] * 2, [fine.grid] * 2)
-    model.E, model.nu = 1.0, 0.0
-    return model, fine.heights / height
+class _Solver:
+    """Tamaas on one surface, in its own units: lengths in h_rms, pressures in E*.
+
+    variable: what is minimised over and whose mean is given, tamaas.PolonskyKeerRey.pressure or .gap.
+    """
+
+    def __init__(self, fine, variable, tolerance):
+        # One thread: sums keep their order, and results their bytes.
+        tamaas.initialize(1)
+        self.tolerance = tolerance
+        self.unit = fine.rms_height
+        self.model = tamaas.Model(tamaas.model_type.basic_2d, [fine.period / self.unit] * 2, [fine.grid] * 2)
+        self.model.E, self.model.nu = 1.0, 0.0
+        self.heights = fine.heights / self.unit
+        self.solver = tamaas.PolonskyKeerRey(self.model, self.heights, tolerance, variable, variable)
+        self.solver.max_iter = _MAX_ITERATIONS
+
+    def solve(self, mean):
+        """Solve for a mean pressure or gap; the error reached."""
+        try:
+            with tamaas.utils.log_context(tamaas.LogLevel.error):
+                residual = self.solver.solve(mean)
+        except tamaas.FloatingPointError as error:
+            raise NotSolved(f"boundary elements: {error}") from None
+        if not residual <= self.tolerance:
+            raise NotSolved(f"boundary elements did not converge: error {residual:.3g}, tolerance {self.tolerance:g}")
+        return residual
 
 
-def _solver(model, heights, tolerance, variable):
-    solver = tamaas.PolonskyKeerRey(model, heights, tolerance, variable, variable)
-    solver.max_iter = _MAX_ITERATIONS
-    return solver
-
-
-def _solve(solver, stop, tolerance):
-    residual = solver.solve(stop)
-    if not residual <= tolerance:
-        raise NotSolved(f"boundary elements did not converge: error {residual:.3g}, tolerance {tolerance:g}")
-    return residual
-
-
-def _without_adhesion(fine, height, pressure, tolerance):
-    model, heights = _model(fine, height)
-    solver = _solver(model, heights, tolerance, tamaas.PolonskyKeerRey.pressure)
-    residual = _solve(solver, pressure, tolerance)
-    traction = np.array(model.traction)
+def _without_adhesion(fine, material, pressure, tolerance):
+    """The state at a given mean pressure, Pa."""
+    solver = _Solver(fine, tamaas.PolonskyKeerRey.pressure, tolerance)
+    residual = solver.solve(pressure / material.contact_modulus)
+    traction = np.array(solver.model.traction)
     contact = traction > 0
-    gap = np.asarray(model.displacement) - heights
+    gap = solver.model.displacement - solver.heights
     # The displacement is known up to a constant.
     gap -= gap[contact].mean()
-    return gap, traction, contact, residual, 1
+    return NodalState(fine, gap * solver.unit, traction * material.contact_modulus, contact, residual)
 
 
-def _with_adhesion(fine, height, material, pressure, tolerance, mean_gap, say):
-    """Search for the mean gap of a given mean traction, from the one without adhesion."""
-    model, heights = _model(fine, height)
-    solver = _solver(model, heights, tolerance, tamaas.PolonskyKeerRey.gap)
-    attraction = tamaas.ExponentialAdhesionFunctional(heights)
-    attraction.parameters = {
-        "rho": material.interaction_range / height,
-        "surface_energy": material.adhesion_length / height,
-    }
-    solver.addFunctionalTerm(attraction)
+class _AdhesiveContact:
+    """States with adhesion at given mean gaps; every solution starts from the last, the first from `gap` (m)."""
+
+    def __init__(self, fine, material, tolerance, gap=None):
+        self.fine, self.material = fine, material
+        self.solver = _Solver(fine, tamaas.PolonskyKeerRey.gap, tolerance)
+        unit = self.solver.unit
+        # Tamaas keeps a reference only.
+        self.attraction = tamaas.ExponentialAdhesionFunctional(self.solver.heights)
+        self.attraction.parameters = {
+            "rho": material.interaction_range / unit,
+            "surface_energy": material.adhesion_length / unit,
+        }
+        self.solver.solver.addFunctionalTerm(self.attraction)
+        if gap is not None:
+            self.solver.model["gap"][:] = np.maximum(gap, 0.0) / unit
+        self.solves = 0
+
+    def at(self, separation):
+        """The state at a mean gap, m."""
+        unit, model = self.solver.unit, self.solver.model
+        residual = self.solver.solve(separation / unit)
+        self.solves += 1
+        gap, traction = np.array(model["gap"]), np.array(model.traction)
+        return NodalState(
+            self.fine, gap * unit, traction * self.material.contact_modulus, gap <= 0, residual, self.solves
+        )
+
+
+def _carrying(contact, pressure, separation, say):
+    """Search for the mean gap at which the mean traction is `pressure` (Pa), from a first guess (m)."""
+    unit = contact.fine.rms_height
     tried: list[tuple[float, float]] = []
+    mean_gap = separation / unit
     while len(tried) < _MAX_SOLVES:
-        residual = _solve(solver, mean_gap, tolerance)
-        traction = np.array(model.traction)
-        error = float(traction.mean()) / pressure - 1
+        state = contact.at(mean_gap * unit)
+        error = state.nominal_pressure / pressure - 1
         tried.append((mean_gap, error))
-        say(f"mean gap {mean_gap:.8g} h_rms: load {1 + error:.6g} of the one asked for, error {residual:.2g}")
+        say(f"mean gap {mean_gap:.8g} h_rms: load {1 + error:.6g} of the one asked for, error {state.residual:.2g}")
         if abs(error) <= LOAD_TOLERANCE:
-            gap = np.array(model["gap"])
-            return gap, traction, gap <= 0, residual, len(tried)
+            return state
         mean_gap = _next_gap(tried)
-    raise NotSolved(f"no mean gap was found that carries the load: {len(tried)} tries, the last off by {error:.3g}")
+    raise NotSolved(
+        f"no mean gap was found that carries the load: {len(tried)} tries, the last at {tried[-1][0]:.8g} h_rms with "
+        f"{1 + tried[-1][1]:.6g} of it; nearest {min(abs(e) for _, e in tried):.2g} off, allowed {LOAD_TOLERANCE:g}"
+    )
 
 
 def _next_gap(tried):
@@ -235,35 +360,34 @@ def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
     return (np.count_nonzero(contact) - (math.pi - 1 + math.log(2)) / 24 * edges) / contact.size, float(edges)
 
 
-def _dataset(surface, fine, material, target, tolerance, seed, state):
-    gap, traction, contact, residual, solves = state
-    height, modulus = surface.rms_height, material.contact_modulus
+def _dataset(surface, material, state, target, tolerance, seed):
+    fine, gap, contact = state.surface, state.gap, state.contact
+    height, unit = surface.rms_height, material.contact_modulus * surface.rms_slope
     area, edges = perimeter_correction(contact)
     nodes = contact.size
     adhesive = material.surface_energy > 0
-    gaps, _ = np.histogram(np.maximum(gap[~contact], 0.0), GAP_BINS)
-    # Pressures in units of E* h'_rms.
-    inside = traction[contact] / surface.rms_slope
+    gaps, _ = np.histogram(np.maximum(gap[~contact], 0.0) / height, GAP_BINS)
+    inside = state.traction[contact] / unit
     count, _ = np.histogram(inside, PRESSURE_BINS)
     load, _ = np.histogram(inside, PRESSURE_BINS, weights=inside)
     if gaps.sum() + count.sum() != nodes:
         raise NotSolved("gaps or pressures lie beyond the bins of their distributions")
-    unit = modulus * surface.rms_slope
-    mean = float(traction.mean())
+    pressure = state.nominal_pressure
     values = {
-        "mean_separation": gap.mean() * height,
-        "nominal_pressure": mean * modulus,
-        "reduced_pressure": mean / surface.rms_slope,
+        "mean_separation": state.mean_separation,
+        "nominal_pressure": pressure,
+        "reduced_pressure": pressure / unit,
         "target_reduced_pressure": target,
-        "load_error": mean / (target * surface.rms_slope) - 1,
-        "reduced_separation": gap.mean(),
+        "load_error": pressure / unit / target - 1,
+        "reduced_separation": state.mean_separation / height,
         "contact_area_fraction": area,
         "contact_area_fraction_raw": np.count_nonzero(contact) / nodes,
+        "energetic_area_fraction": state.energetic_area_fraction(material),
         "contact_perimeter": edges * fine.spacing,
-        "outside_pressure": traction[~contact].sum() / nodes * modulus,
-        "residual": residual,
+        "outside_pressure": state.outside_pressure,
+        "residual": state.residual,
         "tolerance": tolerance,
-        "solve_count": solves,
+        "solve_count": state.solves,
         "refinement": fine.grid // surface.grid,
         "grid": fine.grid,
         "spacing": fine.spacing,
@@ -275,7 +399,7 @@ def _dataset(surface, fine, material, target, tolerance, seed, state):
         "pressure_bin_mean": np.divide(load, count, out=np.zeros(len(load)), where=count > 0) * unit,
         "pressure_bin_edges": PRESSURE_BINS * unit,
         "contact": contact.astype(np.int8),
-        "contact_modulus": modulus,
+        "contact_modulus": material.contact_modulus,
         "surface_energy": material.surface_energy,
         "interaction_range": material.interaction_range,
         "rms_slope": surface.rms_slope,
