@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from icha.files import whole_file
+from icha.roughness import SpectralMoments, spectral_moments
 from icha.surface import Surface
 
 # Smaller arrays gain nothing from compression. Larger ones are heights: a fifth less space would take half a minute
@@ -151,6 +152,7 @@ def write_surface(
     def variable(dims, value, units, long_name):
         return xr.Variable(dims, value, {"units": units, "long_name": long_name})
 
+    moments = spectral_moments(surface)
     variables = {
         "height": variable(("y", "x"), surface.heights, "m", "height towards the elastic body"),
         "period": variable((), surface.period, "m", "side of the periodic cell"),
@@ -159,6 +161,10 @@ def write_surface(
         "rms_slope": variable((), surface.rms_slope, "1", "root mean square slope, from the spectrum"),
         "rms_height": variable((), surface.rms_height, "m", "root mean square height"),
         "rms_curvature": variable((), surface.rms_curvature, "m-1", "root mean square curvature of a profile"),
+        "spectral_moment_0": variable((), moments.m0, "m2", "variance of a profile's height"),
+        "spectral_moment_2": variable((), moments.m2, "1", "variance of a profile's slope"),
+        "spectral_moment_4": variable((), moments.m4, "m-2", "variance of a profile's curvature"),
+        "nayak_parameter": variable((), moments.nayak_parameter, "1", "Nayak's parameter m0 m4/m2^2"),
     }
     if spectrum is not None:
         variables |= {
@@ -193,3 +199,22 @@ def read_surface(path: str | os.PathLike) -> Surface:
         return Surface(dataset["height"].transpose("y", "x").values, float(dataset["period"]))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
+    """Read the spectral moments of a surface file, without its heights.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or does not hold them.
+    """
+    names = [f"spectral_moment_{order}" for order in (0, 2, 4)]
+
+    def load(path, engine):
+        with xr.open_dataset(path, engine=engine) as dataset:
+            if missing := [name for name in names if name not in dataset]:
+                raise ValueError(f"{path}: not a surface file, it has no variable {missing[0]!r}")
+            return SpectralMoments(*(float(dataset[name]) for name in names))
+
+    return _read(load, path)

@@ -22,6 +22,7 @@ from icha.limits import MAX_REDUCED_PRESSURE
 from icha.material import Material
 from icha.observables import GAP_BINS, PRESSURE_BINS, gap_distribution, pressure_distribution
 from icha.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, load
+from icha.roughness import spectral_moments, stickiness
 from icha.surface import Surface
 from icha.validation import integer
 
@@ -34,7 +35,8 @@ WU_RANGE = (2.0, 5.0)
 REFERENCES = (
     "G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media with an advanced asperity model; "
     "L. Afferrante, G. Carbone and G. Demelio, Wear 278-279 (2012) 28-33, doi:10.1016/j.wear.2011.12.013; "
-    "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
+    "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303; "
+    "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
 )
 
 # name: (dimensions, units, long name)
@@ -98,10 +100,15 @@ VARIABLES = {
     "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
     "rms_height": ((), "m", "root mean square height"),
     "rms_curvature": ((), "m-1", "root mean square curvature of a profile, from the spectrum"),
+    "spectral_moment_0": ((), "m2", "spectral moment m0 of a profile: variance of its height"),
+    "spectral_moment_2": ((), "1", "spectral moment m2 of a profile: variance of its slope"),
+    "spectral_moment_4": ((), "m-2", "spectral moment m4 of a profile: variance of its curvature"),
+    "nayak_parameter": ((), "1", "Nayak's parameter m0 m4/m2^2: breadth of the spectrum"),
     "period": ((), "m", "side of the periodic cell"),
     "grid": ((), "1", "nodes along a side of the cell"),
     "seed": ((), "1", "seed of the surface; -1 where it has none"),
     "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
+    "stickiness": ((), "1", "attraction over repulsion after Pastewka and Robbins; above 1 surfaces stick"),
     "asperity_count": ((), "1", "number of asperities on the surface"),
 }
 
@@ -261,6 +268,7 @@ def _dtype(name):
 
 def _dataset(surface, material, contact, steps, snapshots, seed):
     radius = 1 / surface.rms_curvature
+    moments = spectral_moments(surface)
     values = {
         "gap_bin_edges": GAP_BINS * surface.rms_height,
         "pressure_bin_edges": PRESSURE_BINS * (material.contact_modulus * surface.rms_slope),
@@ -270,10 +278,15 @@ def _dataset(surface, material, contact, steps, snapshots, seed):
         "rms_slope": surface.rms_slope,
         "rms_height": surface.rms_height,
         "rms_curvature": surface.rms_curvature,
+        "spectral_moment_0": moments.m0,
+        "spectral_moment_2": moments.m2,
+        "spectral_moment_4": moments.m4,
+        "nayak_parameter": moments.nayak_parameter,
         "period": surface.period,
         "grid": surface.grid,
         "seed": seed,
         "tabor_parameter": float(contact.law.tabor_parameter(radius)),
+        "stickiness": stickiness(moments, material),
         "asperity_count": len(contact.asperities),
     }
     bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.roughness import spectral_moments, stickiness
 
 PERIOD, MODULUS, ENERGY, RANGE = 100e-6, 25e6, 0.05, 2.071e-9
 ADHESIVE, BARE = Material(MODULUS, ENERGY, RANGE), Material(MODULUS, 0.0, RANGE)
@@ -112,6 +113,14 @@ def test_statistics_in_the_dataset_are_those_of_the_surface(run):
     mu = np.cbrt((float(run.surface_energy) / MODULUS) ** 2 / float(run.rms_curvature)) / RANGE
     assert float(run.tabor_parameter) == pytest.approx(mu, rel=1e-12)
     np.testing.assert_allclose(run.reduced_separation, run.mean_separation / np.std(heights), rtol=1e-12)
+    assert float(run.spectral_moment_0) == pytest.approx(np.var(heights), rel=1e-12)
+    assert float(run.spectral_moment_2) == pytest.approx(0.5, rel=1e-12)
+    assert float(run.spectral_moment_4) == pytest.approx(float(run.rms_curvature) ** 2, rel=1e-12)
+    alpha = float(run.spectral_moment_0 * run.spectral_moment_4) / 0.25
+    assert float(run.nayak_parameter) == pytest.approx(alpha, rel=1e-12)
+    material = Material(MODULUS, float(run.surface_energy), RANGE)
+    assert float(run.stickiness) == stickiness(spectral_moments(surface), material)
+    assert (float(run.stickiness) > 0) == (float(run.surface_energy) > 0)
 
 
 # --- physics that has to come out ---------------------------------------------------------------------------
