@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from icha.figures.select import first_line_runs, snapshot_label
 from icha.figures.style import BLACK, TWO_COLUMNS, line_look, material_label, new_figure, panel_label, styled
-from icha.reference.theories import persson_pressure_density
+from icha.reference.persson import persson_pressure_density
 
 CAPTION = (
     "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure p "

@@ -13,7 +13,10 @@ def _entries() -> dict:
 
 
 def literature(name: str) -> dict:
-    """One entry of the file: `gfmd_area` or `contact_mechanics_challenge`, with title, citation and DOIs.
+    """One entry of the file, with title, description, citation and DOIs, and the unit of every number.
+
+    There are `gfmd_area`, `area_slope` and `contact_mechanics_challenge`. Lists of an entry belong together, point by
+    point.
 
     Raises
     ------

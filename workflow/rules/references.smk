@@ -1,7 +1,24 @@
 # references/<surface>.nc: what theories say of a surface, and published points.
 
 
+def adhesive_contacts(surface):
+    """Slopes and materials with adhesion of a surface's runs, each once."""
+    materials = {name: material.model_dump() for name, material in CAMPAIGN.materials.items()}
+    pairs = dict.fromkeys((case.rms_slope, case.material) for case in CASES.values() if case.surface == surface)
+    return [
+        {"rms_slope": rms_slope, "name": name, "material": materials[name]}
+        for rms_slope, name in pairs
+        if materials[name]["surface_energy"] > 0
+    ]
+
+
 rule reference:
+    input:
+        surface=lambda wildcards: next(
+            f"{RESULTS}/surfaces/{name}/seed{seed}.nc"
+            for name, seed in surface_cases(CAMPAIGN)
+            if name == wildcards.surface
+        ),
     output:
         f"{RESULTS}/references/{{surface}}.nc",
     log:
@@ -16,6 +33,7 @@ rule reference:
         runtime=10,
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
+        adhesive=lambda wildcards: adhesive_contacts(wildcards.surface),
         attributes=ATTRIBUTES,
         code=code_of("make_references.py"),
     message:

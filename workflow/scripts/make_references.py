@@ -2,19 +2,30 @@
 
 from job import logged
 
-from icha.records import write_dataset
+from icha.material import Material
+from icha.records import read_spectral_moments, write_dataset
 from icha.reference.dataset import reference_dataset
 from icha.spectrum import SelfAffineSpectrum
 
 
-def make_references(output, *, settings, attributes):
-    """Write the references for a surface of the given settings (SI units) to `output`."""
+def make_references(surface, output, *, settings, adhesive, attributes):
+    """Write the references for the surface file `surface` to `output`.
+
+    `settings` are those of the surface and `adhesive` tells the contacts with adhesion, both in SI units.
+    """
     keys = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
     known = settings["kind"] == "self_affine"
     spectrum = SelfAffineSpectrum(**{key: settings[key] for key in keys}) if known else None
-    write_dataset(reference_dataset(spectrum, attrs=attributes), output)
+    materials = {(each["rms_slope"], each["name"]): Material(**each["material"]) for each in adhesive}
+    write_dataset(reference_dataset(spectrum, read_spectral_moments(surface), materials, attrs=attributes), output)
 
 
 if "snakemake" in globals():
     with logged(snakemake.log[0]):
-        make_references(snakemake.output[0], settings=snakemake.params.settings, attributes=snakemake.params.attributes)
+        make_references(
+            snakemake.input.surface,
+            snakemake.output[0],
+            settings=snakemake.params.settings,
+            adhesive=snakemake.params.adhesive,
+            attributes=snakemake.params.attributes,
+        )

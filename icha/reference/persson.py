@@ -1,4 +1,4 @@
-"""Theories of adhesionless contact of a nominally flat rough surface, as plain functions.
+"""Persson's theory of the adhesionless contact of a nominally flat rough surface.
 
 Pressures are reduced, p* = p/(E* h'_rms). Sources:
 
@@ -8,7 +8,6 @@ Pressures are reduced, p* = p/(E* h'_rms). Sources:
   doi:10.1088/0953-8984/20/21/215214.
 - Stiffness proportional to pressure: B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502,
   doi:10.1103/PhysRevLett.99.125502.
-- Bush, Gibson & Thomas: Wear 35 (1975) 87-111, doi:10.1016/0043-1648(75)90145-3.
 """
 
 from __future__ import annotations
@@ -17,11 +16,8 @@ import numpy as np
 from scipy.integrate import simpson
 from scipy.special import erf
 
-# Slopes of A/A0 against p* as p* -> 0.
+# Slope of A/A0 against p* as p* -> 0.
 PERSSON_SLOPE = np.sqrt(8 / np.pi)
-BUSH_GIBSON_THOMAS_SLOPE = np.sqrt(2 * np.pi)
-# The linear law counts separate summits; beyond this area it has no meaning.
-BUSH_GIBSON_THOMAS_AREA_LIMIT = 0.1
 
 # Share of the full-contact elastic energy that a small contact stores (Yang & Persson, gamma).
 YANG_PERSSON_GAMMA = 0.45
@@ -41,11 +37,6 @@ def persson_pressure_density(pressure, reduced_pressure):
     pressure = np.asarray(pressure, float)
     gauss = np.exp(-2 * (pressure - reduced_pressure) ** 2) - np.exp(-2 * (pressure + reduced_pressure) ** 2)
     return np.where(pressure > 0, np.sqrt(2 / np.pi) * gauss, 0.0)
-
-
-def bush_gibson_thomas_area(reduced_pressure):
-    """A/A0 = sqrt(2 pi) p*, the limit of small areas (Bush, Gibson & Thomas 1975)."""
-    return BUSH_GIBSON_THOMAS_SLOPE * np.asarray(reduced_pressure, float)
 
 
 def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, points=401):
