@@ -57,6 +57,7 @@ rule dataset:
         DATASET,
         COMPARISON,
         VERDICT,
+        MODEL_ERROR,
 
 
 rule figures:

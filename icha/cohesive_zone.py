@@ -1,7 +1,8 @@
 """Which range of attraction a grid resolves: the cohesive zone around an adhesive contact must span its cells.
 
 With traction (dgamma/rho) exp(-u/rho) at a gap u, two dimensionless numbers decide: the spacing against the length of
-the cohesive zone, and the height of the steps at which single nodes jump into contact against the range rho.
+the cohesive zone, and the step by which a single node jumps into contact against the range rho (A. Wang, Y. Zhou and
+M. H. Müser, Lubricants 9 (2021) 17, doi:10.3390/lubricants9020017).
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ def resolution_problem(material: Material, spacing: float) -> str | None:
     if is_resolved(material, spacing):
         return None
     return (
-        f"a range of {material.interaction_range:.4g} m is not resolved by a grid of spacing {spacing:.4g} m, for which "
-        f"sqrt(dgamma dx/E*)/range is {strength_number(material, spacing):.3g} (allowed: less than "
-        f"{MAX_STRENGTH_NUMBER:g}) and whose spacing may be {longest_spacing(material):.3g} m at most; allowed: ranges "
+        f"a range of {material.interaction_range:.4g} m is not resolved by a grid of spacing {spacing:.4g} m: "
+        f"sqrt(dgamma dx/E*)/range is {strength_number(material, spacing):.3g}, which must be less than "
+        f"{MAX_STRENGTH_NUMBER:g}, and the spacing may be {longest_spacing(material):.3g} m at most; allowed: ranges "
         f"above {shortest_range(material, spacing):.4g} m, or a finer grid"
     )

@@ -7,7 +7,7 @@ import itertools
 import json
 
 from icha.configuration.model import Campaign, SelfAffineSurface
-from icha.labels import RunLabels
+from icha.labels import RunLabels, SolutionLabels
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
@@ -22,6 +22,66 @@ def run_cases(campaign: Campaign) -> list[RunLabels]:
     ]
 
 
+def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
+    """All boundary-element solutions of a campaign, entry by entry."""
+    cases = []
+    for label, entry in campaign.boundary_elements.items():
+        asked = campaign.solved(entry)
+        cases += [
+            SolutionLabels(label, entry.study, surface, seed, slope, material, pressure)
+            for surface in asked["surfaces"]
+            for seed, slope, material, pressure in itertools.product(
+                campaign.solved_seeds(entry, surface), asked["rms_slopes"], asked["materials"], entry.reduced_pressures
+            )
+        ]
+    return cases
+
+
+def map_solution(campaign: Campaign) -> SolutionLabels | None:
+    """The finest boundary-element solution of the state that the contact map (figure 4) shows, if there is any."""
+    figure = campaign.figures.fig4_contact_map
+    snapshots = campaign.snapshots_of(figure.study) or [campaign.studies[figure.study].targets.last]
+    if figure.snapshot is not None:
+        kind, value = figure.snapshot.target
+    elif {kind for kind, _ in snapshots} == {"reduced_pressure"}:
+        kind, value = min(snapshots)  # the first one that is met
+    else:
+        return None
+    if kind != "reduced_pressure":
+        return None
+    run = map_case(campaign)
+    found = [case for case in solution_cases(campaign) if case.run == run and case.reduced_pressure == value]
+    return max(found, key=lambda case: campaign.boundary_elements[case.entry].refinement, default=None)
+
+
+def map_case(campaign: Campaign) -> RunLabels:
+    """The run that the contact map (figure 4) shows: of its study's first, with adhesion if it does not say."""
+    figure = campaign.figures.fig4_contact_map
+    cases = [
+        case
+        for case in run_cases(campaign)
+        if case.study == figure.study
+        and figure.surface in (None, case.surface)
+        and figure.seed in (None, case.seed)
+        and figure.rms_slope in (None, case.rms_slope)
+        and figure.material in (None, case.material)
+    ]
+    return next((case for case in cases if campaign.materials[case.material].surface_energy > 0), cases[0])
+
+
+def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
+    """Everything but the topography that determines a boundary-element solution, in SI units."""
+    entry = campaign.boundary_elements[case.entry]
+    return {
+        "material": campaign.materials[case.material].model_dump(),
+        "rms_slope": case.rms_slope,
+        "seed": case.seed,
+        "reduced_pressure": case.reduced_pressure,
+        "refinement": entry.refinement,
+        "tolerance": entry.tolerance,
+    }
+
+
 def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
     """The topographies of a campaign, as (surface, seed), each once though many runs share it."""
     return list(dict.fromkeys((case.surface, case.seed) for case in run_cases(campaign)))
@@ -31,10 +91,9 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
     """Everything that determines a run's numbers, in SI units: arguments of the model's own objects."""
     study = campaign.studies[case.study]
     targets = study.targets.model_dump(exclude_none=True)
-    snapshots = None if study.snapshots is None else [snapshot.target for snapshot in study.snapshots]
     return {
         "material": campaign.materials[case.material].model_dump(),
-        "path": targets | {"snapshots": snapshots, "max_step": study.max_step},
+        "path": targets | {"snapshots": campaign.snapshots_of(case.study), "max_step": study.max_step},
         "rms_slope": case.rms_slope,
         "seed": case.seed,
     }

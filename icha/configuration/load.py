@@ -62,7 +62,7 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
         fail(_problem(details, content) for details in error.errors())
     fail(campaign.problems())
     campaign = campaign.with_files_beside(path.parent)
-    fail(_files_that_cannot_be_read(campaign))
+    fail(_problems_of_files(campaign))
     return Configuration(campaign, yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110))
 
 
@@ -197,6 +197,7 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
     sections = {
         "materials": model.Material,
         "studies": model.Study,
+        "boundary_elements": model.BoundaryElements,
         "measurements": model.Measurement,
         "authors": model.Author,
     }
@@ -223,13 +224,17 @@ def _keys(location: tuple, content: Any) -> list[str]:
     return list(section.model_fields) if section else []
 
 
-def _files_that_cannot_be_read(campaign: Campaign) -> Iterable[tuple[tuple, Any, str]]:
+def _problems_of_files(campaign: Campaign) -> Iterable[tuple[tuple, Any, str]]:
     for name, surface in campaign.surfaces.items():
         if isinstance(surface, FileSurface):
             try:
-                read_height_map(surface.path, surface.metres_per_unit)
+                heights = read_height_map(surface.path, surface.metres_per_unit)
             except ValueError as error:
                 yield ("surfaces", name, "path"), surface.path, str(error)
+                continue
+            for label, entry in campaign.boundary_elements.items():
+                if name in campaign.solved(entry)["surfaces"]:
+                    yield from campaign.unresolved(label, name, len(heights))
     for name, measurement in campaign.measurements.items():
         try:
             read_columns(measurement.path, measurement.columns)

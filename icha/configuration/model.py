@@ -7,6 +7,7 @@ Values are kept in SI units. The text of a configuration file becomes these obje
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
@@ -22,8 +23,10 @@ from pydantic import (
     model_validator,
 )
 
+from icha.cohesive_zone import resolution_problem
 from icha.configuration.units import PATTERN, PHYSICAL_NAMES, conversion_factor, to_number, to_si
 from icha.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.material import Material as Interface
 
 NAME_PATTERN = r"^[a-z0-9_-]+$"
 # Rounding of the quotient of two lengths must not decide whether a wave has its cells.
@@ -245,6 +248,12 @@ class Targets(Section):
 
     _check = model_validator(mode="after")(_exactly_one)
 
+    @property
+    def last(self) -> tuple[str, float]:
+        """Kind and value (SI units) of the last stop."""
+        ((kinds, values),) = self.model_dump(exclude_none=True).items()
+        return kinds.removesuffix("s"), values[-1]
+
 
 class Snapshot(Section):
     """A state of which spots, gap and pressure distributions are kept: exactly one of the four keys."""
@@ -379,6 +388,35 @@ class Measurement(Section):
         return self
 
 
+class BoundaryElements(Section):
+    """Boundary-element solutions of a study's own topographies, beside its runs."""
+
+    study: Name = Field(description="Name of the study whose runs are compared with.")
+    surfaces: _names("Surfaces, of the study's. Left out: all.") | None = Field(
+        default=None, description="Surfaces, of the study's. Left out: all."
+    )
+    seeds: Annotated[list[_integer(0)], Field(min_length=1), AfterValidator(_distinct)] | None = Field(
+        default=None, description="Seeds, of the study's. Left out: all."
+    )
+    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(_distinct)] | None = Field(
+        default=None, description="Rms slopes, of the study's. Left out: all."
+    )
+    materials: _names("Materials, of the study's. Left out: all.") | None = Field(
+        default=None,
+        description="Materials, of the study's. Left out: all. With adhesion the grid must resolve their "
+        "`interaction_range`.",
+    )
+    reduced_pressures: _stops(ReducedPressure, _increasing) = Field(
+        description="Loads p/(E* h'rms), increasing. They become snapshots of the study's runs."
+    )
+    refinement: _integer(1, 16) = Field(
+        default=1, description="Cells per cell of the surface's own grid, along a side; heights are interpolated."
+    )
+    tolerance: _number("a number in (0, 1e-4]", above=0, most=1e-4) = Field(
+        default=1e-8, description="Relative error at which the solver may stop."
+    )
+
+
 class JKRFigure(Section):
     """The force-approach curve of one asperity."""
 
@@ -422,6 +460,10 @@ class TaborFigure(SnapshotFigure):
     """A figure of one snapshot of all runs of a study, whose materials differ in their range of attraction."""
 
 
+class ComparedFigure(StudyFigure):
+    """A figure of a study's runs beside their boundary elements."""
+
+
 class Figures(Section):
     """The figures of the campaign; those that are left out are not drawn."""
 
@@ -452,6 +494,17 @@ class Figures(Section):
         "adhesion that differ in their `interaction_range`.",
     )
 
+    fig10_model_error: ComparedFigure | None = Field(
+        default=None,
+        description="Relative error of contact area and mean separation against boundary elements. The study needs "
+        "`boundary_elements`.",
+    )
+    fig11_distribution_error: ComparedFigure | None = Field(
+        default=None,
+        description="How far distributions of pressure and gap and the contact map are from those of boundary "
+        "elements. The study needs `boundary_elements`.",
+    )
+
     def drawn(self) -> dict[str, Section]:
         """The figures that are drawn, by name."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
@@ -480,6 +533,9 @@ class Campaign(Section):
     )
     materials: Annotated[dict[Name, Material], Field(min_length=1)] = Field(description="Materials by name.")
     studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
+    boundary_elements: dict[Name, BoundaryElements] = Field(
+        default={}, description="Boundary-element solutions by name, compared with the runs of a study."
+    )
     measurements: dict[Name, Measurement] = Field(
         default={}, description="Measurements by name, overlaid on figure 5. None are shipped with ICHA."
     )
@@ -503,6 +559,10 @@ class Campaign(Section):
                     "mixes random surfaces with surfaces read from a file, which have no seed; allowed: a study each"
                 )
                 found.append((("studies", label, "surfaces"), ", ".join(study.surfaces), reason))
+        for label, entry in self.boundary_elements.items():
+            known(("boundary_elements", label, "study"), entry.study, self.studies)
+            if entry.study in self.studies:
+                found += self._solution_problems(("boundary_elements", label), entry)
         for label, measurement in self.measurements.items():
             known(("measurements", label, "study"), measurement.study, self.studies)
             if measurement.material is not None:
@@ -519,6 +579,60 @@ class Campaign(Section):
         """Seeds of a surface in a study; a surface that is read from a file has one realisation, numbered 0."""
         return self.studies[study].seeds if isinstance(self.surfaces[surface], SelfAffineSurface) else [0]
 
+    def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
+        """Kind and value of all states that the runs of a study keep; None where they keep their last one.
+
+        The loads of the study's boundary elements are among them.
+        """
+        asked = self.studies[study].snapshots
+        loads = sorted({p for e in self.boundary_elements.values() if e.study == study for p in e.reduced_pressures})
+        if asked is None and not loads:
+            return None
+        own = [self.studies[study].targets.last] if asked is None else [snapshot.target for snapshot in asked]
+        return own + [("reduced_pressure", p) for p in loads if ("reduced_pressure", p) not in own]
+
+    def solved(self, entry: BoundaryElements) -> dict[str, list]:
+        """The surfaces, rms slopes and materials for which an entry asks, written out."""
+        study = self.studies[entry.study]
+        return {key: getattr(entry, key) or getattr(study, key) for key in ("surfaces", "rms_slopes", "materials")}
+
+    def solved_seeds(self, entry: BoundaryElements, surface: str) -> list[int]:
+        """The seeds of a surface for which an entry asks; a surface that is read from a file has the one."""
+        there = self.surface_seeds(entry.study, surface)
+        return there if entry.seeds is None else [seed for seed in entry.seeds if seed in there]
+
+    def _solution_problems(self, location, entry):
+        study = self.studies[entry.study]
+        seeds = {
+            seed for name in study.surfaces if name in self.surfaces for seed in self.surface_seeds(entry.study, name)
+        }
+        for key, there in (
+            ("surfaces", study.surfaces),
+            ("seeds", sorted(seeds)),
+            ("rms_slopes", study.rms_slopes),
+            ("materials", study.materials),
+        ):
+            for index, value in enumerate(getattr(entry, key) or []):
+                if value not in there:
+                    allowed = ", ".join(map(str, there))
+                    yield (*location, key, index), value, f"is not in study {entry.study!r}; allowed: {allowed}"
+        for name in self.solved(entry)["surfaces"]:
+            surface = self.surfaces.get(name)
+            if not isinstance(surface, SelfAffineSurface):
+                continue  # only its file knows its grid
+            yield from self.unresolved(location[1], name, surface.grid)
+
+    def unresolved(self, entry: str, surface: str, grid: int) -> Iterator[tuple[tuple, Any, str]]:
+        """Materials of an entry of boundary elements whose attraction the grid of a surface does not resolve."""
+        asked = self.boundary_elements[entry]
+        spacing = self.surfaces[surface].period / (grid * asked.refinement)
+        for label in self.solved(asked)["materials"]:
+            if label not in self.materials:
+                continue
+            material = Interface(**self.materials[label].model_dump())
+            if problem := resolution_problem(material, spacing):
+                yield ("boundary_elements", entry, "materials"), label, f"on surface {surface!r}: {problem}"
+
     def _figure_problems(self, location, figure, study):
         known = [name for name in study.surfaces if name in self.surfaces]
         seeds = dict.fromkeys(seed for name in known for seed in self.surface_seeds(figure.study, name))
@@ -532,7 +646,8 @@ class Campaign(Section):
             if value is not None and value not in there:
                 allowed = ", ".join(map(str, there))
                 yield (*location, key), value, f"is not in study {figure.study!r}; allowed: {allowed}"
-        kinds = [snapshot.target[0] for snapshot in study.snapshots or []]
+        snapshots = self.snapshots_of(figure.study)
+        kinds = [kind for kind, _ in snapshots or []]
         if isinstance(figure, SlopesFigure):
             for kind in ("relative_load", "area_fraction"):
                 if kind not in kinds:
@@ -543,11 +658,16 @@ class Campaign(Section):
             if not any(material.surface_energy > 0 for material in materials):
                 reason = "has no material with adhesion, so no Tabor parameter; allowed: a study with one"
                 yield (*location, "study"), figure.study, reason
-        if isinstance(figure, SnapshotFigure) and study.snapshots == []:
+        if isinstance(figure, ComparedFigure) and figure.study not in {
+            e.study for e in self.boundary_elements.values()
+        }:
+            reason = "has no boundary elements beside it; allowed: a study that an entry of boundary_elements names"
+            yield (*location, "study"), figure.study, reason
+        if isinstance(figure, SnapshotFigure) and snapshots == []:
             yield (*location, "study"), figure.study, "keeps no snapshot to draw; allowed: a study with one"
         snapshot = getattr(figure, "snapshot", None)
-        if snapshot is not None and snapshot not in (study.snapshots or []):
-            there = ", ".join(f"{kind} {value:g}" for kind, value in (s.target for s in study.snapshots or []))
+        if snapshot is not None and snapshot.target not in (snapshots or []):
+            there = ", ".join(f"{kind} {value:g}" for kind, value in snapshots or [])
             kind, value = snapshot.target
             yield (
                 (*location, "snapshot"),

@@ -37,6 +37,7 @@ _HEADINGS = {
     "Study": "`studies.<name>`",
     "Targets": "`studies.<name>.targets`",
     "Snapshot": "`studies.<name>.snapshots`, each",
+    "BoundaryElements": "`boundary_elements.<name>`",
     "Measurement": "`measurements.<name>`",
     "Column": "`measurements.<name>.load` and `.area`",
     "Figures": "`figures`",
@@ -46,6 +47,7 @@ _HEADINGS = {
     "MapFigure": "`figures.fig4_contact_map`",
     "SlopesFigure": "`figures.fig6_spots_by_slope`",
     "TaborFigure": "`figures.fig9_tabor`",
+    "ComparedFigure": "`figures.fig10_model_error`, `figures.fig11_distribution_error`",
     "Author": "`authors`, each",
 }
 

@@ -11,10 +11,14 @@ from fingerprint import code_fingerprint
 
 from icha.configuration.expansion import (
     campaign_sha256,
+    map_case,
+    map_solution,
     measurement_settings,
     run_cases,
     run_settings,
     run_sha256,
+    solution_cases,
+    solution_settings,
     surface_cases,
     surface_settings,
 )
@@ -30,9 +34,14 @@ BENCHMARKS = f"{RESULTS}/benchmarks"
 CONFIG_USED = f"{RESULTS}/config.used.yaml"
 SURFACES = [f"{RESULTS}/surfaces/{name}/seed{seed}.nc" for name, seed in surface_cases(CAMPAIGN)]
 RUNS = [f"{RESULTS}/runs/{path}" for path in CASES]
-REFERENCES = [f"{RESULTS}/references/{name}.nc" for name in dict.fromkeys(name for name, _ in surface_cases(CAMPAIGN))]
+THEORIES = [f"{RESULTS}/references/{name}.nc" for name in dict.fromkeys(name for name, _ in surface_cases(CAMPAIGN))]
+SOLUTION_CASES = {f"{case.path}.nc": case for case in solution_cases(CAMPAIGN)}
+SOLUTIONS = [f"{RESULTS}/references/boundary_elements/{path}" for path in SOLUTION_CASES]
+REFERENCES = [*THEORIES, *SOLUTIONS]
 DATASET = f"{RESULTS}/dataset/{CAMPAIGN.name}.nc"
 COMPARISON = f"{RESULTS}/aggregated/{CAMPAIGN.name}.nc"
+# Only a campaign with boundary elements has an error to tell.
+MODEL_ERROR = [f"{RESULTS}/aggregated/model_error.nc"] if SOLUTIONS else []
 CHECKS = f"{RESULTS}/checks.json"
 VERDICT = f"{RESULTS}/verdict.txt"
 FIGURES = [f"{RESULTS}/figures/{name}.{ending}" for name in CAMPAIGN.figures.drawn() for ending in ("png", "pdf")]
@@ -46,10 +55,12 @@ ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": CAMPAIGN.license}
 
 wildcard_constraints:
     name="[a-z0-9_-]+",
+    entry="[a-z0-9_-]+",
     study="[a-z0-9_-]+",
     surface="[a-z0-9_-]+",
     seed=r"\d+",
     slope=r"[0-9.e+-]+",
+    pressure=r"[0-9.e+-]+",
     material="[a-z0-9_-]+",
 
 
@@ -84,6 +95,16 @@ def figure_memory(name):
     return 2000 + (16 * max(map(points_of, CAMPAIGN.surfaces)) // 10**6 if name == "fig4_contact_map" else 0)
 
 
+def solution_of(wildcards):
+    return SOLUTION_CASES["{entry}/{surface}/seed{seed}/slope{slope}/{material}/p{pressure}.nc".format(**wildcards)]
+
+
+def solution_memory(wildcards):
+    """Megabytes that boundary elements need: some thirty arrays of their grid, and the program."""
+    refinement = CAMPAIGN.boundary_elements[wildcards.entry].refinement
+    return 400 + 30 * 8 * points_of(wildcards.surface) * refinement**2 // 10**6
+
+
 def case_of(wildcards):
     return CASES["{study}/{surface}/seed{seed}/slope{slope}/{material}.nc".format(**wildcards)]
 
@@ -101,15 +122,15 @@ def figure_data(name):
     study = CAMPAIGN.studies[options.study]
     if name in ("fig2_area_and_gap", "fig7_stiffness"):
         data["references"] = f"{RESULTS}/references/{study.surfaces[0]}.nc"
+    if name in ("fig2_area_and_gap", "fig3_distributions", "fig10_model_error", "fig11_distribution_error"):
+        if any(entry.study == options.study for entry in CAMPAIGN.boundary_elements.values()):
+            data["model_error"] = MODEL_ERROR[0]
     if name == "fig4_contact_map":
-        case = next(
-            case
-            for case in CASES.values()
-            if case.study == options.study
-            and options.surface in (None, case.surface)
-            and options.seed in (None, case.seed)
-        )
+        case = map_case(CAMPAIGN)
         data["surface"] = f"{RESULTS}/surfaces/{case.surface}/seed{case.seed}.nc"
+        solution = map_solution(CAMPAIGN)
+        if solution is not None:
+            data["solution"] = f"{RESULTS}/references/boundary_elements/{solution.path}.nc"
     if name == "fig5_multi_slope":
         files = [m.path for m in CAMPAIGN.measurements.values() if m.study == options.study]
         if files:

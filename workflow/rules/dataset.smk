@@ -1,5 +1,6 @@
 # config.used.yaml: what was asked for; dataset/<campaign>.nc: all runs in one file, a group per study; aggregated/<campaign>.nc: the runs of every
-# study at common loads; checks.json: what every result must satisfy.
+# study at common loads; aggregated/model_error.nc: the runs against boundary elements; checks.json: what every result
+# must satisfy.
 
 
 rule configuration:
@@ -73,6 +74,32 @@ rule comparison:
         "Comparison of the runs"
     script:
         "../scripts/compare_runs.py"
+
+
+rule model_error:
+    input:
+        campaign=DATASET,
+        solutions=SOLUTIONS,
+    output:
+        f"{RESULTS}/aggregated/model_error.nc",
+    log:
+        f"{LOGS}/model_error.log",
+    benchmark:
+        f"{BENCHMARKS}/model_error.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        labels=[tuple(case) for case in SOLUTION_CASES.values()],
+        attributes=ATTRIBUTES,
+        code=code_of("measure_model_error.py"),
+    message:
+        "Error of the model against boundary elements"
+    script:
+        "../scripts/measure_model_error.py"
 
 
 rule checks:

@@ -8,6 +8,7 @@ rule deposit:
         SURFACES,
         RUNS,
         REFERENCES,
+        MODEL_ERROR,
     output:
         DEPOSIT,
     log:

@@ -1,4 +1,6 @@
-# references/<surface>.nc: what theories say of a surface, and published points.
+# references/<surface>.nc: what theories say of a surface, and published points;
+# references/boundary_elements/<entry>/<surface>/seed<k>/slope<g>/<material>/p<p*>.nc: one load each, by boundary
+# elements on the topography of the run.
 
 
 def adhesive_contacts(surface):
@@ -40,3 +42,29 @@ rule reference:
         "Theories and literature for surface {wildcards.surface}"
     script:
         "../scripts/make_references.py"
+
+
+rule boundary_elements:
+    input:
+        surface=f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+    output:
+        f"{RESULTS}/references/boundary_elements/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}/p{{pressure}}.nc",
+    log:
+        f"{LOGS}/boundary_elements/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}/p{{pressure}}.log",
+    benchmark:
+        f"{BENCHMARKS}/boundary_elements/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}/p{{pressure}}.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=solution_memory,
+        runtime=240,
+    params:
+        settings=lambda wildcards: solution_settings(CAMPAIGN, solution_of(wildcards)),
+        attributes=ATTRIBUTES,
+        code=code_of("solve_boundary_elements.py"),
+    message:
+        "Boundary elements {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
+        "{wildcards.material}, p* = {wildcards.pressure}"
+    script:
+        "../scripts/solve_boundary_elements.py"

@@ -7,6 +7,7 @@ rule report_page:
         campaign=DATASET,
         comparison=COMPARISON,
         checks=CHECKS,
+        model_error=MODEL_ERROR,
         configuration=CONFIG_USED,
         surfaces=SURFACES,
         figures=FIGURES,

@@ -8,7 +8,13 @@ from icha.configuration.measurement import read_columns
 from icha.figures.style import save
 from icha.records import read_campaign, read_dataset
 
-READERS = {"campaign": read_campaign, "references": read_dataset, "surface": read_dataset}
+READERS = {
+    "campaign": read_campaign,
+    "references": read_dataset,
+    "surface": read_dataset,
+    "model_error": read_campaign,
+    "solution": read_dataset,
+}
 
 
 def draw_figure(name, png, pdf, *, data, options, measurements=()):

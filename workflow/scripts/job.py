@@ -6,6 +6,12 @@ import traceback
 from contextlib import contextmanager
 
 
+def _failures_of_solvers():
+    """How solvers say that they did not converge. Most jobs do without them, so nothing is imported for this."""
+    names = {"icha.simulation": "ConvergenceError", "icha.reference.boundary_elements": "NotSolved"}
+    return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
+
+
 @contextmanager
 def logged(log):
     """Send all output to the file `log`; an error ends the job with its message there.
@@ -21,9 +27,7 @@ def logged(log):
         try:
             yield
         except Exception as error:
-            # Not imported before it is needed: most jobs do without the solver.
-            simulation = sys.modules.get("icha.simulation")
-            expected = (ValueError, OSError, *([simulation.ConvergenceError] if simulation else []))
+            expected = (ValueError, OSError, *_failures_of_solvers())
             print(f"Error: {error}" if isinstance(error, expected) else f"Error: {error!r}, which was not expected")
             if not isinstance(error, expected):
                 with open(f"{log}.traceback", "w", encoding="utf-8") as details:

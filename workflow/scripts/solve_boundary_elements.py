@@ -1,0 +1,25 @@
+"""Press one surface against one material at one load, by boundary elements."""
+
+from job import logged
+
+from icha.material import Material
+from icha.records import read_surface, write_dataset
+from icha.reference.boundary_elements import boundary_elements
+
+
+def solve_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
+    """Solve for the surface of the file `surface`, scaled to `rms_slope`, and write the solution to `output`."""
+    scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
+    solution = boundary_elements(scaled, Material(**material), **settings)
+    write_dataset(solution.assign_attrs(attributes), output)
+
+
+if "snakemake" in globals():
+    with logged(snakemake.log[0]):
+        solve_boundary_elements(
+            snakemake.input.surface,
+            snakemake.output[0],
+            **snakemake.params.settings,
+            attributes=snakemake.params.attributes,
+            progress=lambda line: print(line, flush=True),
+        )
