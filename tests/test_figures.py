@@ -1,9 +1,12 @@
 """Figures can be drawn from small and unusual campaigns, say what is wrong, and have the same bytes every time."""
 
+import compared_campaign as compared
 import matplotlib as mpl
 import numpy as np
 import pytest
 import small_campaign as small
+import xarray as xr
+from matplotlib.colors import to_rgb
 
 import icha
 from icha.campaign import RunLabels, campaign_tree, find_snapshot
@@ -17,12 +20,16 @@ from icha.figures import (
     fig7_stiffness,
     fig8_patch_sizes,
     fig9_tabor,
+    fig10_model_error,
+    fig11_distribution_error,
 )
 from icha.figures.select import path_steps
 from icha.figures.spots import periodic_circles
-from icha.figures.style import material_label, number, quantity, save, unit_for
+from icha.figures.style import BLUE, VERMILLION, material_label, number, quantity, save, unit_for
+from icha.model_error import jaccard
 from icha.records import read_dataset, write_surface
 from icha.reference import reference_dataset
+from icha.roughness import spectral_moments
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +37,12 @@ def surface(tmp_path_factory):
     path = tmp_path_factory.mktemp("surface") / "s.nc"
     write_surface(path, small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
     return read_dataset(path)
+
+
+def solution(pressure=3e-3, shift=0):
+    """Boundary elements of what figure 4 draws of the compared campaign, their contact shifted by some nodes."""
+    own = compared.own_solution(compared.runs()["one", "rough", 1, 1.0, "soft"], pressure)
+    return own.assign(contact=own["contact"].roll(x=shift))
 
 
 def draw(name, surface):
@@ -50,14 +63,21 @@ def draw(name, surface):
         "fig8": lambda: fig8_patch_sizes.figure(tree, study="slopes"),
         "fig8_one": lambda: fig8_patch_sizes.figure(tree, study="single", kind="area_fraction"),
         "fig9": lambda: fig9_tabor.figure(tree, study="slopes"),
+        "fig2_truth": lambda: fig2_area_and_gap.figure(compared.tree(), None, compared.errors(), study="one"),
+        "fig3_truth": lambda: fig3_distributions.figure(compared.tree(), compared.errors(), study="one"),
+        "fig4_truth": lambda: fig4_contact_map.figure(compared.tree(), surface, solution(), study="one"),
+        "fig10": lambda: fig10_model_error.figure(compared.errors(), study="one"),
+        "fig11": lambda: fig11_distribution_error.figure(compared.errors(), study="one"),
         "fig9_one": lambda: fig9_tabor.figure(tree, study="single", kind="area_fraction"),
     }[name]()
 
 
 NAMES = ["fig1", "fig2", "fig2_alone", "fig3", "fig3_one", "fig4", "fig5", "fig5_one", "fig6", "fig6_one"]
 NAMES += ["fig7", "fig7_alone", "fig8", "fig8_one", "fig9", "fig9_one"]
+NAMES += ["fig2_truth", "fig3_truth", "fig4_truth", "fig10", "fig11"]
 FIGURES = [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope]
 FIGURES += [fig7_stiffness, fig8_patch_sizes, fig9_tabor]
+COMPARED = [fig10_model_error, fig11_distribution_error]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -280,6 +300,161 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
         fig9_tabor.figure(tree, study="tabor")
 
 
+def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
+    figure = fig2_area_and_gap.figure(compared.tree(), None, compared.errors(), study="one")
+    for axes, name in zip(figure.axes, ("contact_area_fraction", "reduced_separation"), strict=True):
+        crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
+        runs = [line for line in axes.get_lines() if line.get_marker() not in ("+", "None")]
+        assert len(crosses) == 2 and len(runs) == 6
+        assert {line.get_markeredgecolor() for line in crosses} == {line.get_markeredgecolor() for line in runs}
+        for line, entry in zip(crosses, ("adhesive", "bare"), strict=True):
+            truth = compared.errors()[entry][f"{name}_boundary_elements"].values
+            np.testing.assert_array_equal(np.sort(line.get_ydata()), np.sort(truth.ravel()))
+            assert sorted(set(line.get_xdata())) == list(compared.PRESSURES)
+        names = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert names.count("boundary elements") == 1
+    alone = fig2_area_and_gap.figure(small.tree(), None, compared.errors(), study="single")
+    assert not [line for line in alone.axes[0].get_lines() if line.get_marker() == "+"]
+
+
+def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
+    moments = spectral_moments(small.surface())
+    adhesive = {(1.0, "soft"): small.MATERIALS["soft"], (1.0, "other"): icha.Material(1e6, 0.02, 2e-9)}
+    references = reference_dataset(small.SPECTRUM, moments, adhesive)
+    figure = fig2_area_and_gap.figure(compared.tree(), references, compared.errors(), study="one")
+    # Too many names for a panel: they stand below, each once.
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"Greenwood & Williamson", "Fuller & Tabor", "Yang & Persson", "boundary elements"} <= set(names)
+    assert len(names) == len(set(names))
+    for axes, name in zip(figure.axes, ("summit_area_fraction", "reduced_separation"), strict=True):
+        assert axes.get_legend() is None
+        drawn = [line for line in axes.get_lines() if line.get_linewidth() == 0.8 and len(line.get_xdata())]
+        assert len(drawn) == 2  # Greenwood & Williamson, and Fuller & Tabor of the study's material
+        values = references[name if name in references else f"greenwood_williamson_{name}"].values
+        np.testing.assert_array_equal(drawn[0].get_ydata(), values)
+        np.testing.assert_array_equal(drawn[0].get_xdata(), references["greenwood_williamson_reduced_pressure"].values)
+        assert np.all(drawn[1].get_xdata() > 0)
+        runs = {line.get_markeredgecolor() for line in axes.get_lines() if line.get_marker() not in ("+", "x", "None")}
+        assert drawn[1].get_color() in runs
+
+
+def test_fig2_tells_further_solutions_of_the_same_states_apart():
+    bare = compared.errors()["bare"].to_dataset()
+    twice = xr.DataTree.from_dict({"/first": bare, "/finer": bare})
+    axes = fig2_area_and_gap.figure(compared.tree(), None, twice, study="one").axes[0]
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "boundary elements" in names and "boundary elements, finer" in names
+    assert {"+", "1"} <= {line.get_marker() for line in axes.get_lines()}
+
+
+def test_fig3_shows_boundary_elements_of_the_same_state_only():
+    def broad(**options):
+        figure = fig3_distributions.figure(compared.tree(), compared.errors(), study="one", **options)
+        return [[line for line in axes.get_lines() if line.get_linewidth() > 3] for axes in figure.axes]
+
+    for shown in broad(target=3e-3):
+        assert len(shown) == 3  # both materials, and what the legend shows
+    only = compared.errors().isel(reduced_pressure=[1])
+    figure = fig3_distributions.figure(compared.tree(), only, study="one", target=3e-3)
+    assert all(line.get_linewidth() < 3 for axes in figure.axes for line in axes.get_lines())
+    # These solutions are the runs' own states, so that their points lie on those of the runs.
+    truth = compared.errors()["bare"].to_dataset().isel(surface=0, seed=0, rms_slope=0, material=0, reduced_pressure=0)
+    truth["solution_grid"] = 32
+    for drawn, own in zip(
+        fig3_distributions.solution_gap_points(truth),
+        fig3_distributions.gap_points(compared.runs()["one", "rough", 1, 1.0, "hertz"], 0),
+        strict=True,
+    ):
+        np.testing.assert_allclose(drawn, own, rtol=1e-9)
+
+
+def test_fig3_joined_bins_keep_what_they_hold():
+    rng = np.random.default_rng(3)
+    edges, content = np.cumsum(rng.uniform(0.1, 1, 41)), rng.uniform(0, 1, 40) * (rng.random(40) < 0.5)
+    low, high, density = fig3_distributions._joined(edges, content, 0.7)
+    assert low[0] == edges[0] and np.array_equal(low[1:], high[:-1])
+    held = density * (high - low)
+    assert np.all(held >= 0.7 - 1e-12)
+    assert 0 <= content.sum() - held.sum() < 0.7
+
+
+def test_fig4_puts_boundary_elements_beside_the_spots(surface):
+    truth = solution(shift=2)
+    run = compared.runs()["one", "rough", 1, 1.0, "soft"]
+    figure = fig4_contact_map.figure(compared.tree(), surface, truth, study="one")
+    assert len(figure.axes) == 5  # four panels and the scale of heights
+    contact = truth["contact"].values == 1
+    covered = np.roll(contact, -2, axis=1)
+    beside = figure.axes[1].get_images()[1].get_array()
+    np.testing.assert_array_equal(beside[:-1, :-1], contact)
+    states = figure.axes[3].get_images()[0].get_array()[:-1, :-1]
+    counts = {
+        name: np.count_nonzero(np.all(states == to_rgb(colour), axis=-1))
+        for name, colour in (("icha", VERMILLION), ("truth", BLUE), ("both", "0.35"))
+    }
+    assert counts["both"] + counts["icha"] == np.count_nonzero(covered)
+    assert counts["both"] + counts["truth"] == np.count_nonzero(contact)
+    assert counts["both"] / sum(counts.values()) == jaccard(covered, contact) < 1
+    assert float(run["rms_slope"]) == pytest.approx(1)
+
+
+def test_fig4_refuses_the_boundary_elements_of_another_state(surface):
+    with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/soft: boundary elements of reduced pressure 0\.01"):
+        fig4_contact_map.figure(compared.tree(), surface, solution(1e-2), study="one")
+    other = solution().assign(surface_energy=0.04)
+    with pytest.raises(ValueError, match=r"soft: the boundary elements given are of another contact: surface_energy"):
+        fig4_contact_map.figure(compared.tree(), surface, other, study="one")
+
+
+def test_fig10_shows_means_and_scatter_of_the_errors_in_per_cent():
+    left, right = fig10_model_error.figure(compared.errors(), study="one").axes
+    expected = 100 * (1 / np.array(list(compared.AREA_FACTORS.values())) - 1)
+    (adhesive, _, (bars,)), (bare, _, _) = left.containers
+    np.testing.assert_allclose(adhesive.get_ydata(), expected.mean())
+    for segment in bars.get_segments():
+        np.testing.assert_allclose(segment[:, 1], expected.mean() + expected.std(ddof=1) * np.array([-1, 1]))
+    np.testing.assert_allclose(bare.get_ydata(), -20)
+    np.testing.assert_allclose(right.containers[1][0].get_ydata(), 25)
+    np.testing.assert_allclose(adhesive.get_xdata(), compared.PRESSURES, rtol=0.03)
+    assert any(np.all(np.asarray(line.get_ydata()) == 0) for line in left.get_lines())
+    assert adhesive.get_markerfacecolor() != "white" and bare.get_markerfacecolor() == "white"
+
+
+def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
+    def many(node):
+        names = [f"s{k}" for k in range(9)]
+        dataset = node.to_dataset()
+        return xr.concat([dataset.assign_coords(surface=[name]) for name in names], "surface", data_vars="minimal")
+
+    parts = {f"/{name}": many(node) for name, node in compared.errors().children.items()}
+    for name, node in compared.errors().children.items():
+        parts[f"/{name}"].attrs = node.attrs
+    figure = fig10_model_error.figure(xr.DataTree.from_dict(parts), study="one")
+    assert len(figure.axes) == 4
+    assert [len(axes.containers) for axes in figure.axes] == [9, 9, 9, 9]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [f"s{k}" for k in range(9)]
+    looks = {(c[0].get_color(), c[0].get_marker()) for c in figure.axes[0].containers}
+    assert len(looks) == 9
+
+
+def test_fig11_shows_distances_and_overlap():
+    axes = fig11_distribution_error.figure(compared.errors(), study="one").axes
+    for panel, name in zip(
+        axes, ("pressure_distribution_distance", "gap_distribution_distance", "jaccard"), strict=True
+    ):
+        for container, entry in zip(panel.containers, ("adhesive", "bare"), strict=True):
+            values = compared.errors()[entry][f"{name}_mean"].values.ravel()
+            np.testing.assert_array_equal(container[0].get_ydata(), values)
+        assert panel.get_ylim()[0] == 0
+    assert axes[2].get_ylim()[1] == 1
+
+
+@pytest.mark.parametrize("module", COMPARED, ids=lambda module: module.__name__)
+def test_studies_without_boundary_elements_are_named(module):
+    with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; there are some for one"):
+        module.figure(compared.errors(), study="slopes")
+
+
 def test_materials_that_differ_in_range_alone_are_told_apart_by_it():
     study = small.tree()["slopes"].to_dataset()
     assert "range" not in material_label(study, "soft")
@@ -301,7 +476,7 @@ def test_incomplete_campaigns_are_drawn_with_what_they_have():
     assert len(lines(fig5_multi_slope.figure(tree, study="slopes").axes[0])) == 3
 
 
-@pytest.mark.parametrize("module", FIGURES, ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", FIGURES + COMPARED, ids=lambda module: module.__name__)
 def test_captions_are_sentences(module):
     assert len(module.CAPTION) > 100 and module.CAPTION.endswith(".")
 

@@ -1,13 +1,11 @@
 """The error is nothing for a state compared with itself, and the exact number for one changed by a known amount."""
 
-import itertools
-
 import numpy as np
 import pytest
 import small_campaign as small
 import xarray as xr
+from compared_campaign import own_solution, runs, solutions, tree
 
-import icha
 from icha.campaign import RunLabels, campaign_tree, find_snapshot
 from icha.labels import SolutionLabels
 from icha.model_error import (
@@ -26,56 +24,9 @@ from icha.observables import GAP_BINS, PRESSURE_BINS
 from icha.records import read_campaign, write_dataset
 from icha.reference.boundary_elements import boundary_elements
 
-PRESSURES = (3e-3, 1e-2)
-GRID = 96
 
-
-def run(seed=1, material="soft"):
-    path = icha.Path(reduced_pressures=PRESSURES, snapshots=[("reduced_pressure", p) for p in PRESSURES], max_step=0.2)
-    return icha.simulate(small.surface(seed), small.MATERIALS[material], path, seed=seed)
-
-
-@pytest.fixture(scope="module")
-def runs():
-    return {
-        RunLabels("one", "rough", seed, 1.0, material): run(seed, material)
-        for seed, material in itertools.product((1, 2, 3), ("soft", "hertz"))
-    }
-
-
-@pytest.fixture(scope="module")
-def campaign(runs):
-    return campaign_tree(list(runs.items()))
-
-
-def own_solution(run, pressure, *, area=1.0, separation=1.0):
-    """A solution made of the run's own state, with area and separation multiplied by known factors."""
-    at = find_snapshot(run, "reduced_pressure", pressure)
-    state = state_of(run, at)
-    contact = contact_of_spots(run, at, GRID)
-    kept = "gap_density gap_bin_edges pressure_density pressure_bin_mean pressure_bin_edges"
-    return state[[*kept.split(), "seed", *SHARED]].assign(
-        contact=(("y", "x"), contact.astype(np.int8)),
-        contact_area_fraction=state["contact_area_fraction"] * area,
-        contact_area_fraction_raw=contact.mean(),
-        reduced_separation=state["reduced_separation"] * separation,
-        target_reduced_pressure=pressure,
-        load_error=1e-5,
-        residual=1e-9,
-        grid=GRID,
-    )
-
-
-def solutions(runs, entry="truth", **factors):
-    return [
-        (SolutionLabels(entry, *labels, pressure), own_solution(run, pressure, **factors))
-        for labels, run in runs.items()
-        for pressure in PRESSURES
-    ]
-
-
-def test_a_state_is_no_distance_from_itself(campaign, runs):
-    errors = model_error(campaign, solutions(runs))["truth"]
+def test_a_state_is_no_distance_from_itself():
+    errors = model_error(tree(), solutions())["truth"]
     for name in ("area_error", "separation_error", "gap_distribution_distance", "pressure_distribution_distance"):
         np.testing.assert_allclose(errors[name].values, 0, atol=1e-12)
     for name in ("jaccard", "shared_of_icha", "shared_of_boundary_elements"):
@@ -84,11 +35,11 @@ def test_a_state_is_no_distance_from_itself(campaign, runs):
     assert errors["area_error"].shape == (1, 3, 1, 2, 2)
 
 
-def test_relative_errors_are_those_put_in(campaign, runs):
-    errors = model_error(campaign, solutions(runs, area=1.25, separation=0.8))["truth"]
+def test_relative_errors_are_those_put_in():
+    errors = model_error(tree(), solutions(area=lambda labels: 1.25, separation=0.8))["truth"]
     np.testing.assert_allclose(errors["area_error"].values, 1 / 1.25 - 1, rtol=1e-12)
     np.testing.assert_allclose(errors["separation_error"].values, 1 / 0.8 - 1, rtol=1e-12)
-    run = runs["one", "rough", 2, 1.0, "hertz"]
+    run = runs()["one", "rough", 2, 1.0, "hertz"]
     at = find_snapshot(run, "reduced_pressure", 1e-2)
     place = {"surface": "rough", "seed": 2, "rms_slope": 1.0, "material": "hertz", "reduced_pressure": 1e-2}
     state = errors.to_dataset().sel(place)
@@ -98,19 +49,15 @@ def test_relative_errors_are_those_put_in(campaign, runs):
     assert float(np.sum(state["pressure_density"].values * edges)) == pytest.approx(area, rel=1e-9)
 
 
-def test_scatter_over_the_seeds(campaign, runs):
+def test_scatter_over_the_seeds():
     factor = {1: 1.1, 2: 1.2, 3: 1.6}
-    pairs = [
-        (SolutionLabels("truth", *labels, p), own_solution(run, p, area=factor[labels.seed]))
-        for labels, run in runs.items()
-        for p in PRESSURES
-    ]
-    errors = model_error(campaign, reversed(pairs))["truth"]
+    pairs = solutions(area=lambda labels: factor[labels.seed])
+    errors = model_error(tree(), reversed(pairs))["truth"]
     expected = np.array([1 / 1.1, 1 / 1.2, 1 / 1.6]) - 1
     np.testing.assert_allclose(errors["area_error_mean"].values, expected.mean(), rtol=1e-12)
     deviation = np.sqrt(np.sum((expected - expected.mean()) ** 2) / 2)
     np.testing.assert_allclose(errors["area_error_deviation"].values, deviation, rtol=1e-12)
-    single = model_error(campaign, [pair for pair in pairs if pair[0].seed == 2])["truth"]
+    single = model_error(tree(), [pair for pair in pairs if pair[0].seed == 2])["truth"]
     np.testing.assert_allclose(single["area_error_mean"].values, 1 / 1.2 - 1, rtol=1e-12)
     assert not [f"{name}_deviation" for name in SUMMARISED if f"{name}_deviation" in single]
 
@@ -164,9 +111,9 @@ def test_overlap_of_maps():
     assert shared(empty, one) == 1 and shared(one, empty) == 0
 
 
-def test_spots_lie_where_boundary_elements_find_contact(runs):
+def test_spots_lie_where_boundary_elements_find_contact():
     """A map that is mirrored, transposed or shifted by a few cells shares next to nothing with the solution."""
-    run = runs["one", "rough", 1, 1.0, "hertz"]
+    run = runs()["one", "rough", 1, 1.0, "hertz"]
     solution = boundary_elements(small.surface(), small.MATERIALS["hertz"], 3e-3, refinement=2, seed=1)
     compared = compare_state(run, 0, solution)
     assert compared["jaccard"] > 0.5
@@ -181,12 +128,10 @@ def test_spots_lie_where_boundary_elements_find_contact(runs):
     assert abs(compared["area_error"]) < 0.3 and abs(compared["separation_error"]) < 0.1
 
 
-def test_several_entries_and_a_part_of_a_study(campaign, runs, tmp_path):
-    adhesionless = {labels: run for labels, run in runs.items() if labels.material == "hertz"}
-    soft = {labels: run for labels, run in runs.items() if labels.material == "soft" and labels.seed == 3}
-    errors = model_error(
-        campaign, [*solutions(soft, "adhesive"), *solutions(adhesionless, "bare")], attrs={"license": "CC0-1.0"}
-    )
+def test_several_entries_and_a_part_of_a_study(tmp_path):
+    adhesive = solutions("adhesive", lambda labels: labels.material == "soft" and labels.seed == 3)
+    bare = solutions("bare", lambda labels: labels.material == "hertz")
+    errors = model_error(tree(), [*adhesive, *bare], attrs={"license": "CC0-1.0"})
     assert list(errors.children) == ["adhesive", "bare"] and errors.attrs["license"] == "CC0-1.0"
     assert errors["bare"]["material"].values.tolist() == ["hertz"]
     assert errors["adhesive"]["seed"].values.tolist() == [3] and errors["adhesive"].attrs["study"] == "one"
@@ -204,41 +149,41 @@ STATE = r"entry truth, run one/rough/seed1/slope1/soft, reduced pressure 0\.003:
 
 
 @pytest.mark.parametrize("name", SHARED)
-def test_another_contact_is_refused(campaign, runs, name):
+def test_another_contact_is_refused(name):
     labels = RunLabels("one", "rough", 1, 1.0, "soft")
-    solution = own_solution(runs[labels], 3e-3)
+    solution = own_solution(runs()[labels], 3e-3)
     changed = solution.assign({name: solution[name] * 1.001})
     with pytest.raises(ValueError, match=STATE + name):
-        model_error(campaign, [(SolutionLabels("truth", *labels, 3e-3), changed)])
+        model_error(tree(), [(SolutionLabels("truth", *labels, 3e-3), changed)])
 
 
-def test_what_cannot_be_compared_is_named(campaign, runs):
+def test_what_cannot_be_compared_is_named():
     labels = RunLabels("one", "rough", 1, 1.0, "soft")
     place = SolutionLabels("truth", *labels, 3e-3)
-    solution = own_solution(runs[labels], 3e-3)
+    solution = own_solution(runs()[labels], 3e-3)
     with pytest.raises(ValueError, match=STATE + "seed is 1 for the run, 2 for the solution"):
-        model_error(campaign, [(place, solution.assign(seed=2))])
+        model_error(tree(), [(place, solution.assign(seed=2))])
     with pytest.raises(ValueError, match=STATE + r"the solution is one of reduced pressure 0\.01"):
-        model_error(campaign, [(place, own_solution(runs[labels], 1e-2))])
+        model_error(tree(), [(place, own_solution(runs()[labels], 1e-2))])
     with pytest.raises(ValueError, match=r"reduced pressure 0\.02: no snapshot of reduced_pressure 0\.02; there are"):
-        model_error(campaign, [(place._replace(reduced_pressure=0.02), solution)])
+        model_error(tree(), [(place._replace(reduced_pressure=0.02), solution)])
     with pytest.raises(ValueError, match=r"run one/rough/seed9/slope1/soft.*no seed 9"):
-        model_error(campaign, [(place._replace(seed=9), solution)])
+        model_error(tree(), [(place._replace(seed=9), solution)])
     with pytest.raises(ValueError, match=STATE + "this solution is given twice"):
-        model_error(campaign, [(place, solution)] * 2)
+        model_error(tree(), [(place, solution)] * 2)
     with pytest.raises(ValueError, match=STATE + "boundary elements have a contact area of 0"):
-        model_error(campaign, [(place, own_solution(runs[labels], 3e-3, area=0.0))])
+        model_error(tree(), [(place, own_solution(runs()[labels], 3e-3, area=0.0))])
     with pytest.raises(ValueError, match=r"entry truth, run .*/hertz, reduced pressure 0\.01: no solution"):
-        model_error(campaign, solutions(runs)[:-1])
+        model_error(tree(), solutions()[:-1])
     with pytest.raises(ValueError, match="at least one"):
-        model_error(campaign, [])
+        model_error(tree(), [])
 
 
-def test_runs_that_ended_early_are_not_compared(runs):
+def test_runs_that_ended_early_are_not_compared():
     labels = RunLabels("one", "rough", 1, 1.0, "soft")
-    short = runs[labels].isel(step=slice(0, 1), snapshot=slice(0, 1))
+    short = runs()[labels].isel(step=slice(0, 1), snapshot=slice(0, 1))
     short = short.isel(spot=np.flatnonzero(short["spot_snapshot"].values == 0))
-    members = [(labels, short), *((key, run) for key, run in runs.items() if key != labels)]
+    members = [(labels, short), *((key, run) for key, run in runs().items() if key != labels)]
     tree = campaign_tree(members, allow_missing=True)
     with pytest.raises(ValueError, match=STATE + "this run is incomplete"):
         model_error(tree, [(SolutionLabels("truth", *labels, 3e-3), own_solution(short, 3e-3))])

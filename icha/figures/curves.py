@@ -66,22 +66,27 @@ def study_curves(campaign: xr.DataTree, study: str) -> list[Curve]:
     return curves
 
 
-def extra_height(curves: list[Curve]) -> float:
-    """Inches that the legend of `add_legends` needs below the panels."""
-    named = sum(curve.look["label"] is not None for curve in curves)
-    return 0.1 * named if named > 3 else 0.0
+# More runs than this are named below the panels, and all lines if a panel had more names than this.
+_MOST_RUNS = 3
+_MOST_NAMES = 6
 
 
 def add_legends(figure: Figure, panels: dict, curves: list[Curve]) -> None:
-    """Add a legend to every panel of `panels` (axes and corner); many runs are named once, below the panels."""
-    shown = {curve.look["label"] for curve in curves} - {None}
-    if len(shown) > 3:
-        first = next(iter(panels))
-        runs_shown = [pair for pair in zip(*first.get_legend_handles_labels(), strict=True) if pair[1] in shown]
-        figure.legend(*zip(*runs_shown, strict=True), loc="outside lower center", ncols=2)
+    """Add a legend to every panel of `panels` (axes and corner); what would crowd them is named once, below.
+
+    The figure grows by the height of what stands below.
+    """
+    runs = {curve.look["label"] for curve in curves} - {None}
+    names = {axes: dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True)) for axes in panels}
+    known = {name: handle for own in names.values() for name, handle in own.items()}
+    if max(map(len, names.values())) - len(runs) * (len(runs) > _MOST_RUNS) > _MOST_NAMES:
+        below = known
     else:
-        shown = set()
+        below = {name: handle for name, handle in known.items() if name in runs and len(runs) > _MOST_RUNS}
+    if below:
+        figure.set_figheight(figure.get_figheight() + 0.1 * len(below))
+        figure.legend(below.values(), below.keys(), loc="outside lower center", ncols=2)
     for axes, corner in panels.items():
-        others = [pair for pair in zip(*axes.get_legend_handles_labels(), strict=True) if pair[1] not in shown]
-        if others:
-            axes.legend(*zip(*others, strict=True), loc=corner)
+        own = {name: handle for name, handle in names[axes].items() if name not in below}
+        if own:
+            axes.legend(own.values(), own.keys(), loc=corner)

@@ -12,28 +12,45 @@ from icha.figures.curves import (
     PRESSURE_LABEL,
     SEPARATION_LABEL,
     add_legends,
-    extra_height,
     study_curves,
 )
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.figures.select import study_errors
+from icha.figures.style import BLACK, COLOURS, GREY, TWO_COLUMNS, new_figure, panel_label, styled
 
 CAPTION = (
     "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
     "F/(E* h'rms A0), on double logarithmic axes. Markers: ICHA, one for each stop of the loading path; open markers "
-    "are without adhesion. Lines: adhesionless theories of Persson (area) and of Yang and Persson (separation), and "
-    "the linear law of Bush, Gibson and Thomas where few summits touch. Crosses: adhesionless Green's function "
-    "molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no roll-off), reduced from published data."
+    "are without adhesion. Upright crosses, where there are any: boundary elements, an independent code, on the same "
+    "topographies and with the same interaction range, in the colour of the material; their area is corrected by the "
+    "perimeter of the contact. At the ranges that a grid resolves they show practically no hysteresis, so that with "
+    "adhesion they bound the limit of short ranges (JKR), and do not prove it. Lines: adhesionless theories of Persson "
+    "(area) and of Yang and Persson (separation), the linear law of Bush, Gibson and Thomas where few summits touch, "
+    "and the theories of separate summits of Greenwood and Williamson (no adhesion) and of Fuller and Tabor (with "
+    "adhesion, in the colour of the material), with the spectral moments of the surface. Oblique crosses: "
+    "adhesionless Green's function molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no roll-off), "
+    "reduced from published data."
 )
 
 
+# Boundary elements; further solutions of the same states, on other grids, have markers of their own.
+_CROSSES = ("+", "1", "2", "3", "4")
+
+
 @styled
-def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study: str) -> Figure:
+def figure(
+    campaign: xr.DataTree,
+    references: xr.Dataset | None = None,
+    model_error: xr.DataTree | None = None,
+    *,
+    study: str,
+) -> Figure:
     """Draw all runs of a study.
 
     Parameters
     ----------
     campaign : the campaign dataset.
     references : theories and points for the study's surface (`icha.reference.reference_dataset`), if any.
+    model_error : `icha.model_error.model_error` of the campaign, for the boundary elements beside its runs, if any.
     study : name of the study.
 
     Raises
@@ -42,7 +59,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         If there is no such study or no run in it.
     """
     curves = study_curves(campaign, study)
-    fig = new_figure(TWO_COLUMNS, 3.3 + extra_height(curves))
+    fig = new_figure(TWO_COLUMNS, 3.3)
     left, right = fig.subplots(1, 2)
     pressures, areas, gaps = [], [], []
     for run, look in curves:
@@ -52,12 +69,18 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         pressures.append(p[p > 0])
         areas.append(run["contact_area_fraction"].values)
         gaps.append(run["reduced_separation"].values)
+    materials = campaign[study]["material"].values.tolist()
+    for p, area, gap in _draw_solutions(left, right, materials, study_errors(model_error, study)):
+        pressures.append(p)
+        areas.append(area)
+        gaps.append(gap)
     pressures, areas, gaps = map(np.concatenate, (pressures, areas, gaps))
     gaps = gaps[gaps > 0]
 
     x = (pressures.min() / 1.6, max(pressures.max() * 1.6, 0.3))
     if references is not None:
         _draw_references(left, right, references, x)
+        _draw_separate_summits(left, right, references, campaign[study].to_dataset())
     left.set_xlim(x)
     right.set_xlim(x)
     left.set_ylim(min(areas.min(), 1.6 * x[0]) / 1.5, 1)
@@ -73,6 +96,37 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     right.set_ylabel(SEPARATION_LABEL)
     add_legends(fig, {left: "lower right", right: "lower left"}, curves)
     return fig
+
+
+def _draw_solutions(left, right, materials, entries):
+    """Mark the states of boundary elements; returns their pressures, areas and separations."""
+    states, drawn = [], []
+    for entry, errors in entries.items():
+        for material in errors["material"].values.tolist():
+            again = drawn.count(material)
+            drawn.append(material)
+            own = errors.sel(material=material)
+            area, gap = (
+                own[f"{name}_boundary_elements"].transpose(..., "reduced_pressure").values
+                for name in ("contact_area_fraction", "reduced_separation")
+            )
+            p = np.broadcast_to(own["reduced_pressure"].values, area.shape)
+            look = {
+                "ls": "none",
+                "marker": _CROSSES[again % len(_CROSSES)],
+                "mec": COLOURS[(materials.index(material) + 1) % len(COLOURS)],
+                "mew": 1.0,
+                # The larger ones show behind the others where the results agree, as the runs' markers do.
+                "ms": 8 if float(own["surface_energy"]) > 0 else 11,
+                "zorder": 6,
+            }
+            states.append((p.ravel(), area.ravel(), gap.ravel()))
+            for ax, values in ((left, states[-1][1]), (right, states[-1][2])):
+                ax.plot(states[-1][0], values, **look)
+                if again or len(drawn) == 1:
+                    name = f"boundary elements, {entry}" if again else "boundary elements"
+                    ax.plot([], [], **look | {"mec": GREY, "ms": 8}, label=name)
+    return states
 
 
 def _draw_references(left, right, references, limits):
@@ -112,3 +166,29 @@ def _draw_references(left, right, references, limits):
             label="Yang & Persson",
             zorder=2,
         )
+
+
+def _draw_separate_summits(left, right, references, dataset):
+    """Thin lines of the theories of separate summits, where the references have them; Fuller & Tabor by material."""
+    area, look = references.get("summit_area_fraction"), {"lw": 0.8, "zorder": 1.8}
+    dashes = {"Greenwood & Williamson": (0, (5, 2, 1, 2)), "Fuller & Tabor": (0, (1, 1.5))}
+    curves = []
+    if "greenwood_williamson_reduced_pressure" in references:
+        values = [references[f"greenwood_williamson_reduced_{name}"].values for name in ("pressure", "separation")]
+        curves.append(("Greenwood & Williamson", GREY, *values))
+    if "fuller_tabor_reduced_pressure" in references:
+        materials = dataset["material"].values.tolist()
+        for k, name in enumerate(references["fuller_tabor_material"].values.tolist()):
+            slope = float(references["fuller_tabor_rms_slope"][k])
+            if name in materials and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
+                colour = COLOURS[(materials.index(name) + 1) % len(COLOURS)]
+                own = references.isel(fuller_tabor_curve=k)
+                values = [own[f"fuller_tabor_reduced_{quantity}"].values for quantity in ("pressure", "separation")]
+                curves.append(("Fuller & Tabor", colour, *values))
+    for name, colour, p, separation in curves:
+        pushed = p > 0
+        for ax, values in ((left, area.values), (right, separation)):
+            ax.plot(p[pushed], values[pushed], color=colour, ls=dashes[name], **look)
+    for name in dict.fromkeys(name for name, *_ in curves):
+        for ax in (left, right):
+            ax.plot([], [], color=GREY, ls=dashes[name], label=name, **look)

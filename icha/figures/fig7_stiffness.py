@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.curves import PRESSURE_LABEL, add_legends, extra_height, study_curves
+from icha.figures.curves import PRESSURE_LABEL, add_legends, study_curves
 from icha.figures.style import BLACK, TWO_COLUMNS, new_figure, panel_label, styled
 
 CAPTION = (
@@ -35,7 +35,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         If there is no such study or no run in it, or nothing in it has a positive load and stiffness.
     """
     curves = study_curves(campaign, study)
-    fig = new_figure(TWO_COLUMNS, 3.3 + extra_height(curves))
+    fig = new_figure(TWO_COLUMNS, 3.3)
     left, right = fig.subplots(1, 2)
     pressures, stiffnesses = [], []
     for run, look in curves:

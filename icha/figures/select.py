@@ -77,3 +77,9 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     """At which load, area or separation a snapshot was taken, for figures."""
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
     return f"{_KIND_LABELS[kind]} = {number(value)}"
+
+
+def study_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:
+    """The entries of a model error that compare the runs of a study, by name; none where no error is given."""
+    entries = model_error.children if model_error is not None else {}
+    return {name: node.to_dataset() for name, node in entries.items() if node.attrs["study"] == study}

@@ -1,0 +1,123 @@
+"""Differences between the model and boundary elements against load: one look for all figures that show them."""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from icha.figures.curves import PRESSURE_LABEL
+from icha.figures.select import study_errors
+from icha.figures.style import COLOURS, DASHES, MARKERS, TWO_COLUMNS, material_label, new_figure, panel_label
+
+# More surfaces than this, and every material has panels of its own.
+_MOST_LINES = 2
+# Points of one load stand this far apart, as a factor, so that their bars do not hide each other.
+_APART = 1.025
+
+
+class Quantity(NamedTuple):
+    """A variable of the model error, the label of its axis, and its factor and limits on it (None: as they come)."""
+
+    name: str
+    label: str
+    factor: float = 1.0
+    limits: tuple[float | None, float | None] = (None, None)
+
+
+def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity, ...]) -> Figure:
+    """A panel for every quantity, with a curve for every surface, slope and material; bars are the scatter over seeds.
+
+    Raises
+    ------
+    ValueError
+        If the model error has nothing of the study.
+    """
+    entries = study_errors(model_error, study)
+    if not entries:
+        there = sorted({str(node.attrs["study"]) for node in model_error.children.values()})
+        raise ValueError(f"no boundary elements beside study {study!r}; there are some for {', '.join(there)}")
+    places = [
+        (entry, surface, slope, material)
+        for entry, errors in entries.items()
+        for material, surface, slope in itertools.product(
+            *(errors[label].values.tolist() for label in ("material", "surface", "rms_slope"))
+        )
+    ]
+    lines = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in places))
+    materials = list(dict.fromkeys(material for *_, material in places))
+    interfaces = _interfaces(entries, materials)
+    own_rows = len(lines) > _MOST_LINES
+    rows = [[material] for material in materials] if own_rows else [materials]
+
+    fig = new_figure(TWO_COLUMNS, 0.55 + 2.35 * len(rows) + 0.085 * _count(lines, materials, places, own_rows))
+    panels = fig.subplots(len(rows), len(quantities), sharex=True, sharey="col", squeeze=False)
+    letters = iter("abcdefghijklmnopqrstuvwxyz")
+    named: dict[str, object] = {}
+    for row, shown in zip(panels, rows, strict=True):
+        mine = [place for place in places if place[-1] in shown]
+        for k, (entry, surface, slope, material) in enumerate(mine):
+            errors = entries[entry].sel(surface=surface, rms_slope=slope, material=material)
+            # Solutions of the same state on another grid, say.
+            again = [place[0] for place in places if place[1:] == (surface, slope, material)].index(entry)
+            line, kind = lines.index((surface, slope)), materials.index(material)
+            colour = COLOURS[(line if own_rows else kind + 1) % len(COLOURS)]
+            adhesive = float(errors["surface_energy"]) > 0
+            name = [] if own_rows else [material_label(interfaces, material)]
+            name += [surface] if len({surface for surface, _ in lines}) > 1 else []
+            name += (
+                [rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"] if len({slope for _, slope in lines}) > 1 else []
+            )
+            name += [entry] if again else []
+            look = {
+                "color": colour,
+                "marker": MARKERS[(line // len(COLOURS) if own_rows else line) % len(MARKERS)],
+                "ls": DASHES[again % len(DASHES)],
+                "mfc": colour if adhesive else "white",
+                "ms": 4,
+                "lw": 0.9,
+                "elinewidth": 0.7,
+                "capsize": 1.5,
+            }
+            p = errors["reduced_pressure"].values * _APART ** (k - (len(mine) - 1) / 2)
+            for ax, quantity in zip(row, quantities, strict=True):
+                deviation = errors.get(f"{quantity.name}_deviation")
+                bars = None if deviation is None else quantity.factor * deviation.values
+                handle = ax.errorbar(p, quantity.factor * errors[f"{quantity.name}_mean"].values, bars, **look)
+            named.setdefault(", ".join(name), handle)
+        if own_rows:
+            row[-1].set_title(material_label(interfaces, shown[0]), loc="right")
+        for ax, quantity in zip(row, quantities, strict=True):
+            ax.set_xscale("log")
+            ax.axhline(0, color="0.6", lw=0.7, zorder=0)
+            ax.set_ylabel(quantity.label)
+            panel_label(ax, next(letters))
+    for ax, quantity in zip(panels[-1], quantities, strict=True):
+        ax.set_xlabel(PRESSURE_LABEL)
+        ax.set_ylim(*quantity.limits)
+    if len(named) > 1 or "" not in named:
+        fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=_columns(named))
+    return fig
+
+
+def _columns(names):
+    return 2 if max(map(len, names)) > 24 else 4
+
+
+def _count(lines, materials, places, own_rows):
+    """About how many rows the legend has, in units of half a line."""
+    names = len(lines) + len(places) - len({place[1:] for place in places}) if own_rows else len(places)
+    return 2 * np.ceil(names / (4 if own_rows else 2))
+
+
+def _interfaces(entries, materials):
+    """Modulus, energy and range of the materials of all entries."""
+    names = ("contact_modulus", "surface_energy", "interaction_range")
+    found = {}
+    for errors in entries.values():
+        for material in errors["material"].values.tolist():
+            found.setdefault(material, errors[list(names)].sel(material=material))
+    return xr.concat([found[material] for material in materials], "material", coords="minimal", compat="override")

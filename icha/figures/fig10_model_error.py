@@ -1,0 +1,41 @@
+"""Fig. 10: how far contact area and mean separation are from boundary elements, against load."""
+
+from __future__ import annotations
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from icha.figures.errors import Quantity, draw_errors
+from icha.figures.style import styled
+
+CAPTION = (
+    "Error of the model: contact area and mean separation of ICHA over those of boundary elements, less one, in per "
+    "cent, against the reduced pressure F/(E* h'rms A0). Both press the same topographies with the same interaction "
+    "range; the boundary elements are an independent code, and their contact area is corrected by the perimeter of the "
+    "contact (Yastrebov et al., 2017). Points: mean over the seeds; bars: their standard deviation; open markers are "
+    "without adhesion. At the ranges of attraction that a grid resolves boundary elements show practically no "
+    "hysteresis between loading and unloading: with adhesion they bound the error in the limit of short ranges (JKR), "
+    "they do not prove it."
+)
+
+QUANTITIES = (
+    Quantity("area_error", r"error of $A/A_0$ (%)", 100),
+    Quantity("separation_error", r"error of $\bar{u}$ (%)", 100),
+)
+
+
+@styled
+def figure(model_error: xr.DataTree, *, study: str) -> Figure:
+    """Draw all entries that compare the runs of a study.
+
+    Parameters
+    ----------
+    model_error : `icha.model_error.model_error` of the campaign.
+    study : name of the study.
+
+    Raises
+    ------
+    ValueError
+        If the study has no boundary elements beside it.
+    """
+    return draw_errors(model_error, study, QUANTITIES)

@@ -1,0 +1,42 @@
+"""Fig. 11: how far distributions of pressure and gap, and the contact map, are from boundary elements."""
+
+from __future__ import annotations
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from icha.figures.errors import Quantity, draw_errors
+from icha.figures.style import styled
+
+CAPTION = (
+    "How the states of ICHA differ from those of boundary elements of the same topographies, loads and interaction "
+    "range, by an independent code, against the reduced pressure F/(E* h'rms A0): first Wasserstein distance (area "
+    "between the cumulative distributions) between the P(p), in units of the nominal pressure, and between the P(u), "
+    "in units of the rms height, both over the nominal area; and the overlap of the contact maps, area in contact in "
+    "both over area in contact in either, on the nodes of the boundary elements. Points: mean over the seeds; bars: "
+    "their standard deviation; open markers are without adhesion. At the ranges that a grid resolves boundary elements "
+    "show practically no hysteresis: with adhesion they bound the limit of short ranges (JKR), they do not prove it."
+)
+
+QUANTITIES = (
+    Quantity("pressure_distribution_distance", r"distance of $P(p)$,  $W_1/p$", limits=(0, None)),
+    Quantity("gap_distribution_distance", r"distance of $P(u)$,  $W_1/h_{\mathrm{rms}}$", limits=(0, None)),
+    Quantity("jaccard", "overlap of the contact maps", limits=(0, 1)),
+)
+
+
+@styled
+def figure(model_error: xr.DataTree, *, study: str) -> Figure:
+    """Draw all entries that compare the runs of a study.
+
+    Parameters
+    ----------
+    model_error : `icha.model_error.model_error` of the campaign.
+    study : name of the study.
+
+    Raises
+    ------
+    ValueError
+        If the study has no boundary elements beside it.
+    """
+    return draw_errors(model_error, study, QUANTITIES)

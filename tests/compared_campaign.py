@@ -1,0 +1,72 @@
+"""A small campaign with snapshots at common loads, and solutions beside it that differ by known amounts."""
+
+import itertools
+from functools import cache
+
+import numpy as np
+import small_campaign as small
+
+import icha
+from icha.campaign import RunLabels, campaign_tree, find_snapshot
+from icha.labels import SolutionLabels
+from icha.model_error import SHARED, contact_of_spots, model_error, state_of
+
+PRESSURES = (3e-3, 1e-2)
+GRID = 96
+
+
+@cache
+def runs():
+    path = icha.Path(reduced_pressures=PRESSURES, snapshots=[("reduced_pressure", p) for p in PRESSURES], max_step=0.2)
+    return {
+        RunLabels("one", "rough", seed, 1.0, material): icha.simulate(
+            small.surface(seed), small.MATERIALS[material], path, seed=seed
+        )
+        for seed, material in itertools.product((1, 2, 3), ("soft", "hertz"))
+    }
+
+
+@cache
+def tree():
+    return campaign_tree(runs().items(), attrs={"title": "Compared campaign", "summary": "For tests."})
+
+
+def own_solution(run, pressure, *, area=1.0, separation=1.0):
+    """A solution made of the run's own state, with area and separation multiplied by known factors."""
+    at = find_snapshot(run, "reduced_pressure", pressure)
+    state = state_of(run, at)
+    contact = contact_of_spots(run, at, GRID)
+    kept = "gap_density gap_bin_edges pressure_density pressure_bin_mean pressure_bin_edges"
+    return state[[*kept.split(), "seed", *SHARED]].assign(
+        contact=(("y", "x"), contact.astype(np.int8)),
+        contact_area_fraction=state["contact_area_fraction"] * area,
+        contact_area_fraction_raw=contact.mean(),
+        reduced_separation=state["reduced_separation"] * separation,
+        target_reduced_pressure=pressure,
+        load_error=1e-5,
+        residual=1e-9,
+        grid=GRID,
+    )
+
+
+def solutions(entry="truth", keep=lambda labels: True, *, area=lambda labels: 1.0, separation=1.0):
+    """Solutions of all runs that `keep` names, at all loads; `area` is a function of the run's labels."""
+    return [
+        (SolutionLabels(entry, *labels, p), own_solution(run, p, area=area(labels), separation=separation))
+        for labels, run in runs().items()
+        if keep(labels)
+        for p in PRESSURES
+    ]
+
+
+AREA_FACTORS = {1: 1.1, 2: 1.2, 3: 1.6}
+
+
+@cache
+def errors():
+    """Boundary elements with more area, by a factor of the seed with adhesion and by a quarter without."""
+    adhesive = solutions(
+        "adhesive", lambda labels: labels.material == "soft", area=lambda labels: AREA_FACTORS[labels.seed]
+    )
+    bare = solutions("bare", lambda labels: labels.material == "hertz", area=lambda labels: 1.25, separation=0.8)
+    return model_error(tree(), [*adhesive, *bare])
