@@ -7,6 +7,7 @@ import xarray as xr
 import icha
 from icha.asperities import Asperities, find_summits
 from icha.equilibrium import Contact, area_fraction
+from icha.figures import fig12_error_sources
 from icha.jkr import JKR
 from icha.path import load
 from icha.reference.boundary_elements import NodalState, contact_state, perimeter_correction
@@ -27,6 +28,7 @@ from icha.reference.error_sources import (
     summit_curvatures,
     union_area_fraction,
 )
+from icha.reference.error_sources_page import page, ratios, split
 
 HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)
 LAW = JKR(HARD)
@@ -296,3 +298,53 @@ def test_with_adhesion_the_chain_is_shorter(surface):
 def test_odd_refinements_are_refused(surface):
     with pytest.raises(ValueError, match="refinement: 3"):
         error_sources(surface, HARD, PRESSURES, refinement=3)
+
+
+# --- figure and page --------------------------------------------------------------------------------------------
+
+
+def test_figure_shows_the_ratios(sources):
+    drawn = fig12_error_sources.figure([sources.assign(seed=4), sources])
+    areas = drawn.axes[0]
+    black = next(line for line in areas.get_lines() if line.get_color() == "#000000" and len(line.get_xdata()) == 3)
+    area = sources["contact_area_fraction"]
+    expected = area.sel(variant="icha") / area.sel(variant="boundary_elements")
+    assert black.get_ydata() == pytest.approx(expected.values, rel=1e-12)
+    assert drawn.axes[2].get_lines()[0].get_ydata() == pytest.approx(np.log(expected.values), rel=1e-9)
+
+
+def test_figure_refuses_what_cannot_be_averaged(sources):
+    with pytest.raises(ValueError, match="no dataset"):
+        fig12_error_sources.figure([])
+    with pytest.raises(ValueError, match="reduced pressures"):
+        fig12_error_sources.figure([sources, sources.isel(reduced_pressure=[0, 1])])
+    with pytest.raises(ValueError, match="adhesion"):
+        fig12_error_sources.figure([sources.assign(surface_energy=1.0)])
+
+
+def test_medians_of_equally_filled_bins():
+    x = np.arange(80.0)
+    at, middle = fig12_error_sources.medians(x[::-1], np.where(x < 50, np.nan, 3.0)[::-1])
+    assert at == pytest.approx(np.arange(8) * 10 + 4.5)
+    assert middle == pytest.approx([np.nan] * 5 + [3.0] * 3, nan_ok=True)
+
+
+def test_page_has_means_and_deviations_of_the_datasets(sources):
+    other = sources.copy(deep=True).assign(seed=4)
+    factor = xr.where(other["variant"] == "icha", 1.1, 1.0)
+    other["contact_area_fraction"] = other["contact_area_fraction"] * factor
+    area = sources["contact_area_fraction"].isel(reduced_pressure=0)
+    ratio = float(area.sel(variant="icha") / area.sel(variant="boundary_elements"))
+    row = ratios([sources, other], "contact_area_fraction").splitlines()[2]
+    assert row.startswith(f"| ICHA | {1.05 * ratio:.3f} ± {0.1 * ratio / np.sqrt(2):.3f} |")
+    text = page([sources, other], figure="images/some.png", command="some command")
+    assert "`some command`" in text and "(images/some.png)" in text and "seeds 3, 4" in text
+    assert "nan" not in text
+    with_adhesion = page([sources], [sources.drop_dims("pair")], figure="a.png", command="b")
+    assert "## With adhesion" in with_adhesion
+
+
+def test_table_of_the_split_has_the_whole_load(sources):
+    rows = [line.split("|")[1:-1] for line in split([sources]).splitlines()[2:]]
+    loads = np.array([[cell.split("/") for cell in row[1:]] for row in rows if "load" in row[0]], dtype=float)
+    assert loads.sum(axis=0) == pytest.approx(np.full((len(PRESSURES), 2), 100), abs=0.3)

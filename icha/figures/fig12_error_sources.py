@@ -1,0 +1,163 @@
+"""Fig. 12: from the model to boundary elements, one thing at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from icha.figures.curves import PRESSURE_LABEL
+from icha.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    TWO_COLUMNS,
+    VERMILLION,
+    new_figure,
+    panel_label,
+    styled,
+)
+from icha.reference.error_sources import effects, relative_radius, shape_ratio, shape_ratio_of_fourth_order
+
+CAPTION = (
+    "Where the model's error comes from: between ICHA and boundary elements (BEM) one thing is switched at a time, on "
+    "the same topographies, without adhesion. (a) Contact area and (b) mean separation over those of boundary elements "
+    "on the true topography, against the reduced pressure F/(E* h'rms A0); paraboloids: boundary elements on the upper "
+    "envelope of the summits' paraboloids instead of the topography. (c) What every step from boundary elements to the "
+    "model adds to the logarithm of the area; the steps add up to the black line. (d) Spots of one summit: area of the "
+    "patch over Hertz's area at the patch's own force, against the patch's radius a times the wave number q = (mean "
+    "q^4 / mean q^2)^(1/2) of the surface; line: medians; dashed: medians of what the summits' fourth-order terms alone "
+    "give. In (a) and (b) mean and standard deviation over the seeds; in (c) means."
+)
+
+LOOKS = {
+    "icha": ("ICHA", BLACK, "o", "-"),
+    "without_unions": ("ICHA without unions", BLUE, "s", "--"),
+    "independent": ("Hertz, no interaction", ORANGE, "v", ":"),
+    "circular_paraboloids": ("BEM, circular paraboloids", GREEN, "^", "--"),
+    "elliptic_paraboloids": ("BEM, elliptic paraboloids", VERMILLION, "D", "-"),
+}
+_EFFECT_COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION)
+# Patches of fewer boundary elements have no area to speak of.
+_LEAST_NODES = 20
+_BINS = 8
+
+
+@styled
+def figure(error_sources: Sequence[xr.Dataset]) -> Figure:
+    """Draw the datasets of `icha.reference.error_sources.error_sources`, of surfaces that differ in their seeds only.
+
+    Raises
+    ------
+    ValueError
+        If there is none, one is with adhesion, or they are not at the same pressures.
+    """
+    error_sources = one_study(error_sources)
+    fig = new_figure(TWO_COLUMNS, 5.7)
+    (areas, separations), (steps, singles) = fig.subplots(2, 2)
+    _draw_ratios(areas, error_sources, "contact_area_fraction")
+    _draw_ratios(separations, error_sources, "mean_separation")
+    _draw_effects(steps, error_sources)
+    _draw_single_spots(singles, error_sources)
+    areas.set_ylabel(r"$A/A_{\mathrm{BEM}}$")
+    separations.set_ylabel(r"$\bar{u}/\bar{u}_{\mathrm{BEM}}$")
+    areas.legend(loc="best", fontsize=7)
+    for ax, letter in zip((areas, separations, steps, singles), "abcd", strict=True):
+        panel_label(ax, letter)
+    return fig
+
+
+def one_study(error_sources: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """The datasets in the order of their seeds, if they can be averaged.
+
+    Raises
+    ------
+    ValueError
+        If there is none, one is with adhesion, or they are not at the same pressures.
+    """
+    ordered = sorted(error_sources, key=lambda one: int(one["seed"]))
+    if not ordered:
+        raise ValueError("error_sources: there is no dataset to draw")
+    for one in ordered:
+        if float(one["surface_energy"]) > 0:
+            raise ValueError("error_sources: all have to be without adhesion")
+        if not np.array_equal(one["reduced_pressure"], ordered[0]["reduced_pressure"]):
+            raise ValueError("error_sources: all have to be at the same reduced pressures")
+    return ordered
+
+
+def _draw_ratios(ax, error_sources, name):
+    ax.axhline(1, color=GREY, lw=0.8)
+    for variant, (label, colour, marker, dashes) in LOOKS.items():
+        ratio = np.array(
+            [one[name].sel(variant=variant) / one[name].sel(variant="boundary_elements") for one in error_sources]
+        )
+        ax.errorbar(
+            error_sources[0]["reduced_pressure"],
+            ratio.mean(axis=0),
+            yerr=ratio.std(axis=0, ddof=1) if len(ratio) > 1 else None,
+            color=colour,
+            marker=marker,
+            ls=dashes,
+            ms=3.8,
+            lw=0.9,
+            elinewidth=0.6,
+            capsize=1.5,
+            label=label,
+        )
+    ax.set_xscale("log")
+    ax.set_xlabel(PRESSURE_LABEL)
+
+
+def _draw_effects(ax, error_sources):
+    mean = sum(effects(one) for one in error_sources) / len(error_sources)
+    p = mean["reduced_pressure"].values
+    place = np.arange(len(p))
+    above, below = np.zeros(len(p)), np.zeros(len(p))
+    for source, colour in zip(mean["source"].values, _EFFECT_COLOURS, strict=True):
+        effect = mean.sel(source=source).values
+        ax.bar(place, effect, 0.6, bottom=np.where(effect > 0, above, below), color=colour, label=str(source))
+        above += np.maximum(effect, 0)
+        below += np.minimum(effect, 0)
+    ax.plot(place, mean.sum("source"), color=BLACK, marker="o", ms=4, lw=1, label="all: the model's error")
+    ax.axhline(0, color=GREY, lw=0.8)
+    ax.set_xticks(place, [f"{value:.3g}" for value in p])
+    ax.tick_params(axis="x", which="both", length=0)
+    ax.set_ylim(1.15 * below.min(), 1.9 * above.max() - 0.9 * below.min())
+    ax.set_xlabel(PRESSURE_LABEL)
+    ax.set_ylabel(r"part of $\ln(A/A_{\mathrm{BEM}})$")
+    ax.legend(loc="upper left", fontsize=6.5, ncols=1)
+
+
+def _draw_single_spots(ax, error_sources):
+    x, ratio, expected = (
+        np.concatenate([quantity(one)[one["pair_patch_nodes"].values >= _LEAST_NODES] for one in error_sources])
+        for quantity in (relative_radius, shape_ratio, shape_ratio_of_fourth_order)
+    )
+    ax.axhline(1, color=GREY, lw=0.8)
+    ax.plot(x, ratio, ls="none", marker=".", ms=2.5, color=SKY, zorder=2)
+    if len(x) >= 3 * _BINS:
+        at, median = medians(x, ratio)
+        ax.plot(at, median, color=BLUE, marker="o", label="boundary elements", zorder=4)
+        at, median = medians(x, expected)
+        ax.plot(at, median, color=PURPLE, ls="--", label="fourth-order term", zorder=3)
+        ax.legend(loc="upper left")
+    if len(x):
+        ax.set_ylim(min(0.8, ratio.min()), min(2.2, 1.2 * ratio.max()))
+    ax.set_xlim(left=0)
+    ax.set_xlabel(r"radius of the patch  $aq$")
+    ax.set_ylabel(r"$A/A_{\mathrm{Hertz}}(F)$")
+
+
+def medians(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Medians of x and y in bins of x with equally many points; a y that is NaN counts as beyond all others."""
+    bins = np.array_split(np.argsort(x, kind="stable"), _BINS)
+    high = np.where(np.isnan(y), np.inf, y)
+    middle = np.array([np.median(high[part]) for part in bins])
+    return np.array([np.median(x[part]) for part in bins]), np.where(np.isfinite(middle), middle, np.nan)
