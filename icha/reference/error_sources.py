@@ -193,7 +193,7 @@ def error_sources(
 
     Parameters
     ----------
-    surface, material : as for `icha.simulate`.
+    surface, material : as for `icha.simulate`; a range of attraction must be resolved on the coarser grid, too.
     reduced_pressures : p/(E* h'_rms) with the rms slope of the surface itself, increasing, (n,).
     refinement : boundary elements per cell of the surface's grid along a side, even, so that half of it can be tried.
     tolerance : of the boundary elements.
