@@ -33,7 +33,7 @@ CAPTION = (
     "model adds to the logarithm of the area; the steps add up to the black line. (d) Spots of one summit: area of the "
     "patch over Hertz's area at the patch's own force, against the patch's radius a times the wave number q = (mean "
     "q^4 / mean q^2)^(1/2) of the surface; line: medians; dashed: medians of what the summits' fourth-order terms "
-    "alone give. In (a) and (b) mean and standard deviation over the seeds; in (c) means."
+    "alone give; a few points lie above the frame. In (a) and (b) mean and standard deviation over the seeds; in (c) means."
 )
 
 LOOKS = {
@@ -47,6 +47,8 @@ _EFFECT_COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION)
 # Patches of fewer boundary elements have no area to speak of.
 _LEAST_NODES = 20
 _BINS = 8
+# Where the frame of panel (d) ends.
+_HIGHEST_RATIO = 3.0
 
 
 @styled
@@ -149,7 +151,7 @@ def _draw_single_spots(ax, error_sources):
         ax.plot(at, median, color=PURPLE, ls="--", label="fourth-order term", zorder=3)
         ax.legend(loc="upper left")
     if len(x):
-        ax.set_ylim(min(0.8, ratio.min()), min(2.2, 1.2 * ratio.max()))
+        ax.set_ylim(min(0.8, ratio.min()), min(_HIGHEST_RATIO, 1.2 * ratio.max()))
     ax.set_xlim(left=0)
     ax.set_xlabel(r"radius of the patch  $aq$")
     ax.set_ylabel(r"$A/A_{\mathrm{Hertz}}(F)$")

@@ -190,12 +190,15 @@ def _pressures(error_sources):
 
 
 def _means(values, form):
+    def written(value):
+        text = form.format(value)
+        return text.replace("-", "+") if float(text) == 0 else text
+
     mean = np.mean(values, axis=0)
     if len(values) == 1:
-        return [form.format(m) for m in mean]
-    plain = form.replace("+", "")
+        return [written(m) for m in mean]
     deviation = np.std(values, axis=0, ddof=1)
-    return [f"{form.format(m)} ± {plain.format(d)}" for m, d in zip(mean, deviation, strict=True)]
+    return [f"{written(m)} ± {form.replace('+', '').format(d)}" for m, d in zip(mean, deviation, strict=True)]
 
 
 def _table(head, rows):
