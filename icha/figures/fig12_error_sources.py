@@ -33,7 +33,8 @@ CAPTION = (
     "model adds to the logarithm of the area; the steps add up to the black line. (d) Spots of one summit: area of the "
     "patch over Hertz's area at the patch's own force, against the patch's radius a times the wave number q = (mean "
     "q^4 / mean q^2)^(1/2) of the surface; line: medians; dashed: medians of what the summits' fourth-order terms "
-    "alone give; a few points lie above the frame. In (a) and (b) mean and standard deviation over the seeds; in (c) means."
+    "alone give; a few points lie above the frame. In (a) and (b) mean and standard deviation over the seeds; in (c) "
+    "means."
 )
 
 LOOKS = {
