@@ -359,3 +359,13 @@ print(digest(boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["adhesi
     )
     here = boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"], PRESSURE)
     assert other.stdout.strip() == digest(here)
+
+
+def test_area_without_adhesion_does_not_depend_on_the_slope():
+    """One topography, scaled: the same area and reduced separation at the same reduced pressure."""
+    steep, flat = (
+        boundary_elements(ROUGH.realise(grid=48, seed=3).scaled_to_rms_slope(slope), HERTZ, PRESSURE)
+        for slope in (1.0, 0.2)
+    )
+    assert flat.contact_area_fraction == pytest.approx(float(steep.contact_area_fraction), rel=1e-6)
+    assert flat.reduced_separation == pytest.approx(float(steep.reduced_separation), rel=1e-6)

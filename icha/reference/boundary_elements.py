@@ -344,7 +344,7 @@ def _next_gap(tried):
     step = min(max(step, -_LONGEST_STEP), _LONGEST_STEP)
     too_much = max((g for g, e in tried if e > 0), default=None)
     too_little = min((g for g, e in tried if e < 0), default=None)
-    following = gap + step
+    following = max(gap + step, 0.5 * gap)  # gaps are positive
     if too_much is not None and too_little is not None and not too_much < following < too_little:
         following = 0.5 * (too_much + too_little)
     return following
