@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import csv
 import importlib.metadata
+import itertools
 import json
 import os
 import re
@@ -26,11 +27,12 @@ from icha.campaign import RunLabels, run_labels, select_run
 from icha.checks import Check, worst
 from icha.figures.style import quantity
 from icha.files import whole_file
+from icha.model_error import SUMMARISED
 
 PAPER = (
     "G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media with an advanced asperity model"
 )
-SOFTWARE = ("icha", "numpy", "scipy", "finufft", "xarray", "netCDF4", "matplotlib", "snakemake")
+SOFTWARE = ("icha", "numpy", "scipy", "finufft", "tamaas", "xarray", "netCDF4", "matplotlib", "snakemake")
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ def write_report(
     figures: Sequence[ReportFigure],
     checks: Iterable[Check],
     comparison: xr.DataTree | None = None,
+    model_error: xr.DataTree | None = None,
     surfaces: Iterable[xr.Dataset] = (),
     times_path: str | os.PathLike | None = None,
     configuration: str = "",
@@ -74,6 +77,7 @@ def write_report(
     figures : in order; the PNGs become part of the page, the PDFs are linked.
     checks : findings of `icha.checks.check_campaign`.
     comparison : `icha.aggregation.compare_campaign` of the campaign, if there is one.
+    model_error : `icha.model_error.model_error` of the campaign, if it has boundary elements.
     surfaces : surface files, for the parameters of their spectra.
     times_path : the table of what the jobs took, to be named.
     configuration : text of the configuration as used.
@@ -101,6 +105,7 @@ def write_report(
         attributes=campaign.attrs,
         figures=pictures,
         studies=[_study(campaign, name, comparison) for name in campaign.children],
+        entries=[_entry(node.to_dataset()) for node in _entries(model_error)],
         surfaces=[_surface(surface) for surface in surfaces],
         checks=worst(checks),
         check_count=len(checks),
@@ -111,7 +116,7 @@ def write_report(
         dataset_name=Path(dataset_path).name if dataset_path is not None else None,
         paper=PAPER,
         citations=citations,
-        references=_references(campaign),
+        references=_references(campaign, model_error),
         software={name: _version(name) for name in SOFTWARE},
     )
     with whole_file(path) as temporary:
@@ -196,6 +201,8 @@ def _run(labels: RunLabels, run):
         "rms_height": quantity(float(run["rms_height"]), "m"),
         "period": quantity(float(run["period"]), "m"),
         "grid": int(run["grid"]),
+        "nayak_parameter": float(run["nayak_parameter"]),
+        "stickiness": float(run["stickiness"]),
         "residual": float(run["residual"].max()) if run.sizes["step"] else None,
         "events": {
             name: int(run[name].values[-1])
@@ -225,6 +232,54 @@ def _spread(comparison):
     return {name: largest(name) for name in names}
 
 
+def _entries(model_error):
+    return model_error.children.values() if model_error is not None else ()
+
+
+def _entry(errors):
+    """What the page says about one entry of the model error: a row for every surface, material and load."""
+    several = errors.sizes["seed"] > 1
+
+    def scatter(state, name):
+        mean = float(state[f"{name}_mean"])
+        return mean, float(state[f"{name}_deviation"]) if several else None
+
+    rows = []
+    for surface, slope, material in itertools.product(
+        *(errors[label].values.tolist() for label in ("surface", "rms_slope", "material"))
+    ):
+        for p in errors["reduced_pressure"].values.tolist():
+            state = errors.sel(surface=surface, rms_slope=slope, material=material, reduced_pressure=p)
+            rows.append(
+                {
+                    "surface": surface,
+                    "rms_slope": slope,
+                    "material": material,
+                    "reduced_pressure": p,
+                    "area": float(state["contact_area_fraction"].mean()),
+                    "true_area": float(state["contact_area_fraction_boundary_elements"].mean()),
+                    **{name: scatter(state, name) for name in SUMMARISED},
+                }
+            )
+
+    def spread(name):
+        values = errors[name].values
+        return {"median": float(np.median(values)), "least": float(values.min()), "most": float(values.max())}
+
+    return {
+        "name": errors.attrs["entry"],
+        "study": errors.attrs["study"],
+        "axes": {label: errors[label].values.tolist() for label in ("rms_slope", "material", "seed")},
+        "states": int(errors["area_error"].size),
+        "grids": sorted(set(errors["solution_grid"].values.ravel().tolist())),
+        "adhesive": bool((errors["surface_energy"] > 0).any()),
+        "load_error": float(np.abs(errors["load_error"]).max()),
+        "residual": float(errors["residual"].max()),
+        "rows": rows,
+        **{name: spread(name) for name in SUMMARISED},
+    }
+
+
 def _surface(surface):
     """Name, seed and parameters of a surface file."""
     lengths = ("period", "rolloff_wavelength", "short_wavelength", "rms_height")
@@ -239,9 +294,10 @@ def _surface(surface):
     }
 
 
-def _references(campaign):
-    """Sources that the studies' datasets name, each once."""
-    found = (node.attrs.get("references", "") for node in campaign.children.values())
+def _references(campaign, model_error):
+    """Sources that the studies' datasets and their boundary elements name, each once."""
+    nodes = [*campaign.children.values(), *_entries(model_error)]
+    found = (node.attrs.get("references", "") for node in nodes)
     return list(dict.fromkeys(part.strip() for text in found for part in text.split(";") if part.strip()))
 
 
@@ -281,6 +337,12 @@ def _scientific(value: float | None) -> Markup:
     return Markup(f"{value / 10.0**exponent:.2f}&thinsp;×&thinsp;10<sup>{str(exponent).replace('-', '−')}</sup>")
 
 
+def _per_cent(value: float, *, signed: bool = True) -> str:
+    """A part in per cent, to a tenth, with a true minus sign."""
+    text = f"{100 * value:+.1f}" if signed else f"{100 * value:.1f}"
+    return text.replace("+0.0", "0.0").replace("-0.0", "0.0").replace("-", "−")
+
+
 def _template() -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("icha", "templates"),
@@ -289,5 +351,5 @@ def _template() -> jinja2.Template:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters |= {"symbols": _symbols, "scientific": _scientific}
+    environment.filters |= {"symbols": _symbols, "scientific": _scientific, "per_cent": _per_cent}
     return environment.get_template("report.html")

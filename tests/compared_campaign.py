@@ -41,6 +41,7 @@ def own_solution(run, pressure, *, area=1.0, separation=1.0):
         contact=(("y", "x"), contact.astype(np.int8)),
         contact_area_fraction=state["contact_area_fraction"] * area,
         contact_area_fraction_raw=contact.mean(),
+        energetic_area_fraction=state["contact_area_fraction"] * area * 1.2,
         reduced_separation=state["reduced_separation"] * separation,
         target_reduced_pressure=pressure,
         load_error=1e-5,

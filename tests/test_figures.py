@@ -417,6 +417,9 @@ def test_fig10_shows_means_and_scatter_of_the_errors_in_per_cent():
     np.testing.assert_allclose(right.containers[1][0].get_ydata(), 25)
     np.testing.assert_allclose(adhesive.get_xdata(), compared.PRESSURES, rtol=0.03)
     assert any(np.all(np.asarray(line.get_ydata()) == 0) for line in left.get_lines())
+    (energetic,) = [line for line in left.get_lines() if line.get_linestyle() == ":"]
+    np.testing.assert_allclose(energetic.get_ydata(), ((expected + 100) / 1.2 - 100).mean())
+    assert energetic.get_color() == adhesive.get_color()
     assert adhesive.get_markerfacecolor() != "white" and bare.get_markerfacecolor() == "white"
 
 

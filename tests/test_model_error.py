@@ -49,6 +49,13 @@ def test_relative_errors_are_those_put_in():
     assert float(np.sum(state["pressure_density"].values * edges)) == pytest.approx(area, rel=1e-9)
 
 
+def test_energetic_area_counts_with_adhesion_only():
+    errors = model_error(tree(), solutions(area=lambda labels: 1.25))["truth"].to_dataset()
+    np.testing.assert_allclose(errors["energetic_area_error"].sel(material="soft"), 1 / 1.5 - 1, rtol=1e-12)
+    bare = errors.sel(material="hertz")
+    np.testing.assert_array_equal(bare["energetic_area_error"], bare["area_error"])
+
+
 def test_scatter_over_the_seeds():
     factor = {1: 1.1, 2: 1.2, 3: 1.6}
     pairs = solutions(area=lambda labels: factor[labels.seed])

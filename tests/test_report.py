@@ -3,6 +3,7 @@
 import re
 from html.parser import HTMLParser
 
+import compared_campaign as compared
 import numpy as np
 import pytest
 import small_campaign as small
@@ -13,6 +14,7 @@ from icha.checks import Check, check_campaign
 from icha.figures import fig1_jkr
 from icha.figures.select import path_steps
 from icha.figures.style import save
+from icha.model_error import model_error
 from icha.records import read_campaign, read_dataset, write_dataset, write_surface
 from icha.report import Benchmark, ReportFigure, read_benchmarks, write_report
 
@@ -83,6 +85,49 @@ def test_page_shows_parameters_results_and_checks(write):
     assert "<script>" not in text and "&lt;script&gt;" in text
     area = dict((p, a) for p, a, _ in at_round_pressures(small.run(rms_slope=0.2, material="hertz")))[1e-2]
     assert f"{area:.4f}" in text
+
+
+def test_error_of_the_model_has_a_section_where_it_is_known(write):
+    assert 'id="error"' not in write() and "#error" not in Page(write()).targets
+    text = write(campaign=compared.tree(), comparison=None, checks=[], model_error=compared.errors())
+    page = Page(text)
+    assert "error" in page.ids and "#error" in page.targets
+    section = text[text.index('<h2 id="error">') : text.index('<h2 id="parameters">')]
+    adhesive, bare = section.split("<h3>")[1:]
+    # A quarter more area and a fifth less separation in every state without adhesion ...
+    for part in (
+        "In 6 states",
+        "seeds 1, 2, 3",
+        "−20.0 % in the median",
+        "+25.0 %, from +25.0 % to +25.0 %",
+        "96² nodes",
+    ):
+        assert part in bare, part
+    assert "hysteresis" in adhesive and "hysteresis" not in bare
+    # ... and a factor of the seed with it.
+    errors = 100 / np.array(list(compared.AREA_FACTORS.values())) - 100
+    for value in (np.median(errors), errors.min(), errors.max()):
+        assert f"{value:.1f} %".replace("-", "−") in adhesive
+    assert f"{errors.mean():.1f} ± {errors.std(ddof=1):.1f}".replace("-", "−") in adhesive
+    run = compared.runs()["one", "rough", 2, 1.0, "hertz"]
+    areas = [
+        float(own["contact_area_fraction"].values[0])
+        for labels, own in compared.runs().items()
+        if labels.material == "hertz"
+    ]
+    assert f"{np.mean(areas):.5f}" in bare and f"{1.25 * np.mean(areas):.4f}" in bare
+    assert f"{float(run['nayak_parameter']):.3g}" in text
+
+
+def test_error_of_one_seed_has_no_scatter_and_sources_are_cited(write):
+    pairs = compared.solutions("one", lambda labels: labels.seed == 2)
+    cited = [(labels, own.assign_attrs(references="B. Elements, J. Tests 1 (2020) 1; PAPER")) for labels, own in pairs]
+    errors = model_error(compared.tree(), cited)
+    text = write(campaign=compared.tree(), comparison=None, checks=[], model_error=errors)
+    section = text[text.index('<h2 id="error">') : text.index('<h2 id="parameters">')]
+    assert "±" not in section.split("<h3>")[1] and "0.0 %" in section and "-0.0" not in section
+    assert text.count("B. Elements, J. Tests 1 (2020) 1") == 1
+    Page(text)
 
 
 def test_failures_are_loud(write):

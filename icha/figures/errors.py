@@ -20,12 +20,16 @@ _APART = 1.025
 
 
 class Quantity(NamedTuple):
-    """A variable of the model error, the label of its axis, and its factor and limits on it (None: as they come)."""
+    """A variable of the model error, the label of its axis, and its factor and limits on it (None: as they come).
+
+    The variable `other`, if there is one, is a dotted line without markers where there is adhesion.
+    """
 
     name: str
     label: str
     factor: float = 1.0
     limits: tuple[float | None, float | None] = (None, None)
+    other: str = ""
 
 
 def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity, ...]) -> Figure:
@@ -86,7 +90,11 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
             for ax, quantity in zip(row, quantities, strict=True):
                 deviation = errors.get(f"{quantity.name}_deviation")
                 bars = None if deviation is None else quantity.factor * deviation.values
-                handle = ax.errorbar(p, quantity.factor * errors[f"{quantity.name}_mean"].values, bars, **look)
+                values = quantity.factor * errors[f"{quantity.name}_mean"].values
+                handle = ax.errorbar(p, values, bars, **look)
+                if quantity.other and adhesive:
+                    others = quantity.factor * errors[f"{quantity.other}_mean"].values
+                    ax.plot(p, others, color=colour, ls=":", lw=0.9)
             named.setdefault(", ".join(name), handle)
         if own_rows:
             row[-1].set_title(material_label(interfaces, shown[0]), loc="right")

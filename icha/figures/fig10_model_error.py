@@ -13,13 +13,15 @@ CAPTION = (
     "cent, against the reduced pressure F/(E* h'rms A0). Both press the same topographies with the same interaction "
     "range; the boundary elements are an independent code, and their contact area is corrected by the perimeter of the "
     "contact (Yastrebov et al., 2017). Points: mean over the seeds; bars: their standard deviation; open markers are "
-    "without adhesion. At the ranges of attraction that a grid resolves boundary elements show practically no "
-    "hysteresis between loading and unloading: with adhesion they bound the error in the limit of short ranges (JKR), "
-    "they do not prove it."
+    "without adhesion. With adhesion the contact is where the gap is zero, and a zone around it attracts as well: "
+    "dotted lines are errors against the energetic area, energy of adhesion over that of full contact, which tends to "
+    "the area of JKR sooner as the range vanishes. At the ranges of attraction that a grid resolves boundary elements "
+    "show practically no hysteresis between loading and unloading: with adhesion they bound the error in the limit of "
+    "short ranges (JKR), they do not prove it."
 )
 
 QUANTITIES = (
-    Quantity("area_error", r"error of $A/A_0$ (%)", 100),
+    Quantity("area_error", r"error of $A/A_0$ (%)", 100, other="energetic_area_error"),
     Quantity("separation_error", r"error of $\bar{u}$ (%)", 100),
 )
 
