@@ -12,6 +12,7 @@ from icha.jkr import JKR
 from icha.path import load
 from icha.reference.boundary_elements import NodalState, contact_state, perimeter_correction
 from icha.reference.error_sources import (
+    ADHESIVE_CHAIN,
     CATEGORIES,
     Discs,
     chain,
@@ -338,9 +339,10 @@ def test_page_has_means_and_deviations_of_the_datasets(sources):
     row = ratios([sources, other], "contact_area_fraction").splitlines()[2]
     assert row.startswith(f"| ICHA | {1.05 * ratio:.3f} ± {0.1 * ratio / np.sqrt(2):.3f} |")
     text = page([sources, other], figure="images/some.png", command="some command")
-    assert "`some command`" in text and "(images/some.png)" in text and "seeds 3, 4" in text
+    assert "`some command`" in text and "(images/some.png)" in text and "seed 3, 4" in text
     assert "nan" not in text
-    with_adhesion = page([sources], [sources.drop_dims("pair")], figure="a.png", command="b")
+    adhesive = sources.sel(variant=["icha", *list(ADHESIVE_CHAIN)[1:]]).assign(surface_energy=1.0)
+    with_adhesion = page([sources], [adhesive], figure="a.png", command="b")
     assert "## With adhesion" in with_adhesion
 
 

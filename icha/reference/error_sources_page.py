@@ -74,6 +74,13 @@ _REST = """## What cannot be attributed
 """
 
 
+_WITH_ADHESION = """The model has the law of Johnson, Kendall and Roberts, which is that of ranges short against the
+deformation around a contact. A range that the grid resolves is not short, so that the first step, from the model to
+circular paraboloids, holds this difference besides contact mechanics and unions; it can be larger than all others, and
+hide the effect of the shape. The model is not solved without its unions here.
+"""
+
+
 def page(adhesionless: Sequence[xr.Dataset], adhesive: Sequence[xr.Dataset] = (), *, figure: str, command: str) -> str:
     """The page, in Markdown.
 
@@ -111,8 +118,13 @@ def page(adhesionless: Sequence[xr.Dataset], adhesive: Sequence[xr.Dataset] = ()
             "## With adhesion\n",
             f"Adhesion of Δγ/E\\* = {length * 1e9:.3g} nm and a range of {range_ * 1e9:.3g} nm, which the grid "
             f"resolves; the boundary elements' area is that of zero gap; {_surfaces(adhesive)}",
+            _WITH_ADHESION,
+            "Contact area at the same load:\n",
             ratios(adhesive, "contact_area_fraction"),
+            "Mean separation at the same load:\n",
             ratios(adhesive, "mean_separation"),
+            "What every step adds to the logarithm of the area, in per cent:\n",
+            steps(adhesive),
         ]
     return "\n".join([*parts, _REST])
 
@@ -182,7 +194,7 @@ def _surfaces(error_sources):
     one = error_sources[0]
     seeds = ", ".join(str(int(each["seed"])) for each in error_sources)
     grid, refinement = int(one["grid"]), int(one["refinement"])
-    return f"surfaces of seeds {seeds}, {grid} × {grid} nodes; boundary elements {refinement} times as fine.\n"
+    return f"surfaces of the same spectrum, seed {seeds}, {grid} × {grid} nodes; boundary elements {refinement} times as fine.\n"
 
 
 def _pressures(error_sources):
