@@ -194,7 +194,10 @@ def _surfaces(error_sources):
     one = error_sources[0]
     seeds = ", ".join(str(int(each["seed"])) for each in error_sources)
     grid, refinement = int(one["grid"]), int(one["refinement"])
-    return f"surfaces of the same spectrum, seed {seeds}, {grid} × {grid} nodes; boundary elements {refinement} times as fine.\n"
+    return (
+        f"surfaces of the same spectrum, seed {seeds}, {grid} × {grid} nodes; "
+        f"boundary elements {refinement} times as fine.\n"
+    )
 
 
 def _pressures(error_sources):
