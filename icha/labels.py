@@ -25,6 +25,21 @@ class RunLabels(NamedTuple):
         return self.path
 
 
+class SourceLabels(NamedTuple):
+    """Which study of the sources of the error: the entry that asks for it, and what is pressed against what."""
+
+    entry: str
+    surface: str
+    seed: int
+    rms_slope: float
+    material: str
+
+    @property
+    def path(self) -> str:
+        """Where its file stands among the others, without the ending."""
+        return f"{self.entry}/{self.surface}/seed{self.seed}/slope{number_label(self.rms_slope)}/{self.material}"
+
+
 class SolutionLabels(NamedTuple):
     """Which boundary-element solution of a campaign: the entry that asks for it, the run beside it, and its load."""
 

@@ -9,10 +9,15 @@ import yaml
 from icha.configuration import model
 from icha.configuration.expansion import (
     campaign_sha256,
+    map_solution,
     measurement_settings,
     run_cases,
     run_settings,
     run_sha256,
+    solution_cases,
+    solution_settings,
+    source_cases,
+    source_settings,
     surface_cases,
     surface_settings,
 )
@@ -107,14 +112,43 @@ def test_the_papers_campaign():
     campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
     assert campaign.name == "paper"
     cases = run_cases(campaign)
-    assert len(cases) == 2 + 9
-    assert len({case.path for case in cases}) == 11
+    assert len(cases) == 3 + 9
+    assert len({case.path for case in cases}) == 12
     assert surface_cases(campaign) == [("challenge", 1), ("mcghee", 1)]
     challenge, mcghee = campaign.surfaces["challenge"], campaign.surfaces["mcghee"]
     assert mcghee.period == 1000 * challenge.period == 0.1
     assert challenge.cells_per_short_wave == pytest.approx(8)
-    ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][2:]
+    ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][3:]
     assert ratios == pytest.approx([8.333e-9, 4.0e-9, 1.905e-9], rel=1e-3)
+
+
+def test_boundary_elements_stand_beside_the_papers_runs():
+    campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
+    cases = solution_cases(campaign)
+    assert {case.run for case in cases} <= set(run_cases(campaign))
+    assert len({case.path for case in cases}) == len(cases)
+    energies = {campaign.materials[case.material].surface_energy for case in cases}
+    assert energies == {0.0, 0.05}  # with and without adhesion
+    for case in cases:
+        assert ("reduced_pressure", case.reduced_pressure) in run_settings(campaign, case.run)["path"]["snapshots"]
+    assert map_solution(campaign).material == campaign.figures.fig4_contact_map.material
+
+
+def test_the_validation_varies_what_makes_a_surface():
+    campaign = load_configuration(REPOSITORY / "config/campaigns/validation.yaml").campaign
+    entries = [case for case in solution_cases(campaign) if case.entry in ("adhesionless", "adhesive")]
+    surfaces = [campaign.surfaces[name] for name in dict.fromkeys(case.surface for case in entries)]
+    assert {surface.hurst for surface in surfaces} == {0.3, 0.5, 0.8}
+    assert len({surface.rolloff_wavelength for surface in surfaces}) >= 3
+    assert len({surface.short_wavelength for surface in surfaces}) >= 3
+    for name in {case.surface for case in entries}:
+        for energy in (0.0, 0.05):
+            seeds = {
+                case.seed
+                for case in entries
+                if case.surface == name and campaign.materials[case.material].surface_energy == energy
+            }
+            assert len(seeds) >= 3
 
 
 def test_the_whole_challenge():
@@ -296,6 +330,61 @@ BAD = {
         {"kind": "file", "path": "none.npy", "height_unit": "kg", "period": "1 mm"},
         "allowed: a unit of length",
     ),
+    "boundary elements of no study": (
+        "boundary_elements",
+        {"truth": {"study": "two", "reduced_pressures": [0.01]}},
+        "boundary_elements.truth.study: 'two' is not defined; allowed: one",
+    ),
+    "boundary elements of another material": (
+        "boundary_elements",
+        {"truth": {"study": "one", "materials": ["hard"], "reduced_pressures": [0.01]}},
+        "boundary_elements.truth.materials[0]: 'hard' is not in study 'one'; allowed: soft",
+    ),
+    "boundary elements of another seed": (
+        "boundary_elements",
+        {"truth": {"study": "one", "seeds": [3], "reduced_pressures": [0.01]}},
+        "boundary_elements.truth.seeds[0]: 3 is not in study 'one'; allowed: 1, 2",
+    ),
+    "boundary elements without loads": (
+        "boundary_elements",
+        {"truth": {"study": "one"}},
+        "boundary_elements.truth.reduced_pressures: the key is missing",
+    ),
+    "refinement beyond any memory": (
+        "boundary_elements",
+        {"truth": {"study": "one", "reduced_pressures": [0.01], "refinement": 100}},
+        "boundary_elements.truth.refinement: 100 is not an integer from 1 to 16",
+    ),
+    "unknown key of boundary elements": (
+        "boundary_elements",
+        {"truth": {"study": "one", "reduced_pressures": [0.01], "refine": 2}},
+        "boundary_elements.truth.refine: unknown key (did you mean 'refinement'?)",
+    ),
+    "range that the grid does not resolve": (
+        "boundary_elements",
+        {"truth": {"study": "one", "reduced_pressures": [0.01]}},
+        "boundary_elements.truth.materials: 'soft' on surface 'rough': a range of 2.071e-09 m is not resolved",
+    ),
+    "error without boundary elements": (
+        "figures",
+        {"fig10_model_error": {"study": "one"}},
+        "figures.fig10_model_error.study: 'one' has no boundary elements beside it",
+    ),
+    "odd refinement of error sources": (
+        "error_sources",
+        {"why": {"study": "one", "reduced_pressures": [0.01], "refinement": 3}},
+        "error_sources.why.refinement: 3 is odd; allowed: 2, 4",
+    ),
+    "range that half the refinement does not resolve": (
+        "error_sources",
+        {"why": {"study": "one", "reduced_pressures": [0.01]}},
+        "error_sources.why.materials: 'soft' on surface 'rough': a range of 2.071e-09 m is not resolved",
+    ),
+    "figure of unknown error sources": (
+        "figures",
+        {"fig12_error_sources": {"entry": "why"}},
+        "figures.fig12_error_sources.entry: 'why' is not defined",
+    ),
     "ORCID": ("authors", [{"name": "A", "orcid": "1"}], "authors[0].orcid"),
 }
 
@@ -312,6 +401,75 @@ def test_the_figure_of_tabor_parameters_needs_adhesion(load):
     load({"figures": figures})
     with pytest.raises(ConfigurationError, match=r"fig9_tabor\.study: 'one' has no material with adhesion"):
         load({"figures": figures, "materials.soft.surface_energy": "0 J/m^2"})
+
+
+TRUTH = {"study": "one", "reduced_pressures": [0.003, 0.01]}
+LONG_RANGE = {"materials.soft.interaction_range": "120 nm"}
+
+
+def test_boundary_elements_are_a_product_of_the_studys_lists(load):
+    campaign = load({**LONG_RANGE, "boundary_elements": {"truth": TRUTH | {"rms_slopes": [1.0]}}}).campaign
+    cases = solution_cases(campaign)
+    assert [case.path for case in cases] == [
+        f"truth/rough/seed{seed}/slope1/soft/p{p}" for seed in (1, 2) for p in ("0.003", "0.01")
+    ]
+    assert solution_settings(campaign, cases[0]) == {
+        "material": {"contact_modulus": 25e6, "surface_energy": 0.05, "interaction_range": pytest.approx(120e-9)},
+        "rms_slope": 1.0,
+        "seed": 1,
+        "reduced_pressure": 0.003,
+        "refinement": 1,
+        "tolerance": 1e-8,
+    }
+
+
+def test_loads_of_boundary_elements_are_snapshots_of_the_runs(load):
+    entries = {"coarse": TRUTH, "fine": TRUTH | {"refinement": 2, "reduced_pressures": [0.01, 0.05]}}
+    own, loads = ("area_fraction", 0.02), [("reduced_pressure", p) for p in (0.003, 0.01, 0.05)]
+    campaign = load({**LONG_RANGE, "boundary_elements": entries}).campaign
+    assert campaign.snapshots_of("one") == [own, *loads]
+    # A study that names no snapshot keeps its last state as well, and one that wants none keeps the loads only.
+    campaign = load({**LONG_RANGE, "boundary_elements": entries, "studies.one.snapshots": None}).campaign
+    assert campaign.snapshots_of("one") == [("reduced_pressure", 0.01), loads[0], loads[2]]
+    campaign = load({**LONG_RANGE, "boundary_elements": entries, "studies.one.snapshots": []}).campaign
+    assert campaign.snapshots_of("one") == loads
+    assert load({"studies.one.snapshots": None}).campaign.snapshots_of("one") is None
+
+
+def test_the_map_is_compared_with_the_finest_solution_of_its_state(load):
+    entries = {"coarse": TRUTH, "fine": TRUTH | {"refinement": 2, "seeds": [2]}}
+    changes = {**LONG_RANGE, "boundary_elements": entries}
+
+    def solution(**figure):
+        campaign = load({**changes, "figures": {"fig4_contact_map": {"study": "one", **figure}}}).campaign
+        return map_solution(campaign)
+
+    at_load = {"snapshot": {"reduced_pressure": 0.01}}
+    assert solution(**at_load).path == "coarse/rough/seed1/slope0.2/soft/p0.01"
+    assert solution(**at_load, seed=2, rms_slope=1.0).path == "fine/rough/seed2/slope1/soft/p0.01"
+    assert solution(snapshot={"area_fraction": 0.02}) is None
+
+
+def test_the_sources_of_the_error_are_drawn_without_adhesion(load):
+    changes = {
+        **LONG_RANGE,
+        "error_sources": {"why": TRUTH | {"seeds": [2]}},
+        "figures": {"fig12_error_sources": {"entry": "why"}},
+    }
+    with pytest.raises(ConfigurationError, match=r"fig12_error_sources\.entry: 'why' has no material without adhesion"):
+        load(changes)
+    campaign = load({**changes, "materials.soft.surface_energy": "0 J/m^2"}).campaign
+    cases = source_cases(campaign)
+    assert [case.path for case in cases] == [f"why/rough/seed2/slope{slope}/soft" for slope in ("0.2", "1")]
+    assert source_settings(campaign, cases[1]) == {
+        "material": {"contact_modulus": 25e6, "surface_energy": 0.0, "interaction_range": pytest.approx(120e-9)},
+        "rms_slope": 1.0,
+        "seed": 2,
+        "reduced_pressures": [0.003, 0.01],
+        "refinement": 2,
+        "tolerance": 1e-8,
+    }
+    assert campaign.snapshots_of("one") == [("area_fraction", 0.02)]  # the runs are none of their concern
 
 
 def test_random_surfaces_and_files_need_studies_of_their_own(load, tmp_path):
@@ -421,6 +579,14 @@ def test_a_surface_file_is_one_realisation_beside_the_configuration(load, tmp_pa
     assert surface_cases(campaign) == [("rough", 0)]
     assert campaign.surfaces["rough"].path == str(tmp_path / "heights.npy")
     assert surface_settings(campaign, "rough") == {"kind": "file", "period": 1e-3, "metres_per_unit": 1e-6}
+
+
+def test_ranges_are_held_against_the_grid_of_a_surface_file(load, tmp_path):
+    np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
+    changes = {"surfaces.rough": _file_surface("heights.npy"), "boundary_elements": {"truth": TRUTH}}
+    with pytest.raises(ConfigurationError, match=r"truth\.materials: 'soft' on .* spacing 6\.25e-05 m"):
+        load(changes)
+    assert len(solution_cases(load({**changes, "materials.soft.surface_energy": "0 J/m^2"}).campaign)) == 4
 
 
 def _measurement(**changes):

@@ -19,15 +19,18 @@ ALL_RULES = {
     "configuration",
     "surface",
     "reference",
+    "boundary_elements",
+    "error_sources",
     "run",
     "campaign_dataset",
     "comparison",
+    "model_error",
     "checks",
     "verdict",
     "figure",
     "report_page",
 }
-WHAT_FOLLOWS_RUNS = ALL_RULES - {"configuration", "surface", "reference"}
+WHAT_FOLLOWS_RUNS = ALL_RULES - {"configuration", "surface", "reference", "boundary_elements", "error_sources"}
 
 
 def planned(project, *arguments):
@@ -90,7 +93,7 @@ def test_a_fresh_clone_with_unpacked_results_runs_nothing(smoke, tmp_path):
 def test_the_physics_runs_sweeps_and_what_follows(module, project):
     add_statement(project / f"icha/{module}.py")
     jobs, _ = planned(project)
-    assert jobs["run"] == 7
+    assert jobs["run"] == 9
     assert set(jobs) == WHAT_FOLLOWS_RUNS
 
 
@@ -111,7 +114,29 @@ def test_a_figure_runs_itself_and_the_report(project):
 def test_the_style_runs_all_figures(project):
     add_statement(project / "icha/figures/style.py")
     jobs, _ = planned(project)
-    assert jobs == {"figure": 9, "report_page": 1}
+    assert jobs == {"figure": 12, "report_page": 1}
+
+
+def test_boundary_elements_run_without_the_sweeps(project):
+    add_statement(project / "icha/reference/boundary_elements.py")
+    jobs, _ = planned(project)
+    assert jobs["boundary_elements"] == 6
+    assert set(jobs) == {"boundary_elements", "model_error", "figure", "report_page"}
+
+
+def test_a_finer_grid_costs_its_own_solutions(project):
+    replace(project / "config/campaigns/smoke.yaml", "refinement: 2", "refinement: 3")
+    jobs, messages = planned(project)
+    assert jobs["boundary_elements"] == 4
+    assert "run" not in jobs
+    assert not [message for message in messages if "cmc_300nm" in message]
+
+
+def test_a_solution_that_is_lost_is_the_only_one_computed_again(project):
+    (project / "results/smoke/references/boundary_elements/adhesive/challenge/seed2/slope1/cmc_300nm/p0.01.nc").unlink()
+    jobs, _ = planned(project)
+    assert jobs["boundary_elements"] == 1
+    assert "run" not in jobs
 
 
 def test_the_page_template_runs_the_report(project):

@@ -39,6 +39,10 @@ def test_everything_that_was_promised_is_there(smoke):
         "runs/challenge/challenge/seed2/slope1/cmc_adhesionless.nc",
         "runs/multi_slope/mcghee/seed1/slope0.2/pdms_soft.nc",
         "references/challenge.nc",
+        "references/boundary_elements/adhesionless/challenge/seed2/slope1/cmc_adhesionless/p0.0316.nc",
+        "references/boundary_elements/adhesive/challenge/seed1/slope1/cmc_300nm/p0.01.nc",
+        "references/error_sources/adhesionless/challenge/seed1/slope1/cmc_adhesionless.nc",
+        "aggregated/model_error.nc",
         "dataset/smoke.nc",
         "aggregated/smoke.nc",
         "checks.json",
@@ -50,7 +54,7 @@ def test_everything_that_was_promised_is_there(smoke):
     ):
         assert name in files
     figures = sorted(file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py"))
-    assert len(figures) == 9
+    assert len(figures) == 12
     for figure in figures:
         assert f"figures/{figure}.png" in files and f"figures/{figure}.pdf" in files
     jobs = [file for file in files if file.startswith(("surfaces", "runs"))]
@@ -63,6 +67,13 @@ def test_everything_that_was_promised_is_there(smoke):
 def test_sweeps_report_progress(smoke):
     log = smoke / "results/smoke/logs/runs/challenge/challenge/seed1/slope1/cmc.log"
     assert len(log.read_text().splitlines()) >= 4
+
+
+def test_boundary_elements_say_whether_the_grid_resolves_the_attraction_before_they_start(smoke):
+    folder = smoke / "results/smoke/logs/boundary_elements/adhesive/challenge/seed1/slope1/cmc_300nm"
+    first, *others = (folder / "p0.01.log").read_text().splitlines()
+    assert "spacing 1.562e-06 m" in first and "sqrt(dgamma dx/E*)/range" in first
+    assert others
 
 
 def test_the_dataset_tells_where_it_comes_from(smoke):

@@ -7,7 +7,7 @@ import itertools
 import json
 
 from icha.configuration.model import Campaign, SelfAffineSurface
-from icha.labels import RunLabels, SolutionLabels
+from icha.labels import RunLabels, SolutionLabels, SourceLabels
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
@@ -35,6 +35,34 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
             )
         ]
     return cases
+
+
+def source_cases(campaign: Campaign) -> list[SourceLabels]:
+    """All studies of the sources of the model's error, entry by entry."""
+    cases = []
+    for label, entry in campaign.error_sources.items():
+        asked = campaign.solved(entry)
+        cases += [
+            SourceLabels(label, surface, seed, slope, material)
+            for surface in asked["surfaces"]
+            for seed, slope, material in itertools.product(
+                campaign.solved_seeds(entry, surface), asked["rms_slopes"], asked["materials"]
+            )
+        ]
+    return cases
+
+
+def source_settings(campaign: Campaign, case: SourceLabels) -> dict:
+    """Everything but the topography that determines a study of the sources of the error, in SI units."""
+    entry = campaign.error_sources[case.entry]
+    return {
+        "material": campaign.materials[case.material].model_dump(),
+        "rms_slope": case.rms_slope,
+        "seed": case.seed,
+        "reduced_pressures": entry.reduced_pressures,
+        "refinement": entry.refinement,
+        "tolerance": entry.tolerance,
+    }
 
 
 def map_solution(campaign: Campaign) -> SolutionLabels | None:

@@ -198,6 +198,7 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
         "materials": model.Material,
         "studies": model.Study,
         "boundary_elements": model.BoundaryElements,
+        "error_sources": model.ErrorSources,
         "measurements": model.Measurement,
         "authors": model.Author,
     }
@@ -232,9 +233,10 @@ def _problems_of_files(campaign: Campaign) -> Iterable[tuple[tuple, Any, str]]:
             except ValueError as error:
                 yield ("surfaces", name, "path"), surface.path, str(error)
                 continue
-            for label, entry in campaign.boundary_elements.items():
-                if name in campaign.solved(entry)["surfaces"]:
-                    yield from campaign.unresolved(label, name, len(heights))
+            for section in ("boundary_elements", "error_sources"):
+                for label, entry in getattr(campaign, section).items():
+                    if name in campaign.solved(entry)["surfaces"]:
+                        yield from campaign.unresolved(section, label, name, len(heights))
     for name, measurement in campaign.measurements.items():
         try:
             read_columns(measurement.path, measurement.columns)

@@ -388,10 +388,10 @@ class Measurement(Section):
         return self
 
 
-class BoundaryElements(Section):
-    """Boundary-element solutions of a study's own topographies, beside its runs."""
+class BesideStudy(Section):
+    """Boundary elements on the topographies of a study."""
 
-    study: Name = Field(description="Name of the study whose runs are compared with.")
+    study: Name = Field(description="Name of the study on whose topographies they are solved.")
     surfaces: _names("Surfaces, of the study's. Left out: all.") | None = Field(
         default=None, description="Surfaces, of the study's. Left out: all."
     )
@@ -407,14 +407,44 @@ class BoundaryElements(Section):
         "`interaction_range`.",
     )
     reduced_pressures: _stops(ReducedPressure, _increasing) = Field(
-        description="Loads p/(E* h'rms), increasing. They become snapshots of the study's runs."
-    )
-    refinement: _integer(1, 16) = Field(
-        default=1, description="Cells per cell of the surface's own grid, along a side; heights are interpolated."
+        description="Loads p/(E* h'rms), increasing. Those of `boundary_elements` become snapshots of the study's runs."
     )
     tolerance: _number("a number in (0, 1e-4]", above=0, most=1e-4) = Field(
         default=1e-8, description="Relative error at which the solver may stop."
     )
+
+
+class BoundaryElements(BesideStudy):
+    """Boundary-element solutions of a study's own topographies, beside its runs."""
+
+    refinement: _integer(1, 16) = Field(
+        default=1, description="Cells per cell of the surface's own grid, along a side; heights are interpolated."
+    )
+
+    @property
+    def coarsest(self) -> int:
+        """Smallest number of cells per cell of the surface's grid."""
+        return self.refinement
+
+
+class ErrorSources(BesideStudy):
+    """Variants between the model and boundary elements, each of which changes one thing."""
+
+    refinement: _integer(2, 16) = Field(
+        default=2, description="Cells per cell of the surface's own grid, along a side: even, since half is tried too."
+    )
+
+    @field_validator("refinement")
+    @classmethod
+    def _half_of_it_can_be_tried(cls, value):
+        if value % 2:
+            raise ValueError("is odd; allowed: 2, 4, … 16")
+        return value
+
+    @property
+    def coarsest(self) -> int:
+        """Smallest number of cells per cell of the surface's grid."""
+        return self.refinement // 2
 
 
 class JKRFigure(Section):
@@ -464,6 +494,12 @@ class ComparedFigure(StudyFigure):
     """A figure of a study's runs beside their boundary elements."""
 
 
+class SourcesFigure(Section):
+    """A figure of where the model's error comes from."""
+
+    entry: Name = Field(description="Name of the entry of `error_sources` that is drawn: its runs without adhesion.")
+
+
 class Figures(Section):
     """The figures of the campaign; those that are left out are not drawn."""
 
@@ -505,6 +541,10 @@ class Figures(Section):
         "elements. The study needs `boundary_elements`.",
     )
 
+    fig12_error_sources: SourcesFigure | None = Field(
+        default=None, description="From the model to boundary elements, one thing at a time."
+    )
+
     def drawn(self) -> dict[str, Section]:
         """The figures that are drawn, by name."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
@@ -536,6 +576,9 @@ class Campaign(Section):
     boundary_elements: dict[Name, BoundaryElements] = Field(
         default={}, description="Boundary-element solutions by name, compared with the runs of a study."
     )
+    error_sources: dict[Name, ErrorSources] = Field(
+        default={}, description="Studies of where the model's error comes from, by name."
+    )
     measurements: dict[Name, Measurement] = Field(
         default={}, description="Measurements by name, overlaid on figure 5. None are shipped with ICHA."
     )
@@ -559,15 +602,23 @@ class Campaign(Section):
                     "mixes random surfaces with surfaces read from a file, which have no seed; allowed: a study each"
                 )
                 found.append((("studies", label, "surfaces"), ", ".join(study.surfaces), reason))
-        for label, entry in self.boundary_elements.items():
-            known(("boundary_elements", label, "study"), entry.study, self.studies)
-            if entry.study in self.studies:
-                found += self._solution_problems(("boundary_elements", label), entry)
+        for section in ("boundary_elements", "error_sources"):
+            for label, entry in getattr(self, section).items():
+                known((section, label, "study"), entry.study, self.studies)
+                if entry.study in self.studies:
+                    found += self._solution_problems((section, label), entry)
         for label, measurement in self.measurements.items():
             known(("measurements", label, "study"), measurement.study, self.studies)
             if measurement.material is not None:
                 known(("measurements", label, "material"), measurement.material, self.materials)
         for label, figure in self.figures.drawn().items():
+            if isinstance(figure, SourcesFigure):
+                known(("figures", label, "entry"), figure.entry, self.error_sources)
+                asked = self.error_sources.get(figure.entry)
+                names = self.solved(asked)["materials"] if asked is not None and asked.study in self.studies else []
+                if names and all(n in self.materials and self.materials[n].surface_energy > 0 for n in names):
+                    reason = "has no material without adhesion, which is what is drawn; allowed: an entry with one"
+                    found.append((("figures", label, "entry"), figure.entry, reason))
             if not hasattr(figure, "study"):
                 continue
             known(("figures", label, "study"), figure.study, self.studies)
@@ -591,12 +642,12 @@ class Campaign(Section):
         own = [self.studies[study].targets.last] if asked is None else [snapshot.target for snapshot in asked]
         return own + [("reduced_pressure", p) for p in loads if ("reduced_pressure", p) not in own]
 
-    def solved(self, entry: BoundaryElements) -> dict[str, list]:
+    def solved(self, entry: BesideStudy) -> dict[str, list]:
         """The surfaces, rms slopes and materials for which an entry asks, written out."""
         study = self.studies[entry.study]
         return {key: getattr(entry, key) or getattr(study, key) for key in ("surfaces", "rms_slopes", "materials")}
 
-    def solved_seeds(self, entry: BoundaryElements, surface: str) -> list[int]:
+    def solved_seeds(self, entry: BesideStudy, surface: str) -> list[int]:
         """The seeds of a surface for which an entry asks; a surface that is read from a file has the one."""
         there = self.surface_seeds(entry.study, surface)
         return there if entry.seeds is None else [seed for seed in entry.seeds if seed in there]
@@ -620,18 +671,19 @@ class Campaign(Section):
             surface = self.surfaces.get(name)
             if not isinstance(surface, SelfAffineSurface):
                 continue  # only its file knows its grid
-            yield from self.unresolved(location[1], name, surface.grid)
+            yield from self.unresolved(*location, name, surface.grid)
 
-    def unresolved(self, entry: str, surface: str, grid: int) -> Iterator[tuple[tuple, Any, str]]:
-        """Materials of an entry of boundary elements whose attraction the grid of a surface does not resolve."""
-        asked = self.boundary_elements[entry]
-        spacing = self.surfaces[surface].period / (grid * asked.refinement)
+    def unresolved(self, section: str, entry: str, surface: str, grid: int) -> Iterator[tuple[tuple, Any, str]]:
+        """Materials of an entry of `boundary_elements` or `error_sources` whose attraction the grid of a surface does
+        not resolve."""
+        asked = getattr(self, section)[entry]
+        spacing = self.surfaces[surface].period / (grid * asked.coarsest)
         for label in self.solved(asked)["materials"]:
             if label not in self.materials:
                 continue
             material = Interface(**self.materials[label].model_dump())
             if problem := resolution_problem(material, spacing):
-                yield ("boundary_elements", entry, "materials"), label, f"on surface {surface!r}: {problem}"
+                yield (section, entry, "materials"), label, f"on surface {surface!r}: {problem}"
 
     def _figure_problems(self, location, figure, study):
         known = [name for name in study.surfaces if name in self.surfaces]

@@ -38,6 +38,7 @@ _HEADINGS = {
     "Targets": "`studies.<name>.targets`",
     "Snapshot": "`studies.<name>.snapshots`, each",
     "BoundaryElements": "`boundary_elements.<name>`",
+    "ErrorSources": "`error_sources.<name>`",
     "Measurement": "`measurements.<name>`",
     "Column": "`measurements.<name>.load` and `.area`",
     "Figures": "`figures`",
@@ -48,6 +49,7 @@ _HEADINGS = {
     "SlopesFigure": "`figures.fig6_spots_by_slope`",
     "TaborFigure": "`figures.fig9_tabor`",
     "ComparedFigure": "`figures.fig10_model_error`, `figures.fig11_distribution_error`",
+    "SourcesFigure": "`figures.fig12_error_sources`",
     "Author": "`authors`, each",
 }
 

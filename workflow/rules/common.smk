@@ -19,6 +19,8 @@ from icha.configuration.expansion import (
     run_sha256,
     solution_cases,
     solution_settings,
+    source_cases,
+    source_settings,
     surface_cases,
     surface_settings,
 )
@@ -37,7 +39,9 @@ RUNS = [f"{RESULTS}/runs/{path}" for path in CASES]
 THEORIES = [f"{RESULTS}/references/{name}.nc" for name in dict.fromkeys(name for name, _ in surface_cases(CAMPAIGN))]
 SOLUTION_CASES = {f"{case.path}.nc": case for case in solution_cases(CAMPAIGN)}
 SOLUTIONS = [f"{RESULTS}/references/boundary_elements/{path}" for path in SOLUTION_CASES]
-REFERENCES = [*THEORIES, *SOLUTIONS]
+SOURCE_CASES = {f"{case.path}.nc": case for case in source_cases(CAMPAIGN)}
+ERROR_SOURCES = [f"{RESULTS}/references/error_sources/{path}" for path in SOURCE_CASES]
+REFERENCES = [*THEORIES, *SOLUTIONS, *ERROR_SOURCES]
 DATASET = f"{RESULTS}/dataset/{CAMPAIGN.name}.nc"
 COMPARISON = f"{RESULTS}/aggregated/{CAMPAIGN.name}.nc"
 # Only a campaign with boundary elements has an error to tell.
@@ -99,10 +103,13 @@ def solution_of(wildcards):
     return SOLUTION_CASES["{entry}/{surface}/seed{seed}/slope{slope}/{material}/p{pressure}.nc".format(**wildcards)]
 
 
-def solution_memory(wildcards):
+def sources_of(wildcards):
+    return SOURCE_CASES["{entry}/{surface}/seed{seed}/slope{slope}/{material}.nc".format(**wildcards)]
+
+
+def solution_memory(surface, entry):
     """Megabytes that boundary elements need: some thirty arrays of their grid, and the program."""
-    refinement = CAMPAIGN.boundary_elements[wildcards.entry].refinement
-    return 400 + 30 * 8 * points_of(wildcards.surface) * refinement**2 // 10**6
+    return 400 + 30 * 8 * points_of(surface) * entry.refinement**2 // 10**6
 
 
 def case_of(wildcards):
@@ -113,16 +120,29 @@ def settings_of(wildcards):
     return run_settings(CAMPAIGN, case_of(wildcards))
 
 
+def sources_drawn(entry):
+    """Files of an entry of error sources without adhesion."""
+    return [
+        file
+        for file, case in zip(ERROR_SOURCES, SOURCE_CASES.values(), strict=True)
+        if case.entry == entry and CAMPAIGN.materials[case.material].surface_energy == 0
+    ]
+
+
 def figure_data(name):
-    """Files that a figure needs besides the campaign dataset, by the names of its arguments."""
+    """Files that a figure needs, by the names of its arguments."""
     options = CAMPAIGN.figures.drawn()[name]
     if name == "fig1_jkr":
         return {}
+    if name == "fig12_error_sources":
+        return {"error_sources": sources_drawn(options.entry)}
+    if name in ("fig10_model_error", "fig11_distribution_error"):
+        return {"model_error": MODEL_ERROR[0]}
     data = {"campaign": DATASET}
     study = CAMPAIGN.studies[options.study]
     if name in ("fig2_area_and_gap", "fig7_stiffness"):
         data["references"] = f"{RESULTS}/references/{study.surfaces[0]}.nc"
-    if name in ("fig2_area_and_gap", "fig3_distributions", "fig10_model_error", "fig11_distribution_error"):
+    if name in ("fig2_area_and_gap", "fig3_distributions"):
         if any(entry.study == options.study for entry in CAMPAIGN.boundary_elements.values()):
             data["model_error"] = MODEL_ERROR[0]
     if name == "fig4_contact_map":
@@ -140,7 +160,7 @@ def figure_data(name):
 
 def figure_options(name):
     """Arguments of a figure other than data."""
-    options = CAMPAIGN.figures.drawn()[name].model_dump(exclude={"snapshot"}, exclude_none=True)
+    options = CAMPAIGN.figures.drawn()[name].model_dump(exclude={"snapshot", "entry"}, exclude_none=True)
     snapshot = getattr(CAMPAIGN.figures.drawn()[name], "snapshot", None)
     if snapshot is not None:
         options["kind"], options["target"] = snapshot.target

@@ -1,6 +1,7 @@
 # references/<surface>.nc: what theories say of a surface, and published points;
 # references/boundary_elements/<entry>/<surface>/seed<k>/slope<g>/<material>/p<p*>.nc: one load each, by boundary
-# elements on the topography of the run.
+# elements on the topography of the run;
+# references/error_sources/<entry>/<surface>/seed<k>/slope<g>/<material>.nc: variants between the model and them.
 
 
 def adhesive_contacts(surface):
@@ -57,7 +58,7 @@ rule boundary_elements:
         "../envs/icha.yaml"
     threads: 1
     resources:
-        mem_mb=solution_memory,
+        mem_mb=lambda wildcards: solution_memory(wildcards.surface, CAMPAIGN.boundary_elements[wildcards.entry]),
         runtime=240,
     params:
         settings=lambda wildcards: solution_settings(CAMPAIGN, solution_of(wildcards)),
@@ -68,3 +69,29 @@ rule boundary_elements:
         "{wildcards.material}, p* = {wildcards.pressure}"
     script:
         "../scripts/solve_boundary_elements.py"
+
+
+rule error_sources:
+    input:
+        surface=f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+    output:
+        f"{RESULTS}/references/error_sources/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.nc",
+    log:
+        f"{LOGS}/error_sources/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.log",
+    benchmark:
+        f"{BENCHMARKS}/error_sources/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=lambda wildcards: solution_memory(wildcards.surface, CAMPAIGN.error_sources[wildcards.entry]),
+        runtime=480,
+    params:
+        settings=lambda wildcards: source_settings(CAMPAIGN, sources_of(wildcards)),
+        attributes=ATTRIBUTES,
+        code=code_of("find_error_sources.py"),
+    message:
+        "Sources of the error {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
+        "{wildcards.material}"
+    script:
+        "../scripts/find_error_sources.py"

@@ -14,7 +14,13 @@ READERS = {
     "surface": read_dataset,
     "model_error": read_campaign,
     "solution": read_dataset,
+    "error_sources": lambda paths: [read_dataset(path) for path in _several(paths)],
 }
+
+
+def _several(paths):
+    """A list of files, also if Snakemake gives the only one of them as itself."""
+    return [paths] if isinstance(paths, str) else list(paths)
 
 
 def draw_figure(name, png, pdf, *, data, options, measurements=()):
@@ -45,7 +51,5 @@ if "snakemake" in globals():
             snakemake.output.pdf,
             data=inputs,
             options=snakemake.params.options,
-            measurements=list(
-                zip([measured] if isinstance(measured, str) else measured, snakemake.params.measurements, strict=True)
-            ),
+            measurements=list(zip(_several(measured), snakemake.params.measurements, strict=True)),
         )

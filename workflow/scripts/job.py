@@ -8,7 +8,12 @@ from contextlib import contextmanager
 
 def _failures_of_solvers():
     """How solvers say that they did not converge. Most jobs do without them, so nothing is imported for this."""
-    names = {"icha.simulation": "ConvergenceError", "icha.reference.boundary_elements": "NotSolved"}
+    names = {
+        "icha.simulation": "ConvergenceError",
+        "icha.equilibrium": "NotConverged",
+        "icha.reference.boundary_elements": "NotSolved",
+        "icha.reference.error_sources": "NotSolved",
+    }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
 
 

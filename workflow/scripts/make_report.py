@@ -11,8 +11,11 @@ from icha.records import read_campaign, read_dataset
 from icha.report import ReportFigure, read_benchmarks, write_report
 
 
-def make_report(page, *, campaign, comparison, checks, configuration, surfaces, figures, citations, times):
-    """Write the page from the files of the campaign's results; `figures` maps names to (PNG, PDF)."""
+def make_report(page, *, campaign, comparison, checks, model_error, configuration, surfaces, figures, citations, times):
+    """Write the page from the files of the campaign's results; `figures` maps names to (PNG, PDF).
+
+    `model_error` is empty where there are no boundary elements.
+    """
     write_report(
         page,
         campaign=read_campaign(campaign),
@@ -22,6 +25,7 @@ def make_report(page, *, campaign, comparison, checks, configuration, surfaces, 
         ],
         checks=read_checks(checks),
         comparison=read_campaign(comparison),
+        model_error=read_campaign(model_error) if model_error else None,
         surfaces=[read_dataset(path) for path in surfaces],
         configuration=Path(configuration).read_text(encoding="utf-8"),
         dataset_path=campaign,
@@ -47,6 +51,7 @@ if "snakemake" in globals():
             campaign=snakemake.input.campaign,
             comparison=snakemake.input.comparison,
             checks=snakemake.input.checks,
+            model_error="".join(snakemake.input.model_error),
             configuration=snakemake.input.configuration,
             surfaces=snakemake.input.surfaces,
             figures={name: (next(pictures), next(pictures)) for name in snakemake.params.figures},

@@ -1,0 +1,24 @@
+"""Find where the error of the model comes from, on one surface with one material."""
+
+from job import logged
+
+from icha.material import Material
+from icha.records import read_surface, write_dataset
+from icha.reference.error_sources import error_sources
+
+
+def find_error_sources(surface, output, *, rms_slope, material, attributes, **settings):
+    """Solve all variants for the surface of the file `surface`, scaled to `rms_slope`, and write them to `output`."""
+    scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
+    write_dataset(error_sources(scaled, Material(**material), **settings).assign_attrs(attributes), output)
+
+
+if "snakemake" in globals():
+    with logged(snakemake.log[0]):
+        find_error_sources(
+            snakemake.input.surface,
+            snakemake.output[0],
+            **snakemake.params.settings,
+            attributes=snakemake.params.attributes,
+            progress=lambda line: print(line, flush=True),
+        )
