@@ -82,10 +82,6 @@ class JKR:
 
     # --- instabilities --------------------------------------------------------------------------------------
 
-    def tabor_parameter(self, R):
-        """mu = (gamma^2 R/E*^2)^(1/3)/epsilon (after eq. 3)."""
-        return np.cbrt(self.material.adhesion_length**2 * R) / self.material.interaction_range
-
     def jump_off_radius(self, R):
         """Contact radius at the loss of contact under displacement control, (pi gamma R^2/(8 E*))^(1/3), m."""
         return np.cbrt(np.pi / 8 * self.material.adhesion_length * np.asarray(R, float) ** 2)
@@ -102,7 +98,7 @@ class JKR:
         """
         if self.material.surface_energy == 0:
             return np.zeros(np.shape(R))
-        wu = (1 - 2.641 * self.tabor_parameter(R) ** (3 / 7)) * self.material.interaction_range
+        wu = (1 - 2.641 * self.material.tabor_parameter(R) ** (3 / 7)) * self.material.interaction_range
         return np.clip(wu, self.jump_off_approach(R), 0.0)
 
     # --- the half-space around the spot ---------------------------------------------------------------------

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from icha.validation import not_negative, positive
 
 
@@ -37,3 +39,7 @@ class Material:
     def adhesion_length(self) -> float:
         """Surface energy over contact modulus, m: the elasto-adhesive length."""
         return self.surface_energy / self.contact_modulus
+
+    def tabor_parameter(self, radius):
+        """mu = (gamma^2 R/E*^2)^(1/3)/epsilon of paraboloids of radius R (m), of any shape (after eq. 3)."""
+        return np.cbrt(self.adhesion_length**2 * radius) / self.interaction_range

@@ -10,9 +10,10 @@ import numpy as np
 import xarray as xr
 from scipy.stats import wasserstein_distance
 
+from icha.bins import GAP_BINS, PRESSURE_BINS
 from icha.campaign import LABELS, find_snapshot, select_run, spots_of
 from icha.labels import SolutionLabels
-from icha.observables import GAP_BINS, PRESSURE_BINS, nodes_in_discs
+from icha.observables import nodes_in_discs
 from icha.path import REDUCED_PRESSURE
 from icha.records import COMPLETE
 

@@ -6,19 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from icha.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
 from icha.cores import on_cores
 from icha.equilibrium import ContactState, Spots
 from icha.fields import DisplacementField, displacement_field, row_blocks, windows
 from icha.jkr import JKR
 from icha.surface import Surface
 from icha.validation import integer
-
-# Bins of the gap in units of h_rms: one from zero, then 20 per decade; and of the pressure in units of
-# E* h'_rms: linear where the bulk is, 20 per decade in the tails. JKR pressures tend to minus infinity at the edge
-# of a spot as |p|^-3, hence the long tail.
-_GAPS_PER_DECADE = 20
-GAP_BINS = np.concatenate([[0.0], np.logspace(-4, 1.5, 111)])
-PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5, 301), 5 * np.logspace(0, 2, 41)[1:]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +113,7 @@ def _gap_bin(u, edges):
     """Index of the bin edges[i] <= u < edges[i + 1] of every gap; the last bin holds what is larger."""
     last = len(edges) - 2
     decade = np.log10(np.maximum(u / edges[1], 1.0))
-    index = np.minimum(decade * _GAPS_PER_DECADE + 1, last).astype(np.intp)
+    index = np.minimum(decade * GAPS_PER_DECADE + 1, last).astype(np.intp)
     # Next to an edge the logarithm may round to the wrong side.
     index -= u < edges[index]
     index += (u >= edges[index + 1]) & (index < last)

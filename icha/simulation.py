@@ -10,6 +10,7 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from icha.asperities import find_summits
+from icha.bins import GAP_BINS, PRESSURE_BINS
 from icha.equilibrium import (
     Contact,
     NotConverged,
@@ -20,7 +21,7 @@ from icha.equilibrium import (
 from icha.jkr import JKR
 from icha.limits import MAX_REDUCED_PRESSURE
 from icha.material import Material
-from icha.observables import GAP_BINS, PRESSURE_BINS, gap_distribution, pressure_distribution
+from icha.observables import gap_distribution, pressure_distribution
 from icha.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, load
 from icha.roughness import spectral_moments, stickiness
 from icha.surface import Surface
@@ -200,7 +201,7 @@ def _step(contact, target, state, unit):
     spots = state.spots
     pressure = mean_pressure(contact, spots)
     single = spots.members == 1
-    mu = contact.law.tabor_parameter(spots.radius_of_curvature[single])
+    mu = contact.law.material.tabor_parameter(spots.radius_of_curvature[single])
     outside = np.count_nonzero((mu < WU_RANGE[0]) | (mu > WU_RANGE[1]))
     adhesive = contact.law.material.surface_energy > 0
     return {
@@ -285,7 +286,7 @@ def _dataset(surface, material, contact, steps, snapshots, seed):
         "period": surface.period,
         "grid": surface.grid,
         "seed": seed,
-        "tabor_parameter": float(contact.law.tabor_parameter(radius)),
+        "tabor_parameter": float(material.tabor_parameter(radius)),
         "stickiness": stickiness(moments, material),
         "asperity_count": len(contact.asperities),
     }

@@ -6,6 +6,7 @@ import small_campaign as small
 import xarray as xr
 from compared_campaign import own_solution, runs, solutions, tree
 
+from icha.bins import GAP_BINS, PRESSURE_BINS
 from icha.campaign import RunLabels, campaign_tree, find_snapshot
 from icha.labels import SolutionLabels
 from icha.model_error import (
@@ -20,7 +21,6 @@ from icha.model_error import (
     shared,
     state_of,
 )
-from icha.observables import GAP_BINS, PRESSURE_BINS
 from icha.records import read_campaign, write_dataset
 from icha.reference.boundary_elements import boundary_elements
 

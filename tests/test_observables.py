@@ -9,12 +9,11 @@ from half_space import periodic_displacement
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperities import find_summits
+from icha.bins import GAP_BINS, PRESSURE_BINS
 from icha.equilibrium import Contact, Spots, area_fraction, equilibrium, mean_pressure, untouched
 from icha.fields import displacement_field, row_blocks
 from icha.jkr import JKR
 from icha.observables import (
-    GAP_BINS,
-    PRESSURE_BINS,
     _gap_bin,
     contact_cover,
     covered_nodes,

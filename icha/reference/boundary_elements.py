@@ -26,10 +26,9 @@ import tamaas
 import tamaas.utils
 import xarray as xr
 
+from icha.bins import GAP_BINS, PRESSURE_BINS
 from icha.cohesive_zone import longest_spacing, resolution_problem, strength_number
-from icha.jkr import JKR
 from icha.material import Material
-from icha.observables import GAP_BINS, PRESSURE_BINS
 from icha.surface import Surface
 from icha.validation import integer, positive
 
@@ -405,7 +404,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "rms_slope": surface.rms_slope,
         "rms_height": height,
         "rms_curvature": surface.rms_curvature,
-        "tabor_parameter": float(JKR(material).tabor_parameter(1 / surface.rms_curvature)),
+        "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
         "period": surface.period,
         "seed": seed,
     }
