@@ -12,10 +12,11 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help environment run test lint format schema benchmarks benchmarks-page clean
+.PHONY: help environment run validation test lint format schema benchmarks benchmarks-page clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
+	@echo "make validation  run campaign validation (an hour) and write docs/validation.md and docs/error_sources.md from it"
 	@echo "make test    run the tests"
 	@echo "make lint    check style of Python code and workflow"
 	@echo "make format  put Python code and workflow into that style"
@@ -39,6 +40,10 @@ run: environment
 	$(if $(CONFIG),@python -m icha.configuration $(CONFIG))
 	snakemake --cores $(CORES) $(if $(CONFIG),--configfile $(CONFIG))
 	@python workflow/scripts/show_results.py $(CONFIG)
+
+validation: environment
+	$(MAKE) run CONFIG=config/campaigns/validation.yaml
+	python docs/write_pages.py
 
 test: environment
 	pytest -n $(CORES) --dist loadfile

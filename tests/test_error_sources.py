@@ -9,6 +9,7 @@ from icha.asperities import Asperities, find_summits
 from icha.equilibrium import Contact, area_fraction
 from icha.figures import fig12_error_sources
 from icha.jkr import JKR
+from icha.pages.error_sources import page, ratios, split
 from icha.path import load
 from icha.reference.boundary_elements import NodalState, contact_state, perimeter_correction
 from icha.reference.error_sources import (
@@ -29,7 +30,6 @@ from icha.reference.error_sources import (
     summit_curvatures,
     union_area_fraction,
 )
-from icha.reference.error_sources_page import page, ratios, split
 
 HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)
 LAW = JKR(HARD)

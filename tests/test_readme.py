@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 import small_campaign as small
-import yaml
 
 from icha.campaign import campaign_tree
+from icha.configuration.expansion import solution_cases
 from icha.configuration.load import load_configuration
 from icha.records import write_dataset
 
@@ -45,9 +45,21 @@ def test_figure_5_is_redrawn_from_the_dataset_in_ten_lines(tmp_path, monkeypatch
     names["plt"].close()
 
 
-def test_the_campaign_of_the_five_minutes_is_a_valid_one(tmp_path):
-    (text,) = blocks("yaml")
-    assert yaml.safe_load(text)["name"] == "mine"
-    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
-    campaign = load_configuration(tmp_path / "mine.yaml").campaign
-    assert set(campaign.studies) == {"load"}
+@pytest.fixture
+def campaign(tmp_path):
+    def loaded(text):
+        (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+        return load_configuration(tmp_path / "mine.yaml").campaign
+
+    return loaded
+
+
+def test_the_campaign_of_the_five_minutes_is_a_valid_one(campaign):
+    (text,) = blocks("yaml", "name: mine")
+    assert set(campaign(text).studies) == {"load"}
+
+
+def test_boundary_elements_can_be_added_to_it(campaign):
+    (text,), (more,) = blocks("yaml", "name: mine"), blocks("yaml", "boundary_elements:")
+    cases = solution_cases(campaign(text + "\n" + more))
+    assert len(cases) == 3 * 2 and {case.material for case in cases} == {"bare"}

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from icha.pages.tables import means, pressures, table
 from icha.reference.error_sources import BESIDE, CATEGORIES, chain, effects, relative_radius, shape_ratio
 
 NAMES = {
@@ -138,19 +139,19 @@ def ratios(error_sources: Sequence[xr.Dataset], name: str) -> str:
             continue
         over = truth.get(variant, "boundary_elements")
         ratio = [one[name].sel(variant=variant).values / one[name].sel(variant=over).values for one in error_sources]
-        rows.append([NAMES[variant] + (" (over ICHA)" if over == "icha" else ""), *_means(ratio, "{:.3f}")])
-    return _table(["", *_pressures(error_sources)], rows)
+        rows.append([NAMES[variant] + (" (over ICHA)" if over == "icha" else ""), *means(ratio, "{:.3f}")])
+    return table(["", *pressures(error_sources[0]["reduced_pressure"].values)], rows)
 
 
 def steps(error_sources: Sequence[xr.Dataset]) -> str:
     """Table of the effects of every step of the chain, and of their sum."""
     each = [100 * effects(one) for one in error_sources]
     rows = [
-        [str(source), *_means([one.sel(source=source).values for one in each], "{:+.1f}")]
+        [str(source), *means([one.sel(source=source).values for one in each], "{:+.1f}")]
         for source in each[0]["source"].values
     ]
-    rows.append(["sum: ln(A/A_BEM) of the model", *_means([one.sum("source").values for one in each], "{:+.1f}")])
-    return _table(["", *_pressures(error_sources)], rows)
+    rows.append(["sum: ln(A/A_BEM) of the model", *means([one.sum("source").values for one in each], "{:+.1f}")])
+    return table(["", *pressures(error_sources[0]["reduced_pressure"].values)], rows)
 
 
 def split(error_sources: Sequence[xr.Dataset]) -> str:
@@ -172,7 +173,7 @@ def split(error_sources: Sequence[xr.Dataset]) -> str:
             ]
             cells = [f"{model:.1f} / {truth:.1f}" for model, truth in zip(*sides, strict=True)]
             rows.append([f"{meaning}: {what}", *cells])
-    return _table(["", *_pressures(error_sources)], rows)
+    return table(["", *pressures(error_sources[0]["reduced_pressure"].values)], rows)
 
 
 def single_spots(error_sources: Sequence[xr.Dataset]) -> str:
@@ -187,7 +188,7 @@ def single_spots(error_sources: Sequence[xr.Dataset]) -> str:
         if inside.any():
             range_ = f"{low:g} to {high:g}" if np.isfinite(high) else f"over {low:g}"
             rows.append([range_, str(np.count_nonzero(inside)), f"{np.median(ratio[inside]):.3f}"])
-    return _table(["aq", "patches", "area over Hertz's"], rows)
+    return table(["aq", "patches", "area over Hertz's"], rows)
 
 
 def _surfaces(error_sources):
@@ -198,24 +199,3 @@ def _surfaces(error_sources):
         f"surfaces of the same spectrum, seed {seeds}, {grid} × {grid} nodes; "
         f"boundary elements {refinement} times as fine.\n"
     )
-
-
-def _pressures(error_sources):
-    return [f"p\\* = {p:.3g}" for p in error_sources[0]["reduced_pressure"].values]
-
-
-def _means(values, form):
-    def written(value):
-        text = form.format(value)
-        return text.replace("-", "+") if float(text) == 0 else text
-
-    mean = np.mean(values, axis=0)
-    if len(values) == 1:
-        return [written(m) for m in mean]
-    deviation = np.std(values, axis=0, ddof=1)
-    return [f"{written(m)} ± {form.replace('+', '').format(d)}" for m, d in zip(mean, deviation, strict=True)]
-
-
-def _table(head, rows):
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"

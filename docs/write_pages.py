@@ -1,0 +1,46 @@
+"""Write the pages of the documentation that are made of the results of campaign `validation`."""
+
+import shutil
+from pathlib import Path
+
+from icha.files import whole_file
+from icha.pages import error_sources, validation
+from icha.records import read_campaign, read_dataset
+
+COMMAND = "make validation"
+RESULTS = Path("results/validation")
+DOCS = Path("docs")
+
+
+def main():
+    """Write the pages and copy their figures."""
+    for name in ("fig10_model_error", "fig11_distribution_error", "fig12_error_sources"):
+        with whole_file(DOCS / f"images/{name}.png") as temporary:
+            shutil.copyfile(RESULTS / f"figures/{name}.png", temporary)
+
+    def sources(entry):
+        return [read_dataset(path) for path in sorted((RESULTS / "references/error_sources" / entry).rglob("*.nc"))]
+
+    pages = {
+        "validation": validation.page(
+            read_campaign(RESULTS / "aggregated/model_error.nc"),
+            entries={"adhesionless": "Without adhesion", "adhesive": "With adhesion"},
+            grids={"adhesionless": "2 cells", "coarse": "1 cell", "fine": "4 cells"},
+            ranges={"adhesionless": ["ranges", "shortest_range"]},
+            figures={
+                "images/fig10_model_error.png": "Relative error of contact area and mean separation against load",
+                "images/fig11_distribution_error.png": "Distances of the distributions, overlap of the contact maps",
+            },
+            command=COMMAND,
+        ),
+        "error_sources": error_sources.page(
+            sources("adhesionless"), sources("adhesive"), figure="images/fig12_error_sources.png", command=COMMAND
+        ),
+    }
+    for name, text in pages.items():
+        with whole_file(DOCS / f"{name}.md") as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

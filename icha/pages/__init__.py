@@ -1,0 +1,1 @@
+"""Pages of the documentation whose numbers are results: Markdown, written from datasets."""
