@@ -16,12 +16,15 @@ import numpy as np
 import xarray as xr
 
 from icha.campaign import RunLabels, run_labels, select_run
+from icha.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.files import whole_file
 from icha.records import INCOMPLETE, MISSING
 
 RESIDUAL_LIMIT = 1e-8
 IDENTITY_LIMIT = 1e-8
 TARGET_LIMIT = 1e-8
+# The mean gap that carries a load is searched for to 2e-4 of the load.
+LOAD_LIMIT = 1e-3
 # Under load control an event (jump-in, coalescence) may push the surfaces apart by a little, in units of h_rms.
 SEPARATION_RISE_LIMIT = 1e-2
 
@@ -49,11 +52,7 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
     checks: list[Check] = []
 
     def at_most(name, value, limit, description):
-        # A value that is not a number keeps to no limit; it is reported as -1, which no error can be.
-        value = float(value)
-        passed = bool(math.isfinite(value) and value <= limit)
-        shown = value if math.isfinite(value) else -1.0
-        checks.append(Check(name, shown, float(limit), passed, description, subject))
+        checks.append(_at_most(name, value, limit, description, subject))
 
     numbers = [v.values for v in run.variables.values() if v.dtype.kind in "fiu"]
     at_most(
@@ -202,6 +201,71 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
     for labels in present:
         checks.extend(check_run(select_run(tree, labels), str(labels)))
     return tuple(checks)
+
+
+def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
+    """Check a boundary-element solution: finite, converged, resolved, at its load, and true to its identities.
+
+    Parameters
+    ----------
+    solution : a dataset as `icha.reference.boundary_elements.boundary_elements` returns it.
+    subject : name of the solution in the findings.
+    """
+    gaps = solution["gap_density"].values * np.diff(solution["gap_bin_edges"].values)
+    pressures = solution["pressure_density"].values * np.diff(solution["pressure_bin_edges"].values)
+    loads = pressures * solution["pressure_bin_mean"].values
+    area, nominal = float(solution["contact_area_fraction_raw"]), float(solution["nominal_pressure"])
+    unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
+    asked = float(solution["target_reduced_pressure"]) * unit
+    numbers = [v.values for v in solution.variables.values() if v.dtype.kind in "fiu"]
+    findings = (
+        (
+            "boundary elements: finite",
+            sum(int(np.count_nonzero(~np.isfinite(values))) for values in numbers),
+            0,
+            "number of values that are not finite",
+        ),
+        (
+            "boundary elements: converged",
+            float(solution["residual"]) / float(solution["tolerance"]),
+            1,
+            "error of the solver over the one at which it was to stop",
+        ),
+        ("boundary elements: load", abs(nominal / asked - 1), LOAD_LIMIT, "mean traction against the load asked for"),
+        (
+            "boundary elements: resolved",
+            float(solution["strength_number"]),
+            MAX_STRENGTH_NUMBER,
+            "sqrt(dgamma dx/E*)/range of the grid, 0 without adhesion",
+        ),
+        (
+            "boundary elements: P(u) complete",
+            abs(gaps.sum() + area - 1),
+            IDENTITY_LIMIT,
+            "integral of P(u) over u, plus the nodes in contact, against 1",
+        ),
+        (
+            "boundary elements: area from P(p)",
+            abs(pressures.sum() - area) / max(area, np.finfo(float).tiny),
+            IDENTITY_LIMIT,
+            "integral of P(p) over p against the nodes in contact",
+        ),
+        (
+            "boundary elements: load from P(p)",
+            abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), asked),
+            IDENTITY_LIMIT,
+            "integral of p P(p) over p, plus the traction outside contact, against F/A0, over the sum of both signs",
+        ),
+    )
+    return tuple(_at_most(name, value, limit, description, subject) for name, value, limit, description in findings)
+
+
+def _at_most(name, value, limit, description, subject):
+    """The finding that a value keeps to a limit, or does not."""
+    # A value that is not a number keeps to no limit; it is reported as -1, which no error can be.
+    value = float(value)
+    finite = math.isfinite(value)
+    return Check(name, value if finite else -1.0, float(limit), finite and value <= limit, description, subject)
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 import small_campaign as small
 
+import icha
 from icha.campaign import RunLabels, campaign_tree
-from icha.checks import Check, check_campaign, check_run, read_checks, worst, write_checks
+from icha.checks import Check, check_campaign, check_run, check_solution, read_checks, worst, write_checks
+from icha.reference.boundary_elements import boundary_elements
 
 
 def failed(run):
@@ -57,6 +59,37 @@ def test_each_kind_of_damage_is_caught_by_its_check(name):
     run = small.run(material="hertz").copy(deep=True)
     DAMAGES[name](run)
     assert name in failed(run)
+
+
+@pytest.fixture(scope="module")
+def solution():
+    rough = icha.SelfAffineSpectrum(
+        period=100e-6, rolloff_wavelength=50e-6, short_wavelength=12.5e-6, hurst=0.8, rms_slope=1.0
+    )
+    return boundary_elements(rough.realise(grid=64, seed=1), icha.Material(25e6, 0.05, 150e-9), 0.01)
+
+
+def test_boundary_elements_pass(solution):
+    assert all(check.passed for check in check_solution(solution))
+
+
+SOLUTION_DAMAGES = {
+    "finite": ("gap_density", np.nan),
+    "converged": ("residual", 1.01e-8),
+    "load": ("nominal_pressure", 1.002 * 25e6 * 0.01),
+    "resolved": ("strength_number", 0.51),
+    "P(u) complete": ("contact_area_fraction_raw", 0.5),
+    "area from P(p)": ("contact_area_fraction_raw", 0.5),
+    "load from P(p)": ("outside_pressure", -1.0),
+}
+
+
+@pytest.mark.parametrize("name", SOLUTION_DAMAGES)
+def test_damaged_boundary_elements_are_caught(name, solution):
+    variable, value = SOLUTION_DAMAGES[name]
+    damaged = solution.assign({variable: solution[variable] * 0 + value})
+    caught = {check.name.removeprefix("boundary elements: ") for check in check_solution(damaged) if not check.passed}
+    assert name in caught
 
 
 def test_a_lost_spot_is_caught():

@@ -38,6 +38,7 @@ SURFACES = [f"{RESULTS}/surfaces/{name}/seed{seed}.nc" for name, seed in surface
 RUNS = [f"{RESULTS}/runs/{path}" for path in CASES]
 THEORIES = [f"{RESULTS}/references/{name}.nc" for name in dict.fromkeys(name for name, _ in surface_cases(CAMPAIGN))]
 SOLUTION_CASES = {f"{case.path}.nc": case for case in solution_cases(CAMPAIGN)}
+SOLUTION_LABELS = [tuple(case) for case in SOLUTION_CASES.values()]
 SOLUTIONS = [f"{RESULTS}/references/boundary_elements/{path}" for path in SOLUTION_CASES]
 SOURCE_CASES = {f"{case.path}.nc": case for case in source_cases(CAMPAIGN)}
 ERROR_SOURCES = [f"{RESULTS}/references/error_sources/{path}" for path in SOURCE_CASES]

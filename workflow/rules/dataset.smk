@@ -93,7 +93,7 @@ rule model_error:
         mem_mb=4000,
         runtime=30,
     params:
-        labels=[tuple(case) for case in SOLUTION_CASES.values()],
+        labels=SOLUTION_LABELS,
         attributes=ATTRIBUTES,
         code=code_of("measure_model_error.py"),
     message:
@@ -104,7 +104,8 @@ rule model_error:
 
 rule checks:
     input:
-        DATASET,
+        dataset=DATASET,
+        solutions=SOLUTIONS,
     output:
         CHECKS,
     log:
@@ -119,6 +120,7 @@ rule checks:
         runtime=30,
     params:
         labels=LABELS,
+        solution_labels=SOLUTION_LABELS,
         code=code_of("check_results.py"),
     message:
         "Checks of the results"

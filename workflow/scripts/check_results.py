@@ -2,13 +2,20 @@
 
 from job import logged
 
-from icha.checks import check_campaign, worst, write_checks
-from icha.records import read_campaign
+from icha.checks import check_campaign, check_solution, worst, write_checks
+from icha.labels import SolutionLabels
+from icha.records import read_campaign, read_dataset
 
 
-def check_results(dataset, output, *, labels):
-    """Write all checks of the campaign dataset, which should hold the runs of the given labels, to `output`."""
-    checks = check_campaign(read_campaign(dataset), labels)
+def check_results(dataset, solutions, output, *, labels, solution_labels):
+    """Write all checks of a campaign to `output`.
+
+    The dataset should hold the runs of the given labels; `solutions` are files of boundary elements, labelled in their
+    order.
+    """
+    checks = list(check_campaign(read_campaign(dataset), labels))
+    for label, path in zip(solution_labels, solutions, strict=True):
+        checks += check_solution(read_dataset(path), str(SolutionLabels(*label)))
     for check in worst(checks):
         print(f"{check.name}: {check.value:.3g}, at most {check.limit:g} ({check.subject})")
     write_checks(checks, output)
@@ -16,4 +23,10 @@ def check_results(dataset, output, *, labels):
 
 if "snakemake" in globals():
     with logged(snakemake.log[0]):
-        check_results(snakemake.input[0], snakemake.output[0], labels=snakemake.params.labels)
+        check_results(
+            snakemake.input.dataset,
+            snakemake.input.solutions,
+            snakemake.output[0],
+            labels=snakemake.params.labels,
+            solution_labels=snakemake.params.solution_labels,
+        )
