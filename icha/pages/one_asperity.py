@@ -97,4 +97,4 @@ def _range(error, form):
     if not error.size:
         return "–"
     ends = [form.format(100 * float(end)) for end in (error.min(), error.max())]
-    return " to ".join(dict.fromkeys(ends))
+    return " to ".join(dict.fromkeys(end.replace("-", "+") if float(end) == 0 else end for end in ends))
