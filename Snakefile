@@ -31,6 +31,7 @@ rule all:
     default_target: True
     input:
         CONFIG_USED,
+        REFERENCES,
         FIGURES,
         DATASET,
         VERDICT,

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 from icha.files import whole_file
-from icha.pages import error_sources, validation
+from icha.pages import error_sources, one_asperity, validation
 from icha.records import read_campaign, read_dataset
 
 COMMAND = "make validation"
@@ -21,6 +21,8 @@ def main():
     def sources(entry):
         return [read_dataset(path) for path in sorted((RESULTS / "references/error_sources" / entry).rglob("*.nc"))]
 
+    asperities = {path.stem: read_dataset(path) for path in (RESULTS / "references/one_asperity").glob("*.nc")}
+    hertz = asperities.pop("hertz")
     pages = {
         "validation": validation.page(
             read_campaign(RESULTS / "aggregated/model_error.nc"),
@@ -32,6 +34,7 @@ def main():
                 "images/fig11_distribution_error.png": "Distances of the distributions, overlap of the contact maps",
             },
             command=COMMAND,
+            further=one_asperity.section(list(asperities.values()), hertz),
         ),
         "error_sources": error_sources.page(
             sources("adhesionless"), sources("adhesive"), figure="images/fig12_error_sources.png", command=COMMAND

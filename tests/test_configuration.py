@@ -8,6 +8,7 @@ import yaml
 
 from icha.configuration import model
 from icha.configuration.expansion import (
+    asperity_cases,
     campaign_sha256,
     map_solution,
     measurement_settings,
@@ -385,6 +386,12 @@ BAD = {
         {"fig12_error_sources": {"entry": "why"}},
         "figures.fig12_error_sources.entry: 'why' is not defined",
     ),
+    "Tabor parameter that takes too fine a grid": (
+        "one_asperity",
+        {"tabor_parameters": [2, 8]},
+        "one_asperity.tabor_parameters[1]: 8 is out of range; allowed: a number in [1.5, 6]",
+    ),
+    "unknown key of one asperity": ("one_asperity", {"mu": [2]}, "one_asperity.mu: unknown key"),
     "ORCID": ("authors", [{"name": "A", "orcid": "1"}], "authors[0].orcid"),
 }
 
@@ -470,6 +477,12 @@ def test_the_sources_of_the_error_are_drawn_without_adhesion(load):
         "tolerance": 1e-8,
     }
     assert campaign.snapshots_of("one") == [("area_fraction", 0.02)]  # the runs are none of their concern
+
+
+def test_one_asperity_is_hertzs_and_one_for_every_tabor_parameter(load):
+    assert asperity_cases(load().campaign) == {}
+    campaign = load({"one_asperity": {"tabor_parameters": [2, 2.8]}}).campaign
+    assert asperity_cases(campaign) == {"hertz": None, "mu2": 2.0, "mu2.8": 2.8}
 
 
 def test_random_surfaces_and_files_need_studies_of_their_own(load, tmp_path):

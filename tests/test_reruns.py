@@ -21,6 +21,7 @@ ALL_RULES = {
     "reference",
     "boundary_elements",
     "error_sources",
+    "one_asperity",
     "run",
     "campaign_dataset",
     "comparison",
@@ -30,7 +31,8 @@ ALL_RULES = {
     "figure",
     "report_page",
 }
-WHAT_FOLLOWS_RUNS = ALL_RULES - {"configuration", "surface", "reference", "boundary_elements", "error_sources"}
+BESIDE_RUNS = {"reference", "boundary_elements", "error_sources", "one_asperity"}
+WHAT_FOLLOWS_RUNS = ALL_RULES - {"configuration", "surface"} - BESIDE_RUNS
 
 
 def planned(project, *arguments):
@@ -89,19 +91,29 @@ def test_a_fresh_clone_with_unpacked_results_runs_nothing(smoke, tmp_path):
     assert planned(clone) == ({}, [])
 
 
-@pytest.mark.parametrize("module", ["equilibrium", "jkr", "elasticity", "simulation", "path"])
-def test_the_physics_runs_sweeps_and_what_follows(module, project):
+@pytest.mark.parametrize(
+    ("module", "beside"),
+    {
+        "equilibrium": {"error_sources", "one_asperity"},
+        "jkr": {"reference", "error_sources", "one_asperity"},
+        "elasticity": {"error_sources", "one_asperity"},
+        "simulation": set(),
+        "path": {"error_sources"},
+    }.items(),
+)
+def test_the_physics_runs_sweeps_and_what_follows(module, beside, project):
     add_statement(project / f"icha/{module}.py")
     jobs, _ = planned(project)
     assert jobs["run"] == 9
-    assert set(jobs) == WHAT_FOLLOWS_RUNS
+    # Boundary elements know nothing of the model: they are not solved again.
+    assert set(jobs) == WHAT_FOLLOWS_RUNS | beside
 
 
 def test_the_spectrum_runs_surfaces_and_all_that_needs_them(project):
     add_statement(project / "icha/spectrum.py")
     jobs, _ = planned(project)
     assert jobs["surface"] == 3
-    assert set(jobs) == ALL_RULES - {"configuration"}
+    assert set(jobs) == ALL_RULES - {"configuration", "one_asperity"}
 
 
 def test_a_figure_runs_itself_and_the_report(project):
@@ -121,7 +133,8 @@ def test_boundary_elements_run_without_the_sweeps(project):
     add_statement(project / "icha/reference/boundary_elements.py")
     jobs, _ = planned(project)
     assert jobs["boundary_elements"] == 6
-    assert set(jobs) == {"boundary_elements", "model_error", "figure", "report_page"}
+    what_follows = {"model_error", "checks", "verdict", "figure", "report_page"}
+    assert set(jobs) == {"boundary_elements", "error_sources", "one_asperity"} | what_follows
 
 
 def test_a_finer_grid_costs_its_own_solutions(project):

@@ -42,6 +42,8 @@ def test_everything_that_was_promised_is_there(smoke):
         "references/boundary_elements/adhesionless/challenge/seed2/slope1/cmc_adhesionless/p0.0316.nc",
         "references/boundary_elements/adhesive/challenge/seed1/slope1/cmc_300nm/p0.01.nc",
         "references/error_sources/adhesionless/challenge/seed1/slope1/cmc_adhesionless.nc",
+        "references/one_asperity/hertz.nc",
+        "references/one_asperity/mu1.5.nc",
         "aggregated/model_error.nc",
         "dataset/smoke.nc",
         "aggregated/smoke.nc",

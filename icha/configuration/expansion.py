@@ -7,7 +7,7 @@ import itertools
 import json
 
 from icha.configuration.model import Campaign, SelfAffineSurface
-from icha.labels import RunLabels, SolutionLabels, SourceLabels
+from icha.labels import RunLabels, SolutionLabels, SourceLabels, number_label
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
@@ -63,6 +63,13 @@ def source_settings(campaign: Campaign, case: SourceLabels) -> dict:
         "refinement": entry.refinement,
         "tolerance": entry.tolerance,
     }
+
+
+def asperity_cases(campaign: Campaign) -> dict[str, float | None]:
+    """Names of the comparisons of one asperity, and their Tabor parameters; None is Hertz's contact."""
+    if campaign.one_asperity is None:
+        return {}
+    return {"hertz": None} | {f"mu{number_label(mu)}": mu for mu in campaign.one_asperity.tabor_parameters}
 
 
 def map_solution(campaign: Campaign) -> SolutionLabels | None:

@@ -209,6 +209,8 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
         return FileSurface if kind == "file" else model.SelfAffineSurface
     if location == ("figures",):
         return model.Figures
+    if location == ("one_asperity",):
+        return model.OneAsperity
     if len(location) == 2 and location[0] == "figures":
         return get_args(model.Figures.model_fields[location[1]].annotation)[0]
     if len(location) == 2:

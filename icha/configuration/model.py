@@ -447,6 +447,17 @@ class ErrorSources(BesideStudy):
         return self.refinement // 2
 
 
+class OneAsperity(Section):
+    """One asperity by the model and by boundary elements, where the answer is known."""
+
+    tabor_parameters: Annotated[
+        list[_number("a number in [1.5, 6]", least=1.5, most=6)], Field(min_length=1), AfterValidator(_increasing)
+    ] = Field(
+        description="Tabor parameters, increasing; boundary elements take a grid that grows with their square, 800 "
+        "nodes a side and some minutes at 4. Hertz's contact is always computed."
+    )
+
+
 class JKRFigure(Section):
     """The force-approach curve of one asperity."""
 
@@ -578,6 +589,9 @@ class Campaign(Section):
     )
     error_sources: dict[Name, ErrorSources] = Field(
         default={}, description="Studies of where the model's error comes from, by name."
+    )
+    one_asperity: OneAsperity | None = Field(
+        default=None, description="One asperity by the model and by boundary elements."
     )
     measurements: dict[Name, Measurement] = Field(
         default={}, description="Measurements by name, overlaid on figure 5. None are shipped with ICHA."

@@ -39,6 +39,7 @@ _HEADINGS = {
     "Snapshot": "`studies.<name>.snapshots`, each",
     "BoundaryElements": "`boundary_elements.<name>`",
     "ErrorSources": "`error_sources.<name>`",
+    "OneAsperity": "`one_asperity`",
     "Measurement": "`measurements.<name>`",
     "Column": "`measurements.<name>.load` and `.area`",
     "Figures": "`figures`",

@@ -94,7 +94,7 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
                 handle = ax.errorbar(p, values, bars, **look)
                 if quantity.other and adhesive:
                     others = quantity.factor * errors[f"{quantity.other}_mean"].values
-                    ax.plot(p, others, color=colour, ls=":", lw=0.9)
+                    ax.plot(p, others, color=colour, ls=":", lw=0.9, marker=".", ms=3)
             named.setdefault(", ".join(name), handle)
         if own_rows:
             row[-1].set_title(material_label(interfaces, shown[0]), loc="right")

@@ -10,6 +10,7 @@ from command_line import campaign_configuration
 from fingerprint import code_fingerprint
 
 from icha.configuration.expansion import (
+    asperity_cases,
     campaign_sha256,
     map_case,
     map_solution,
@@ -42,7 +43,8 @@ SOLUTION_LABELS = [tuple(case) for case in SOLUTION_CASES.values()]
 SOLUTIONS = [f"{RESULTS}/references/boundary_elements/{path}" for path in SOLUTION_CASES]
 SOURCE_CASES = {f"{case.path}.nc": case for case in source_cases(CAMPAIGN)}
 ERROR_SOURCES = [f"{RESULTS}/references/error_sources/{path}" for path in SOURCE_CASES]
-REFERENCES = [*THEORIES, *SOLUTIONS, *ERROR_SOURCES]
+ASPERITIES = [f"{RESULTS}/references/one_asperity/{name}.nc" for name in asperity_cases(CAMPAIGN)]
+REFERENCES = [*THEORIES, *SOLUTIONS, *ERROR_SOURCES, *ASPERITIES]
 DATASET = f"{RESULTS}/dataset/{CAMPAIGN.name}.nc"
 COMPARISON = f"{RESULTS}/aggregated/{CAMPAIGN.name}.nc"
 # Only a campaign with boundary elements has an error to tell.
@@ -61,6 +63,7 @@ ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": CAMPAIGN.license}
 wildcard_constraints:
     name="[a-z0-9_-]+",
     entry="[a-z0-9_-]+",
+    asperity="hertz|mu[0-9.]+",
     study="[a-z0-9_-]+",
     surface="[a-z0-9_-]+",
     seed=r"\d+",

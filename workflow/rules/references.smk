@@ -1,7 +1,8 @@
 # references/<surface>.nc: what theories say of a surface, and published points;
 # references/boundary_elements/<entry>/<surface>/seed<k>/slope<g>/<material>/p<p*>.nc: one load each, by boundary
 # elements on the topography of the run;
-# references/error_sources/<entry>/<surface>/seed<k>/slope<g>/<material>.nc: variants between the model and them.
+# references/error_sources/<entry>/<surface>/seed<k>/slope<g>/<material>.nc: variants between the model and them;
+# references/one_asperity/<hertz or mu<mu>>.nc: where the answer is known.
 
 
 def adhesive_contacts(surface):
@@ -95,3 +96,26 @@ rule error_sources:
         "{wildcards.material}"
     script:
         "../scripts/find_error_sources.py"
+
+
+rule one_asperity:
+    output:
+        f"{RESULTS}/references/one_asperity/{{asperity}}.nc",
+    log:
+        f"{LOGS}/one_asperity/{{asperity}}.log",
+    benchmark:
+        f"{BENCHMARKS}/one_asperity/{{asperity}}.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=800,
+        runtime=120,
+    params:
+        tabor_parameter=lambda wildcards: asperity_cases(CAMPAIGN)[wildcards.asperity],
+        attributes=ATTRIBUTES,
+        code=code_of("press_one_asperity.py"),
+    message:
+        "One asperity: {wildcards.asperity}"
+    script:
+        "../scripts/press_one_asperity.py"
