@@ -17,10 +17,10 @@ asperities). All quantities are in SI units; every variable names its unit.
 |---|---|
 | `config.used.yaml` | the configuration: everything that was asked for |
 | `dataset/` | the campaign dataset, netCDF-4, one group per study: `xarray.open_datatree` |
-| `aggregated/` | the runs of every study compared at common loads |
+| `aggregated/` | the runs of every study compared at common loads, and with boundary elements where there are any |
 | `runs/` | the same runs, one file each |
 | `surfaces/` | the topographies, at rms slope 1 |
-| `references/` | theory curves and published points for these surfaces |
+| `references/` | theory curves, published points and boundary-element solutions for these surfaces |
 | `figures/`, `report.html` | figures, and the report with tables and checks |
 | `checks.json`, `verdict.txt` | checks of the results, and that all passed |
 | `SHA256SUMS` | checksums of all files: `sha256sum -c SHA256SUMS` |
