@@ -40,7 +40,9 @@ per cell of the surface's.
 _RANGES = """## Whether the range of attraction matters
 
 ICHA's area and mean separation hardly depend on the range at a given surface energy: it decides only when contact
-forms. Here the same surfaces at the same loads for several ranges, over the same without adhesion.
+forms. To boundary elements it does matter at ranges as long as these: the longer, the less contact of zero gap adhesion
+adds, and the more energetic area. Here are the same surfaces at the same loads for several ranges, over the same without
+adhesion.
 """
 
 
@@ -72,7 +74,7 @@ def page(
         _TITLE,
         f"Every number on this page is computed, and the page written, by `{command}`.\n",
         *(_summary(model_error[name].to_dataset(), heading) for name, heading in entries.items()),
-        *(f"![{what}]({path})\n" for path, what in figures.items()),
+        *(f"![{what}]({path})\n\n*{what}.*\n" for path, what in figures.items()),
         "## Contact area and mean separation at given load\n",
     ]
     for name in names:

@@ -104,6 +104,9 @@ VARIABLES = {
 }
 
 
+_OF_PULL_OFF = ("pull_off_force_icha", "pull_off_force_boundary_elements", "pull_off_error")
+
+
 def paraboloid(grid: int, period: float, offset: float = 0.0) -> Surface:
     """One bump of radius of curvature 1 m in a periodic cell of side `period` (m), whose edges are valleys.
 
@@ -125,6 +128,7 @@ def one_asperity(
     tabor_parameter: float,
     *,
     approaches: Sequence[float] = (3.0, 2.0, 1.0),
+    pull_off: bool = True,
     period: float = 12.0,
     grid: int | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
@@ -135,8 +139,9 @@ def one_asperity(
     Parameters
     ----------
     tabor_parameter : positive.
-    approaches : in m, that is in (dgamma^2 R/E*^2)^(1/3), falling. The approach of the model's pull-off force, below
-        all of them, is added: there boundary elements have their largest tension, too.
+    approaches : in m, that is in (dgamma^2 R/E*^2)^(1/3), falling.
+    pull_off : whether to add the approach of the model's pull-off force, which is below all of them: there boundary
+        elements have their largest tension, too, and take longest. Without it there are no pull-off forces to compare.
     period : of the cell, m.
     grid : nodes along a side; None: as few as resolve the attraction.
     tolerance : relative error at which the boundary elements' solver may stop.
@@ -159,18 +164,19 @@ def one_asperity(
     """
     material = Material(_MODULUS, _ENERGY, 1 / positive("tabor_parameter", tabor_parameter))
     period = positive("period", period, "m")
-    pull_off = _pull_off_approach(JKR(material), period)
-    approaches = _falling("approaches", approaches, pull_off)
+    last = _pull_off_approach(JKR(material), period)
+    approaches = _falling("approaches", approaches, last)
     grid = resolving_grid(material, period) if grid is None else integer("grid", grid, 8)
     surface = paraboloid(grid, period)
     states = states_at_mean_separations(
         surface,
         material,
-        [surface.heights.max() - approach for approach in (*approaches, pull_off)],
+        [surface.heights.max() - approach for approach in (*approaches, *[last] * bool(pull_off))],
         tolerance=tolerance,
         progress=progress,
     )
-    return _comparison(surface, material, states, len(approaches), tolerance, progress)
+    compared = _comparison(surface, material, states, len(approaches), tolerance, progress)
+    return compared if pull_off else compared.drop_vars(_OF_PULL_OFF)
 
 
 def hertz_asperity(
