@@ -32,8 +32,8 @@ def main():
             figures={
                 "images/fig10_model_error.png": "Relative error of contact area and mean separation against load; with "
                 "adhesion dotted against the energetic area. Coarse and fine: of one seed, on other grids",
-                "images/fig11_distribution_error.png": "Distances of the distributions of pressure and of gap, and overlap of "
-                "the contact maps",
+                "images/fig11_distribution_error.png": "Distances of the distributions of pressure and of gap, and "
+                "overlap of the contact maps",
             },
             command=COMMAND,
             further=one_asperity.section(list(asperities.values()), hertz),

@@ -41,8 +41,8 @@ _RANGES = """## Whether the range of attraction matters
 
 ICHA's area and mean separation hardly depend on the range at a given surface energy: it decides only when contact
 forms. To boundary elements it does matter at ranges as long as these: the longer, the less contact of zero gap adhesion
-adds, and the more energetic area. Here are the same surfaces at the same loads for several ranges, over the same without
-adhesion.
+adds, and the more energetic area. Here are the same surfaces at the same loads for several ranges, over the same
+without adhesion.
 """
 
 
