@@ -266,6 +266,7 @@ def _entry(errors):
         values = errors[name].values
         return {"median": float(np.median(values)), "least": float(values.min()), "most": float(values.max())}
 
+    tabor = errors["tabor_parameter"].values
     return {
         "name": errors.attrs["entry"],
         "study": errors.attrs["study"],
@@ -273,10 +274,11 @@ def _entry(errors):
         "states": int(errors["area_error"].size),
         "grids": sorted(set(errors["solution_grid"].values.ravel().tolist())),
         "adhesive": bool((errors["surface_energy"] > 0).any()),
+        "tabor": list(dict.fromkeys(f"{mu:.2g}" for mu in (tabor.min(), tabor.max()))),
         "load_error": float(np.abs(errors["load_error"]).max()),
         "residual": float(errors["residual"].max()),
         "rows": rows,
-        **{name: spread(name) for name in SUMMARISED},
+        **{name: spread(name) for name in (*SUMMARISED, "perimeter_correction")},
     }
 
 

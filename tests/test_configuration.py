@@ -392,6 +392,19 @@ BAD = {
         "one_asperity.tabor_parameters[1]: 8 is out of range; allowed: a number in [1.5, 6]",
     ),
     "unknown key of one asperity": ("one_asperity", {"mu": [2]}, "one_asperity.mu: unknown key"),
+    "tolerance that cannot be reached": (
+        "boundary_elements",
+        {"truth": {"study": "one", "reduced_pressures": [0.01], "tolerance": 1e-20}},
+        "boundary_elements.truth.tolerance: 1e-20 is out of range; allowed: a number in [1e-12, 1e-4]",
+    ),
+    "boundary elements beyond any memory": (
+        "",
+        {
+            "surfaces.rough.grid": 8192,
+            "boundary_elements": {"truth": {"study": "one", "reduced_pressures": [0.01], "refinement": 16}},
+        },
+        "boundary_elements.truth.refinement: 16 gives 131072 nodes a side on 'rough'; allowed: 32768 at most",
+    ),
     "ORCID": ("authors", [{"name": "A", "orcid": "1"}], "authors[0].orcid"),
 }
 
@@ -463,9 +476,14 @@ def test_the_sources_of_the_error_are_drawn_without_adhesion(load):
         "error_sources": {"why": TRUTH | {"seeds": [2]}},
         "figures": {"fig12_error_sources": {"entry": "why"}},
     }
-    with pytest.raises(ConfigurationError, match=r"fig12_error_sources\.entry: 'why' has no material without adhesion"):
+    with pytest.raises(ConfigurationError, match=r"fig12_error_sources\.entry: 'why' has not one material"):
         load(changes)
-    campaign = load({**changes, "materials.soft.surface_energy": "0 J/m^2"}).campaign
+    bare = changes | {"materials.soft.surface_energy": "0 J/m^2"}
+    # Its mean over the seeds is that of one surface at one slope.
+    with pytest.raises(ConfigurationError, match=r"entry: 'why' has not one rms slope but 2 \(0\.2, 1\.0\)"):
+        load(bare)
+    del bare["figures"]
+    campaign = load(bare).campaign
     cases = source_cases(campaign)
     assert [case.path for case in cases] == [f"why/rough/seed2/slope{slope}/soft" for slope in ("0.2", "1")]
     assert source_settings(campaign, cases[1]) == {
@@ -496,7 +514,7 @@ def test_random_surfaces_and_files_need_studies_of_their_own(load, tmp_path):
 def test_mistakes_are_named(case, load, tmp_path):
     key, value, message = BAD[case]
     with pytest.raises(ConfigurationError) as error:
-        load({key: value})
+        load({key: value} if key else value)
     lines = str(error.value).splitlines()
     assert any(message in line and line.startswith(f"{tmp_path}/campaign.yaml: ") for line in lines), lines
     assert all("allowed: " in line or "needed: " in line or case == "ORCID" for line in lines), lines

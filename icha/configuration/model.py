@@ -29,6 +29,8 @@ from icha.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, M
 from icha.material import Material as Interface
 
 NAME_PATTERN = r"^[a-z0-9_-]+$"
+# Nodes along a side of a surface or of boundary elements.
+MAX_GRID = 32768
 # Rounding of the quotient of two lengths must not decide whether a wave has its cells.
 _ROUNDING = 1e-9
 
@@ -142,7 +144,7 @@ class SelfAffineSurface(Section):
         "grid cells (an error below), better 4 (a warning below) or 8."
     )
     hurst: _number("a number in (0, 1]", above=0, most=1) = Field(description="Hurst exponent H, in (0, 1].")
-    grid: _integer(8, 32768) = Field(description="Grid points along a side.")
+    grid: _integer(8, MAX_GRID) = Field(description="Grid points along a side.")
     amplitudes: Literal["fixed", "gaussian"] = Field(
         default="fixed",
         description="Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and "
@@ -409,7 +411,7 @@ class BesideStudy(Section):
     reduced_pressures: _stops(ReducedPressure, _increasing) = Field(
         description="Loads p/(E* h'rms), increasing. Those of `boundary_elements` become snapshots of the study's runs."
     )
-    tolerance: _number("a number in (0, 1e-4]", above=0, most=1e-4) = Field(
+    tolerance: _number("a number in [1e-12, 1e-4]", least=1e-12, most=1e-4) = Field(
         default=1e-8, description="Relative error at which the solver may stop."
     )
 
@@ -430,7 +432,7 @@ class BoundaryElements(BesideStudy):
 class ErrorSources(BesideStudy):
     """Variants between the model and boundary elements, each of which changes one thing."""
 
-    refinement: _integer(2, 16) = Field(
+    refinement: _integer(1, 16) = Field(
         default=2, description="Cells per cell of the surface's own grid, along a side: even, since half is tried too."
     )
 
@@ -604,7 +606,9 @@ class Campaign(Section):
 
         def known(location, name, names):
             if name not in names:
-                found.append((location, name, f"is not defined; allowed: {', '.join(names)}"))
+                found.append(
+                    (location, name, f"is not defined; allowed: {', '.join(names) or 'none, for there is none'}")
+                )
 
         for label, study in self.studies.items():
             for kind, names in (("surfaces", self.surfaces), ("materials", self.materials)):
@@ -628,11 +632,8 @@ class Campaign(Section):
         for label, figure in self.figures.drawn().items():
             if isinstance(figure, SourcesFigure):
                 known(("figures", label, "entry"), figure.entry, self.error_sources)
-                asked = self.error_sources.get(figure.entry)
-                names = self.solved(asked)["materials"] if asked is not None and asked.study in self.studies else []
-                if names and all(n in self.materials and self.materials[n].surface_energy > 0 for n in names):
-                    reason = "has no material without adhesion, which is what is drawn; allowed: an entry with one"
-                    found.append((("figures", label, "entry"), figure.entry, reason))
+                if figure.entry in self.error_sources:
+                    found += self._sources_problems(("figures", label, "entry"), figure.entry)
             if not hasattr(figure, "study"):
                 continue
             known(("figures", label, "study"), figure.study, self.studies)
@@ -686,6 +687,11 @@ class Campaign(Section):
             if not isinstance(surface, SelfAffineSurface):
                 continue  # only its file knows its grid
             yield from self.unresolved(*location, name, surface.grid)
+            if surface.grid * entry.refinement > MAX_GRID:
+                reason = (
+                    f"gives {surface.grid * entry.refinement} nodes a side on {name!r}; allowed: {MAX_GRID} at most"
+                )
+                yield (*location, "refinement"), entry.refinement, reason
 
     def unresolved(self, section: str, entry: str, surface: str, grid: int) -> Iterator[tuple[tuple, Any, str]]:
         """Materials of an entry of `boundary_elements` or `error_sources` whose attraction the grid of a surface does
@@ -698,6 +704,26 @@ class Campaign(Section):
             material = Interface(**self.materials[label].model_dump())
             if problem := resolution_problem(material, spacing):
                 yield (section, entry, "materials"), label, f"on surface {surface!r}: {problem}"
+
+    def _sources_problems(self, location, name):
+        """What keeps the runs without adhesion of an entry of error sources from differing in their seeds only."""
+        entry = self.error_sources[name]
+        if entry.study not in self.studies:
+            return
+        asked = self.solved(entry)
+        bare = [n for n in asked["materials"] if n in self.materials and self.materials[n].surface_energy == 0]
+        for what, there in (
+            ("surface", asked["surfaces"]),
+            ("rms slope", asked["rms_slopes"]),
+            ("material without adhesion", bare),
+        ):
+            if len(there) != 1:
+                listed = f" ({', '.join(map(str, there))})" if there else ""
+                yield (
+                    location,
+                    name,
+                    f"has not one {what} but {len(there)}{listed}; allowed: an entry with one, and any seeds",
+                )
 
     def _figure_problems(self, location, figure, study):
         known = [name for name in study.surfaces if name in self.surfaces]

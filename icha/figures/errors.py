@@ -11,12 +11,14 @@ from matplotlib.figure import Figure
 
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.select import study_errors
-from icha.figures.style import COLOURS, DASHES, MARKERS, TWO_COLUMNS, material_label, new_figure, panel_label
+from icha.figures.style import COLOURS, DASHES, GREY, MARKERS, TWO_COLUMNS, material_label, new_figure, panel_label
 
 # More surfaces than this, and every material has panels of its own.
 _MOST_LINES = 2
 # Points of one load stand this far apart, as a factor, so that their bars do not hide each other.
 _APART = 1.025
+# Errors against another quantity of the boundary elements.
+_OTHER = {"ls": ":", "lw": 0.9, "marker": ".", "ms": 3}
 
 
 class Quantity(NamedTuple):
@@ -61,6 +63,7 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
     panels = fig.subplots(len(rows), len(quantities), sharex=True, sharey="col", squeeze=False)
     letters = iter("abcdefghijklmnopqrstuvwxyz")
     named: dict[str, object] = {}
+    dotted: list[object] = []
     for row, shown in zip(panels, rows, strict=True):
         mine = [place for place in places if place[-1] in shown]
         for k, (entry, surface, slope, material) in enumerate(mine):
@@ -94,7 +97,8 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
                 handle = ax.errorbar(p, values, bars, **look)
                 if quantity.other and adhesive:
                     others = quantity.factor * errors[f"{quantity.other}_mean"].values
-                    ax.plot(p, others, color=colour, ls=":", lw=0.9, marker=".", ms=3)
+                    ax.plot(p, others, color=colour, **_OTHER)
+                    dotted = ax.plot([], [], color=GREY, **_OTHER)
             named.setdefault(", ".join(name), handle)
         if own_rows:
             row[-1].set_title(material_label(interfaces, shown[0]), loc="right")
@@ -106,6 +110,8 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
     for ax, quantity in zip(panels[-1], quantities, strict=True):
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylim(*quantity.limits)
+    if dotted:
+        named["against the energetic area"] = dotted[0]
     if len(named) > 1 or "" not in named:
         fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=_columns(named))
     return fig

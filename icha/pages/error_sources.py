@@ -49,8 +49,9 @@ too large and hides a part of the error:
 - the displacement by other spots is taken at a spot's centre, while its curvature across the spot sharpens the summit;
 - unions have a little more area than the discs that they replace cover together.
 
-The error vanishes with the load, since contact then shrinks onto the tops of the highest summits, where nothing but
-their curvature counts; but slowly, as the radius of a contact falls only as the third root of its force. Contacts that
+The error must vanish with the load, since contact then shrinks onto the tops of the highest summits, where nothing but
+their curvature counts; but the radius of a contact falls only as the third root of its force, so slowly that the loads
+of the tables do not show it, only the single spots below. Contacts that
 the model misses, contacts that are not there, the far field and the grids matter little. The steps are taken in one
 order, and the effects are not independent: another order would share them out somewhat differently. Only their sum is
 the model's error.
