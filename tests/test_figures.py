@@ -435,7 +435,8 @@ def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
     figure = fig10_model_error.figure(xr.DataTree.from_dict(parts), study="one")
     assert len(figure.axes) == 4
     assert [len(axes.containers) for axes in figure.axes] == [9, 9, 9, 9]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == [f"s{k}" for k in range(9)]
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == [*(f"s{k}" for k in range(9)), "against the energetic area"]
     looks = {(c[0].get_color(), c[0].get_marker()) for c in figure.axes[0].containers}
     assert len(looks) == 9
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.select import study_errors
@@ -63,7 +64,7 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
     panels = fig.subplots(len(rows), len(quantities), sharex=True, sharey="col", squeeze=False)
     letters = iter("abcdefghijklmnopqrstuvwxyz")
     named: dict[str, object] = {}
-    dotted: list[object] = []
+    against_other = False
     for row, shown in zip(panels, rows, strict=True):
         mine = [place for place in places if place[-1] in shown]
         for k, (entry, surface, slope, material) in enumerate(mine):
@@ -98,7 +99,7 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
                 if quantity.other and adhesive:
                     others = quantity.factor * errors[f"{quantity.other}_mean"].values
                     ax.plot(p, others, color=colour, **_OTHER)
-                    dotted = ax.plot([], [], color=GREY, **_OTHER)
+                    against_other = True
             named.setdefault(", ".join(name), handle)
         if own_rows:
             row[-1].set_title(material_label(interfaces, shown[0]), loc="right")
@@ -110,8 +111,8 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
     for ax, quantity in zip(panels[-1], quantities, strict=True):
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylim(*quantity.limits)
-    if dotted:
-        named["against the energetic area"] = dotted[0]
+    if against_other:
+        named["against the energetic area"] = Line2D([], [], color=GREY, **_OTHER)
     if len(named) > 1 or "" not in named:
         fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=_columns(named))
     return fig
