@@ -3,11 +3,14 @@
 import shutil
 from pathlib import Path
 
+from icha.configuration.expansion import asperity_cases, source_cases
+from icha.configuration.load import load_configuration
 from icha.files import whole_file
 from icha.pages import error_sources, one_asperity, validation
 from icha.records import read_campaign, read_dataset
 
 COMMAND = "make validation"
+CONFIGURATION = Path("config/campaigns/validation.yaml")
 RESULTS = Path("results/validation")
 DOCS = Path("docs")
 
@@ -18,10 +21,15 @@ def main():
         with whole_file(DOCS / f"images/{name}.png") as temporary:
             shutil.copyfile(RESULTS / f"figures/{name}.png", temporary)
 
-    def sources(entry):
-        return [read_dataset(path) for path in sorted((RESULTS / "references/error_sources" / entry).rglob("*.nc"))]
+    campaign = load_configuration(CONFIGURATION).campaign
 
-    asperities = {path.stem: read_dataset(path) for path in (RESULTS / "references/one_asperity").glob("*.nc")}
+    def sources(entry):
+        cases = [case for case in source_cases(campaign) if case.entry == entry]
+        return [read_dataset(RESULTS / f"references/error_sources/{case.path}.nc") for case in cases]
+
+    asperities = {
+        name: read_dataset(RESULTS / f"references/one_asperity/{name}.nc") for name in asperity_cases(campaign)
+    }
     hertz = asperities.pop("hertz")
     pages = {
         "validation": validation.page(
