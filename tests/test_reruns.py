@@ -194,8 +194,9 @@ def test_a_value_runs_the_sweeps_that_it_concerns(project):
 def test_a_new_seed_costs_its_own_sweeps(project):
     replace(project / "config/campaigns/smoke.yaml", "seeds: [1, 2]", "seeds: [1, 2, 3]")
     jobs, messages = planned(project)
-    assert jobs["surface"] == 1 and jobs["run"] == 2
-    assert all("seed 3" in message for message in messages if message.startswith(("Surface", "Sweep")))
+    assert jobs["surface"] == 1 and jobs["run"] == 3 and jobs["boundary_elements"] == 3
+    own = ("Surface", "Sweep", "Boundary")
+    assert all("seed 3" in message for message in messages if message.startswith(own))
 
 
 def test_an_option_of_a_figure_draws_that_figure(project):

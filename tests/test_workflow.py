@@ -74,7 +74,7 @@ def test_sweeps_report_progress(smoke):
 def test_boundary_elements_say_whether_the_grid_resolves_the_attraction_before_they_start(smoke):
     folder = smoke / "results/smoke/logs/boundary_elements/adhesive/challenge/seed1/slope1/cmc_300nm"
     first, *others = (folder / "p0.01.log").read_text().splitlines()
-    assert "spacing 1.562e-06 m" in first and "sqrt(dgamma dx/E*)/range" in first
+    assert "spacing 1.563e-06 m" in first and "sqrt(dgamma dx/E*)/range" in first
     assert others
 
 
@@ -264,6 +264,12 @@ def test_surface_files_and_measurements(smoke, tmp_path):
     study = content["studies"]["multi_slope"] | {"surfaces": ["own"], "rms_slopes": [0.5]}
     study["targets"] = {"area_fractions": [0.002, 0.01]}
     study["snapshots"] = [{"area_fraction": 0.01}]
+    study["materials"] = ["pdms_soft", "bare"]
+    content["materials"]["bare"] = content["materials"]["pdms_soft"] | {"surface_energy": "0 J/m^2"}
+    content["boundary_elements"] = {
+        "truth": {"study": "multi_slope", "materials": ["bare"], "reduced_pressures": [3e-3], "refinement": 2}
+    }
+    del content["error_sources"], content["one_asperity"]
     content["studies"] = {"multi_slope": study}
     content["figures"] = {"fig5_multi_slope": {"study": "multi_slope"}}
     content["measurements"] = {
@@ -285,6 +291,9 @@ def test_surface_files_and_measurements(smoke, tmp_path):
         ratio = surface["height"].values / (heights - heights.mean())
         assert float(surface["rms_slope"]) == pytest.approx(1)
         assert np.ptp(ratio[np.isfinite(ratio)]) == pytest.approx(0, abs=1e-9 * abs(ratio).max())
+    with xr.open_datatree(tmp_path / "results/own/aggregated/model_error.nc") as errors:
+        truth = errors["truth"].to_dataset()
+        assert truth["area_error"].shape == (1, 1, 1, 1, 1) and truth["solution_grid"].item() == 64
     assert "A. Nobody, private communication" in (tmp_path / "results/own/report.html").read_text()
     again = snakemake(smoke, "-n", "-d", str(tmp_path), configuration=tmp_path / "own.yaml")
     assert "Nothing to be done" in again.stdout
