@@ -116,6 +116,17 @@ def solution_memory(surface, entry):
     return 400 + 30 * 8 * points_of(surface) * entry.refinement**2 // 10**6
 
 
+def adhesive_contacts(surface):
+    """Slopes and materials with adhesion of a surface's runs, each once."""
+    materials = {name: material.model_dump() for name, material in CAMPAIGN.materials.items()}
+    pairs = dict.fromkeys((case.rms_slope, case.material) for case in CASES.values() if case.surface == surface)
+    return [
+        {"rms_slope": rms_slope, "name": name, "material": materials[name]}
+        for rms_slope, name in pairs
+        if materials[name]["surface_energy"] > 0
+    ]
+
+
 def case_of(wildcards):
     return CASES["{study}/{surface}/seed{seed}/slope{slope}/{material}.nc".format(**wildcards)]
 

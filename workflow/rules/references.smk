@@ -5,17 +5,6 @@
 # references/one_asperity/<hertz or mu<mu>>.nc: where the answer is known.
 
 
-def adhesive_contacts(surface):
-    """Slopes and materials with adhesion of a surface's runs, each once."""
-    materials = {name: material.model_dump() for name, material in CAMPAIGN.materials.items()}
-    pairs = dict.fromkeys((case.rms_slope, case.material) for case in CASES.values() if case.surface == surface)
-    return [
-        {"rms_slope": rms_slope, "name": name, "material": materials[name]}
-        for rms_slope, name in pairs
-        if materials[name]["surface_energy"] > 0
-    ]
-
-
 rule reference:
     input:
         surface=lambda wildcards: next(
