@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 
-from icha.configuration.model import Campaign, SelfAffineSurface
+from icha.configuration.model import BesideStudy, Campaign, SelfAffineSurface
 from icha.labels import RunLabels, SolutionLabels, SourceLabels, number_label
 
 
@@ -24,45 +24,36 @@ def run_cases(campaign: Campaign) -> list[RunLabels]:
 
 def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
     """All boundary-element solutions of a campaign, entry by entry."""
-    cases = []
-    for label, entry in campaign.boundary_elements.items():
-        asked = campaign.solved(entry)
-        cases += [
-            SolutionLabels(label, entry.study, surface, seed, slope, material, pressure)
-            for surface in asked["surfaces"]
-            for seed, slope, material, pressure in itertools.product(
-                campaign.solved_seeds(entry, surface), asked["rms_slopes"], asked["materials"], entry.reduced_pressures
-            )
-        ]
-    return cases
+    return [
+        SolutionLabels(label, entry.study, *contact, pressure)
+        for label, entry in campaign.boundary_elements.items()
+        for contact, pressure in itertools.product(_contacts(campaign, entry), entry.reduced_pressures)
+    ]
 
 
 def source_cases(campaign: Campaign) -> list[SourceLabels]:
     """All studies of the sources of the model's error, entry by entry."""
-    cases = []
-    for label, entry in campaign.error_sources.items():
-        asked = campaign.solved(entry)
-        cases += [
-            SourceLabels(label, surface, seed, slope, material)
-            for surface in asked["surfaces"]
-            for seed, slope, material in itertools.product(
-                campaign.solved_seeds(entry, surface), asked["rms_slopes"], asked["materials"]
-            )
-        ]
-    return cases
+    return [
+        SourceLabels(label, *contact)
+        for label, entry in campaign.error_sources.items()
+        for contact in _contacts(campaign, entry)
+    ]
+
+
+def _contacts(campaign: Campaign, entry: BesideStudy) -> list[tuple[str, int, float, str]]:
+    """Surface, seed, rms slope and material of every contact for which an entry asks, in the order of its lists."""
+    asked = campaign.solved(entry)
+    return [
+        (surface, *rest)
+        for surface in asked["surfaces"]
+        for rest in itertools.product(campaign.solved_seeds(entry, surface), asked["rms_slopes"], asked["materials"])
+    ]
 
 
 def source_settings(campaign: Campaign, case: SourceLabels) -> dict:
     """Everything but the topography that determines a study of the sources of the error, in SI units."""
     entry = campaign.error_sources[case.entry]
-    return {
-        "material": campaign.materials[case.material].model_dump(),
-        "rms_slope": case.rms_slope,
-        "seed": case.seed,
-        "reduced_pressures": entry.reduced_pressures,
-        "refinement": entry.refinement,
-        "tolerance": entry.tolerance,
-    }
+    return _solver_settings(campaign, entry, case) | {"reduced_pressures": entry.reduced_pressures}
 
 
 def asperity_cases(campaign: Campaign) -> dict[str, float | None]:
@@ -107,11 +98,15 @@ def map_case(campaign: Campaign) -> RunLabels:
 def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
     """Everything but the topography that determines a boundary-element solution, in SI units."""
     entry = campaign.boundary_elements[case.entry]
+    return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
+
+
+def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabels | SourceLabels) -> dict:
+    """What boundary elements are told but for their loads."""
     return {
         "material": campaign.materials[case.material].model_dump(),
         "rms_slope": case.rms_slope,
         "seed": case.seed,
-        "reduced_pressure": case.reduced_pressure,
         "refinement": entry.refinement,
         "tolerance": entry.tolerance,
     }

@@ -94,7 +94,7 @@ VARIABLES = {
 
 
 class NotSolved(RuntimeError):
-    """The boundary elements did not converge, or no mean gap carries the load; the message says which."""
+    """Boundary elements, or a variant between them and the model, did not converge; the message says which."""
 
 
 @dataclass(frozen=True, eq=False)

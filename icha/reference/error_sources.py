@@ -53,6 +53,7 @@ from icha.reference.boundary_elements import (
     DEFAULT_TOLERANCE,
     REFERENCES,
     NodalState,
+    NotSolved,
     contact_state,
     perimeter_correction,
 )
@@ -134,10 +135,6 @@ _RING = 0.5
 _DISC_REFINEMENT = 4
 
 
-class NotSolved(RuntimeError):
-    """A variant without unions was not solved; the message says which."""
-
-
 class State(NamedTuple):
     """Contact area fraction, and mean separation in m."""
 
@@ -210,7 +207,7 @@ def error_sources(
     ------
     ValueError
         If an argument is out of range.
-    NotSolved, icha.reference.boundary_elements.NotSolved, icha.equilibrium.NotConverged
+    icha.reference.boundary_elements.NotSolved, icha.equilibrium.NotConverged
         If a variant was not solved.
     """
     path = Path(reduced_pressures=reduced_pressures)

@@ -12,7 +12,6 @@ def _failures_of_solvers():
         "icha.simulation": "ConvergenceError",
         "icha.equilibrium": "NotConverged",
         "icha.reference.boundary_elements": "NotSolved",
-        "icha.reference.error_sources": "NotSolved",
     }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
 
