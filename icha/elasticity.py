@@ -128,8 +128,8 @@ class _SmoothSum:
             modes *= self._green
         else:
             # Both real sets travel as one complex set: its spectrum c holds F as the part with c(-k) = conj c(k).
-            largest = np.max(np.abs(moment), initial=0.0)
-            scale = np.max(np.abs(force), initial=0.0) / largest if largest > 0 else 1.0
+            sizes = [np.max(np.abs(each), initial=0.0) for each in (force, moment)]
+            scale = sizes[0] / sizes[1] if all(sizes) else 1.0
             c = collect.execute(force + 1j * (scale * moment))
             mirrored = np.conj(c[::-1, ::-1])
             modes = (0.5 * self._green) * (c + mirrored) + (-0.5j / scale * self._laplacian) * (c - mirrored)

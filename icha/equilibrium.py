@@ -12,6 +12,10 @@ Newton's method with an inexact Krylov solver runs over sites: the spots and, wi
 come into contact; there a negative approach exerts nothing, and who is in contact comes out of the iteration. With
 adhesion contact forms and breaks in jumps. As soon as the iteration is close to an equilibrium, all jumps and unions
 that apply happen at once, and it goes on from there.
+
+Unions are undone when the surfaces part: as the contact says, where a united spot detaches, which then falls back into
+its asperities (those that a stable JKR state holds stay in contact), or before, where the two spots that it was made of
+would no longer overlap.
 """
 
 from __future__ import annotations
@@ -24,7 +28,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.asperities import Asperities
 from icha.coalescence import covering_spot, disjoint_pairs, equivalent_spots, overlapping_pairs
-from icha.elasticity import HalfSpace, Interaction, displacement_at
+from icha.elasticity import HalfSpace, Interaction, displacement_at, periodic_difference
 from icha.jkr import JKR
 
 # Largest equilibrium error in units of h_rms at which an equilibrium counts as found.
@@ -61,6 +65,17 @@ _GONE_PART = 0.25
 _FULL_CONTACT = 0.5
 
 _CONTACT, _TRIAL, _GONE = 1, 2, 3
+# Below so many jump-off radii a Newton step back is one of the radius.
+_NEAR_JUMP_OFF = 1.5
+# So large a part of a step that leads back over jump-off may be lost by ending there.
+_NEXT_TO_JUMP_OFF = 0.2
+
+# Until when united spots stay united.
+DETACHMENT, OVERLAP = "detachment", "overlap"
+
+# Kinds of events.
+JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT = range(4)
+EVENT_KINDS = ("jump_in", "jump_off", "coalescence", "split")
 
 
 class NotConverged(Exception):
@@ -91,12 +106,45 @@ class Spots:
 
 
 @dataclass(frozen=True, eq=False)
+class Events:
+    """What happened on the way to one equilibrium. Arrays of length k.
+
+    kind: JUMP_IN, JUMP_OFF (a spot, single or united, lets go), COALESCENCE (two spots unite) or SPLIT (a union is
+    undone, and what it was made of stays in contact). position (k, 2), m. members: asperities of the spot concerned.
+    energy: J that a jump would set free if the spot were alone; zero for unions and splits.
+    """
+
+    kind: np.ndarray
+    position: np.ndarray
+    members: np.ndarray
+    energy: np.ndarray
+
+    def __len__(self) -> int:
+        """Number of events."""
+        return len(self.kind)
+
+    def count(self, kind: int) -> int:
+        """Number of events of a kind."""
+        return int(np.count_nonzero(self.kind == kind))
+
+    @classmethod
+    def joined(cls, parts) -> Events:
+        """Several, one after the other."""
+        parts = [cls(np.empty(0, np.int8), np.empty((0, 2)), np.empty(0, int), np.empty(0)), *parts]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__match_args__))
+
+
+@dataclass(frozen=True, eq=False)
 class Contact:
-    """The contact problem: a law, the summits of one surface, and the length that makes residuals dimensionless."""
+    """The contact problem: a law, the summits of one surface, and the length that makes residuals dimensionless.
+
+    united_until: DETACHMENT or OVERLAP, until when united spots stay united.
+    """
 
     law: JKR
     asperities: Asperities
     rms_height: float
+    united_until: str = DETACHMENT
     jump_in: np.ndarray = field(init=False)
 
     def __post_init__(self):
@@ -115,11 +163,38 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
+class _Union:
+    """Two spots that have become one: what they were, and the radius (m) of the united one at which they just touch.
+
+    position (2, 2), height, radius of curvature and contact radius, asperity, members (2,); parts: those of spots that
+    are unions themselves.
+    """
+
+    touching: float
+    position: np.ndarray
+    height: np.ndarray
+    radius: np.ndarray
+    contact_radius: np.ndarray
+    asperity: np.ndarray
+    members: np.ndarray
+    parts: np.ndarray
+
+    def asperities(self) -> list[list[int]]:
+        """The asperities of either of the two."""
+        return [
+            [own] if part is None else [each for one in part.asperities() for each in one]
+            for own, part in zip(self.asperity.tolist(), self.parts, strict=True)
+        ]
+
+
+@dataclass(frozen=True, eq=False)
 class _Sites:
     """Places where contact is or may come out of the iteration. Arrays of length n.
 
     position (n, 2), height, radius (of curvature), jump_off: m. asperity: its index, -1 for united spots.
-    members: asperities united in it. arranged: number of sites when the half-space was made.
+    members: asperities united in it. parts: the _Union that it is, None for others and where that is not kept.
+    parted: number of the union out of which a spot has come, -1 for others. arranged: number of sites when the
+    half-space was made.
     """
 
     position: np.ndarray
@@ -128,10 +203,12 @@ class _Sites:
     jump_off: np.ndarray
     asperity: np.ndarray
     members: np.ndarray
+    parts: np.ndarray
+    parted: np.ndarray
     half_space: HalfSpace
     arranged: int
 
-    _ARRAYS = ("position", "height", "radius", "jump_off", "asperity", "members")
+    _ARRAYS = ("position", "height", "radius", "jump_off", "asperity", "members", "parts", "parted")
 
     def __len__(self) -> int:
         return len(self.height)
@@ -161,7 +238,7 @@ class ContactState:
     zero where there is no contact), status and response d(delta)/du. Arrays of the asperities' length: holder, the
     site that an asperity is, or is part of, or was found under, -1 where free; seen, its approach (m) when it was last
     looked at, at the separation seen_at (m).
-    Event counts accumulate along the path.
+    Event counts accumulate along the path; history: the events of every equilibrium of the path up to here.
     pending: free asperities beyond their jump-in approach that were left free because they had broken contact at
     the same separation before.
     """
@@ -179,7 +256,9 @@ class ContactState:
     jump_ins: int = 0
     jump_offs: int = 0
     coalescences: int = 0
+    splits: int = 0
     pending: int = 0
+    history: tuple[Events, ...] = ()
 
     @cached_property
     def _in_contact(self):
@@ -216,6 +295,20 @@ def contact_stiffness(contact: Contact, state: ContactState) -> float:
     return 0.0 - Control("pressure", 0.0).slope(contact, state)
 
 
+def stored_energy(contact: Contact, state: ContactState) -> float:
+    """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact.
+
+    Every spot has the work that would make it alone, and half that of its force against the displacement by the
+    others. Force and displacement are those of the spots' centres, as in eq. (4), which makes the interaction of
+    spots of unlike size only nearly reciprocal: along a path without events the energy changes by the work done but
+    for a part of the order of (a/r)^2 of that interaction.
+    """
+    spots, law = state.spots, contact.law
+    a, R = spots.contact_radius, spots.radius_of_curvature
+    displaced = spots.height - state.separation - spots.approach
+    return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / contact.area
+
+
 def untouched(contact: Contact) -> ContactState:
     """The state at which the first asperity is about to make contact."""
     asperities, none = contact.asperities, np.empty(0)
@@ -224,7 +317,7 @@ def untouched(contact: Contact) -> ContactState:
     half_space = HalfSpace.at(nowhere, asperities.period, contact.law.material.contact_modulus)
     return ContactState(
         separation=separation,
-        sites=_Sites(nowhere, none, none, none, nobody, nobody, half_space, 0),
+        sites=_Sites(nowhere, none, none, none, nobody, nobody, np.empty(0, dtype=object), nobody, half_space, 0),
         approach=none,
         radius=none,
         status=np.empty(0, dtype=np.int8),
@@ -238,7 +331,7 @@ def untouched(contact: Contact) -> ContactState:
 def _radius_response(law: JKR, a, R, approach, jump_off):
     """da/d(delta), zero for spots past jump-off; bounded close to it, where it is infinite."""
     slope = np.zeros(len(a))
-    touching = (a > 0) & (approach > jump_off)
+    touching = (a > 0) & (approach >= jump_off)
     slope[touching] = 1 / np.maximum(law.approach_derivative(a[touching], R[touching]), 1e-3 * (a / R)[touching])
     return slope
 
@@ -307,8 +400,13 @@ class _Search:
         self.approach = state.approach + state.response * (separation - state.separation)
         self.response = state.response
         self.seen, self.seen_at = state.seen.copy(), state.seen_at.copy()
-        self.jump_ins, self.jump_offs, self.coalescences = state.jump_ins, state.jump_offs, state.coalescences
+        self.jump_ins, self.jump_offs = state.jump_ins, state.jump_offs
+        self.coalescences, self.splits = state.coalescences, state.splits
+        self.history, self.log = state.history, []
+        self.parting = contact.united_until == OVERLAP and separation > state.separation
         self.pending = 0
+        self.fallen = np.full(len(contact.asperities), -1)  # the united spot that an asperity has just fallen out of
+        self.split = np.zeros(len(contact.asperities), dtype=bool)  # whether it has fallen out of one before
         self.locked = np.zeros(len(contact.asperities), dtype=bool)
         self.known = state.status == _CONTACT  # spots that were there before
         self.fresh = np.empty(0, dtype=int)  # united spots whose heights follow from the next evaluation
@@ -349,13 +447,15 @@ class _Search:
             radius=asperities.radius[asperity],
             asperity=asperity,
             members=np.ones(len(asperity), dtype=int),
+            parts=np.full(len(asperity), None),
             status=status,
             approach=approach,
             known=False,
         )
 
-    def _append(self, *, status, approach, known, **more):
+    def _append(self, *, status, approach, known, parted=-1, **more):
         count = len(approach)
+        more["parted"] = np.full(count, parted)
         self.sites = self.sites.extended(**more, jump_off=self.law.jump_off_approach(more["radius"]))
         self.height = np.concatenate([self.height, more["height"]])
         self.status = np.concatenate([self.status, np.full(count, status, dtype=np.int8)])
@@ -376,6 +476,28 @@ class _Search:
         self.sites = self.sites.taken(stay)
         self.height, self.status, self.known = self.height[stay], self.status[stay], self.known[stay]
         self.approach, self.response = self.approach[stay], self.response[stay]
+
+    # --- what happens ---------------------------------------------------------------------------------------
+
+    def _note(self, kind, position, members, energy=0.0, asperity=-1):
+        """Keep events in mind: positions (k, 2), and what else there is of them, each (k,) or one for all."""
+        others = (np.broadcast_to(each, len(position)) for each in (members, energy, asperity))
+        self.log += [(kind, *row) for row in zip(position, *others, strict=True)]
+
+    def _forget_jumps_in(self, asperity):
+        """Take jumps into contact of asperities back; how many there were."""
+        taken_back = set(asperity.tolist())
+        kept = [row for row in self.log if row[0] != JUMP_IN or row[4] not in taken_back]
+        gone = len(self.log) - len(kept)
+        self.log = kept
+        return gone
+
+    def _events_so_far(self):
+        if not self.log:
+            return self.history
+        kind, position, members, energy, _ = zip(*self.log, strict=True)
+        events = Events(np.array(kind, np.int8), np.array(position), np.array(members, int), np.array(energy, float))
+        return (*self.history, events)
 
     # --- the equations --------------------------------------------------------------------------------------
 
@@ -413,7 +535,10 @@ class _Search:
         """Where the unknowns are, da/d(delta) there, and the products of W' da/d(delta), exact and approximate."""
         part = np.flatnonzero(self.status != _GONE)
         a, R = point.a[part], self.sites.radius[part]
-        slope = _radius_response(self.law, a, R, point.approach[part], self.sites.jump_off[part])
+        off, approach = self.sites.jump_off[part], point.approach[part]
+        # Who is about to be drawn back over jump-off behaves as on the near side.
+        approach = np.where(self._drawn_back(point)[part] & self.adhesive, off, approach)
+        slope = _radius_response(self.law, a, R, approach, off)
         tangent = self.interaction.tangent(point.a)
 
         def spread(x):
@@ -455,10 +580,45 @@ class _Search:
             step, du = self._newton_step(point, exact)
             for halving in range(_MAX_HALVINGS):
                 fraction = 0.5**halving
-                new = self._evaluate(point.approach + fraction * step, point.separation + fraction * du)
+                new = self._evaluate(self._moved(point, fraction * step), point.separation + fraction * du)
                 if self._size(new) < (1 - 0.1 * fraction) * size:
                     return new
         return None
+
+    def _moved(self, point, step):
+        """Approaches (n,) after a step of theirs.
+
+        At jump-off the radius goes with the root of the approach that is left; in terms of the radius the equations
+        are smooth there. So a step towards jump-off is taken as one of the radius, and one back over it ends there
+        first, and then solves the quadratic equation that the radius obeys.
+        """
+        moved = point.approach + step
+        if not self.adhesive:
+            return moved
+        sites, law, off = self.sites, self.law, self.sites.jump_off
+        drawn_back = self._drawn_back(point)
+        moved = np.where((point.approach < off) & ~drawn_back, np.minimum(moved, off), moved)
+        part = np.flatnonzero((self.status != _GONE) & ((step < 0) & (point.approach > off) | drawn_back))
+        R, a = sites.radius[part], point.a[part]
+        lowest = law.jump_off_radius(R)
+        near = a < _NEAR_JUMP_OFF * lowest
+        part, R, a, lowest = part[near], R[near], a[near], lowest[near]
+        change = _radius_response(law, a, R, np.maximum(point.approach, off)[part], off[part]) * step[part]
+        # What is left of a step where the radius ends is one of the approach.
+        left = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
+        reached = law.approach(np.maximum(a + change, lowest), R)
+        moved[part] = reached + np.where(change < 0, left * step[part], 0.0)
+        back = drawn_back[part]
+        part, far = part[back], np.maximum(reached[back] - off[part[back]], 1e-300)
+        lacking = point.approach[part] - point.error[part] - off[part]
+        slope = lacking / np.sqrt(far)
+        moved[part] = off[part] + (0.5 * (np.sqrt(slope**2 + 4 * lacking) - slope)) ** 2
+        return moved
+
+    def _drawn_back(self, point):
+        """Whether a spot is next to jump-off, on the far side, and drawn back over it (n,)."""
+        gap = self.sites.jump_off - point.approach
+        return (self.status == _CONTACT) & (gap >= 0) & (gap < -_NEXT_TO_JUMP_OFF * point.error)
 
     # --- the iteration --------------------------------------------------------------------------------------
 
@@ -506,18 +666,67 @@ class _Search:
         if covered > _FULL_CONTACT:
             raise FullContact(f"the contact area reached {covered:.2f} of the nominal one")
         self.approach = point.approach
-        changed = False
+        off = self.status == _CONTACT
         if self.adhesive:
-            off = (self.status == _CONTACT) & (point.approach < self.sites.jump_off - margin)
-            if off.any():
-                changed = True
-                self.jump_offs += int(np.count_nonzero(off))
-                self.locked |= self._let_go(off)
+            off &= point.approach < self.sites.jump_off - margin
+        else:  # a single asperity out of contact is harmless
+            off &= (point.approach <= 0) & (self.sites.asperity < 0) & (margin == 0)
+        changed = bool(off.any())
+        if changed:
+            self._jump_off(off)
         windows = self.interaction.windows
         # Without adhesion only who was not expected is missing, which may wait for the equilibrium.
         if self.adhesive or margin == 0:
             changed |= self._join(point, margin)
-        return self._unite(point.a, windows, margin=margin) or changed
+        changed |= self._unite(point.a, windows, margin=margin)
+        return (self.parting and self._part(point.a)) or changed
+
+    def _jump_off(self, off):
+        """Break the contact of spots (n,). Asperities of united ones fall back, if they have not done so here before;
+        the others may not come back at this separation."""
+        sites, spots = self.sites, np.flatnonzero(off)
+        self.jump_offs += len(spots)
+        R = sites.radius[spots]
+        energy = self.law.energy(self.law.jump_off_radius(R), R)
+        self._note(JUMP_OFF, sites.position[spots], sites.members[spots], energy)
+        before, united = self.holder.copy(), np.append(off & (sites.asperity < 0), False)
+        freed = self._let_go(off)
+        falls = united[before] & ~self.split  # a holder -1 looks up the last
+        self.fallen[falls] = before[falls]
+        self.split |= falls
+        self.locked |= freed & ~falls
+
+    def _part(self, a):
+        """Undo unions whose two spots would no longer overlap; whether there were any."""
+        sites, n = self.sites, len(a)
+        touching = np.array([0.0 if union is None else union.touching for union in sites.parts[:n]])
+        apart = np.flatnonzero((self.status[:n] == _CONTACT) & (a < touching))
+        for site in apart.tolist():
+            union = sites.parts[site]
+            shrunk = union.contact_radius * (a[site] / np.hypot(*union.contact_radius))
+            held = self.holder == site
+            self.holder[held] = -1
+            self.seen_at[held] = np.inf  # who lay under the spot is looked at anew
+            self.status[site] = _GONE
+            self.splits += 1
+            self._note(SPLIT, sites.position[[site]], sites.members[[site]])
+            for k, asperities in enumerate(union.asperities()):
+                self.holder[asperities] = len(self.sites) + k
+            single = union.asperity[union.asperity >= 0]
+            self.is_site[single] = True
+            self._append(
+                position=union.position,
+                height=union.height,
+                radius=union.radius,
+                asperity=union.asperity,
+                members=union.members,
+                parts=union.parts,
+                status=_CONTACT,
+                approach=self.law.approach(shrunk, union.radius),
+                known=True,
+                parted=self.splits,
+            )
+        return bool(len(apart))
 
     def _let_go(self, off):
         """Free the asperities of spots (n,), and say whose (asperities,)."""
@@ -541,9 +750,15 @@ class _Search:
         )
         self.seen[looked_at] = asperities.height[looked_at] - point.separation - w
         self.seen_at[looked_at] = point.separation
-        ready = self.seen[looked_at] >= contact.jump_in[looked_at] + margin
+        # What has just fallen out of a united spot was in contact, and stays so wherever there is a stable state.
+        fell = self.fallen[looked_at] >= 0
+        lowest = self.law.jump_off_approach(asperities.radius[looked_at[fell]])
+        needed = contact.jump_in[looked_at] + margin
+        needed[fell] = lowest
+        ready = self.seen[looked_at] >= needed
         if not self.adhesive:
             ready &= self.seen[looked_at] > 0
+        self.locked[looked_at[fell & ~ready]] = True
         ready = looked_at[ready]
         locked = self.locked[ready]
         self.pending = int(np.count_nonzero(locked))
@@ -551,9 +766,18 @@ class _Search:
         under = covering_spot(asperities.position[ready], there, a, asperities.period)
         self.holder[ready[under >= 0]] = spots[under[under >= 0]]
         ready = self._first_of_each_group(ready[under < 0])
+        source = self.fallen[ready]
+        self.fallen[:] = -1
         if not len(ready):
             return False
-        self.jump_ins += len(ready) if self.adhesive else 0
+        stay, joining = np.unique(source[source >= 0]), ready[source < 0]
+        self.splits += len(stay)
+        self._note(SPLIT, self.sites.position[stay], self.sites.members[stay])
+        if self.adhesive:
+            self.jump_ins += len(joining)
+            R = asperities.radius[joining]
+            energy = -self.law.energy(self.law.contact_radius(self.seen[joining], R), R)
+            self._note(JUMP_IN, asperities.position[joining], 1, energy, joining)
         self._admit(ready, _CONTACT if self.adhesive else _TRIAL, self.seen[ready])
         return True
 
@@ -580,7 +804,7 @@ class _Search:
             return False
         inside = inside[np.argsort((a[j] - windows.r)[inside], kind="stable")]
         i, j = i[inside], j[inside]
-        self.jump_ins -= int(np.count_nonzero(self.status[np.unique(i)] == _CONTACT))
+        self.jump_ins -= self._forget_jumps_in(self.sites.asperity[np.unique(i)])
         self.holder[self.sites.asperity[i]] = i
         self.is_site[self.sites.asperity[i]] = False
         self.status[i] = _GONE
@@ -602,7 +826,11 @@ class _Search:
         first, second = windows.source, windows.target
         depth = a[first] + a[second] - windows.r
         part = (a > 0) & (self.status[: len(a)] != _GONE)
-        touch = np.flatnonzero((depth > 0) & part[first] & part[second])
+        touch = (depth > 0) & part[first] & part[second]
+        if self.parting and not deep:
+            # Two spots that have just come apart would unite again and again, as they settle.
+            touch &= (sites.parted[first] < 0) | (sites.parted[first] != sites.parted[second])
+        touch = np.flatnonzero(touch)
         if margin > 0 and len(touch):
             # An error of the approach is one of the radius, about R/(2a) times as large.
             i, j = first[touch], second[touch]
@@ -617,9 +845,20 @@ class _Search:
         centre, radius, R = equivalent_spots(
             sites.position[i], a[i], sites.radius[i], sites.position[j], a[j], sites.radius[j], period
         )
+        parts = np.full(len(pairs), None)
+        if self.contact.united_until == OVERLAP:
+            shrink = np.linalg.norm(periodic_difference(sites.position[j], sites.position[i], period), axis=1)
+            touching = radius * np.minimum(shrink / (a[i] + a[j]), 1.0)
+            for k, pair in enumerate(pairs):
+                own = (getattr(sites, name)[pair] for name in ("position", "radius", "asperity", "members", "parts"))
+                position, curvature, asperity, members, inner = own
+                parts[k] = _Union(
+                    touching[k], position, self.height[pair], curvature, a[pair], asperity, members, inner
+                )
         # Without adhesion a site may have come into contact only now.
         arrived = pairs[self.status[pairs] == _TRIAL]
         self.jump_ins += len(arrived)
+        self._note(JUMP_IN, sites.position[arrived], 1, 0.0, sites.asperity[arrived])
         self.holder[sites.asperity[arrived]] = arrived
         single = sites.asperity[pairs]
         self.is_site[single[single >= 0]] = False
@@ -628,6 +867,7 @@ class _Search:
         index[pairs] = len(sites) + np.arange(len(pairs))[:, None]
         self.holder = index[self.holder]  # -1 looks up the last
         self.coalescences += len(pairs)
+        self._note(COALESCENCE, centre, sites.members[i] + sites.members[j])
         self.fresh = len(sites) + np.arange(len(pairs))
         self._append(
             position=centre,
@@ -635,6 +875,7 @@ class _Search:
             radius=R,
             asperity=np.full(len(pairs), -1),
             members=sites.members[i] + sites.members[j],
+            parts=parts,
             status=_CONTACT,
             approach=self.law.approach(radius, R),
             known=True,
@@ -649,13 +890,12 @@ class _Search:
             self.status[made] = _CONTACT
             self.holder[sites.asperity[made]] = made
             self.jump_ins += len(made)
-            idle = (self.status == _CONTACT) & (approach <= 0)
-            self.jump_offs += int(np.count_nonzero(idle))
-            # Asperities of a united spot that let go may lie in the half-space; the next equilibrium takes them up.
-            self.pending = int(np.count_nonzero(self._let_go(idle & (sites.asperity < 0))))
-            single = idle & (sites.asperity >= 0)
-            self.status[single] = _TRIAL
-            self.holder[sites.asperity[single]] = -1
+            self._note(JUMP_IN, sites.position[made], 1, 0.0, sites.asperity[made])
+            idle = np.flatnonzero((self.status == _CONTACT) & (approach <= 0))  # of single asperities
+            self.jump_offs += len(idle)
+            self._note(JUMP_OFF, sites.position[idle], 1)
+            self.status[idle] = _TRIAL
+            self.holder[sites.asperity[idle]] = -1
         return ContactState(
             separation=point.separation,
             sites=replace(sites, height=self.height),
@@ -670,7 +910,9 @@ class _Search:
             jump_ins=self.jump_ins,
             jump_offs=self.jump_offs,
             coalescences=self.coalescences,
+            splits=self.splits,
             pending=self.pending,
+            history=self._events_so_far(),
         )
 
     def _response(self, point):

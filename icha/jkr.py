@@ -80,6 +80,15 @@ class JKR:
                 break
         return a_unit * x**2
 
+    def energy(self, a, R):
+        """Stored energy in J, elastic less adhesive: the work, the integral of F d(delta), that makes the spot.
+
+        8 E* a^5/(15 R^2) - (8/3) sqrt(pi E* gamma/2) a^(7/2)/R + pi gamma a^2, from eqs. (1) and (2).
+        """
+        E, gamma = self.material.contact_modulus, self.material.surface_energy
+        hertz = 8 / 15 * E * a**5 / R**2
+        return hertz - 8 / 3 * np.sqrt(np.pi * E * gamma / 2) * a**3.5 / R + np.pi * gamma * a**2
+
     # --- instabilities --------------------------------------------------------------------------------------
 
     def jump_off_radius(self, R):

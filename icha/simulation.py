@@ -1,4 +1,4 @@
-"""One loading sweep of one surface and one material, as a labelled dataset."""
+"""One sweep of one surface and one material, loading and unloading, as a labelled dataset."""
 
 from __future__ import annotations
 
@@ -11,24 +11,31 @@ from threadpoolctl import threadpool_limits
 
 from icha.asperities import find_summits
 from icha.bins import GAP_BINS, PRESSURE_BINS
+from icha.dissipation import new_events
 from icha.equilibrium import (
+    EVENT_KINDS,
     Contact,
+    Events,
     NotConverged,
     area_fraction,
     contact_stiffness,
     mean_pressure,
+    stored_energy,
 )
 from icha.jkr import JKR
 from icha.limits import MAX_REDUCED_PRESSURE
 from icha.material import Material
 from icha.observables import gap_distribution, pressure_distribution
-from icha.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, load
+from icha.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target, follow
 from icha.roughness import spectral_moments, stickiness
 from icha.surface import Surface
 from icha.validation import integer
 
 # Snapshots farther up, in h_rms, would not fit the bins of the gap.
 _HIGHEST_SNAPSHOT = 20.0
+
+# The snapshot of the largest tension on the way back.
+PULL_OFF = "pull_off"
 
 # Wu's jump-in formula was verified between these Tabor parameters.
 WU_RANGE = (2.0, 5.0)
@@ -49,7 +56,7 @@ VARIABLES = {
     "contact_stiffness": (("step",), "Pa m-1", "contact stiffness, -dp/du of the present spots"),
     "residual": (("step",), "1", "largest equilibrium error over h_rms"),
     "converged": (("step",), "1", "1 where the equilibrium converged"),
-    "branch": (("step",), "1", "branch of the path: loading or unloading"),
+    "leg": (("step",), "1", "leg of the path: 0 the first loading, odd unloading, even loading again"),
     "reduced_pressure": (("step",), "1", "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"),
     "reduced_separation": (("step",), "1", "mean separation over rms height"),
     "step_kind": (("step",), "1", "quantity that this step was asked to reach"),
@@ -61,6 +68,11 @@ VARIABLES = {
     "jump_in_count": (("step",), "1", "contacts formed so far"),
     "jump_off_count": (("step",), "1", "contacts broken so far"),
     "coalescence_count": (("step",), "1", "unions of two spots so far"),
+    "split_count": (
+        ("step",),
+        "1",
+        "united spots so far that let go and left asperities in contact",
+    ),
     "pending_count": (
         ("step",),
         "1",
@@ -111,6 +123,55 @@ VARIABLES = {
     "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
     "stickiness": ((), "1", "attraction over repulsion after Pastewka and Robbins; above 1 surfaces stick"),
     "asperity_count": ((), "1", "number of asperities on the surface"),
+    "control": ((), "1", "what is imposed: separation or load"),
+    "united_until": ((), "1", "until when united spots stay united on the way back: detachment or overlap"),
+}
+
+# Those of a path that goes on after the first loading ...
+CYCLE_VARIABLES = {
+    "work": (("step",), "J m-2", "work done on the contact since first contact, -(integral of p du)"),
+    "stored_energy": (("step",), "J m-2", "elastic energy less that of adhesion, 0 out of contact"),
+    "dissipated_by_jump_in": (("step",), "J m-2", "energy lost so far as contacts formed"),
+    "dissipated_by_jump_off": (("step",), "J m-2", "energy lost so far as contacts broke"),
+    "dissipated_by_coalescence": (("step",), "J m-2", "energy lost so far as spots united or unions were undone"),
+    "dissipated_by_load_jump": (("step",), "J m-2", "energy lost so far in jumps at constant load, under load control"),
+    "event_kind": (("event",), "1", "kind of the event"),
+    "event_step": (("event",), "1", "step at which the event is first seen"),
+    "event_separation": (("event",), "m", "mean separation of that step"),
+    "event_x": (("event",), "m", "x of the centre of the spot concerned"),
+    "event_y": (("event",), "m", "y of the centre of the spot concerned"),
+    "event_members": (("event",), "1", "number of asperities in the spot concerned"),
+}
+# ... and of one that ends in separation.
+LOOP_VARIABLES = {
+    "pull_off_pressure": ((), "Pa", "largest tension on the last unloading"),
+    "pull_off_separation": ((), "m", "mean separation at the largest tension"),
+    "pull_off_over_strength": (
+        (),
+        "1",
+        "largest tension over the strength of the interface, 16 dgamma/(9 sqrt(3) range); 0 without adhesion",
+    ),
+    "pull_off_over_summits": (
+        (),
+        "1",
+        "largest tension over that of all asperities pulling their most at once, 3/2 pi dgamma sum(R)/A0; "
+        "0 without adhesion",
+    ),
+    "detachment_pressure": ((), "Pa", "nominal pressure just before the last contact breaks"),
+    "detachment_separation": ((), "m", "mean separation just before the last contact breaks"),
+    "hysteresis_loss": ((), "J m-2", "work lost from first contact to separation, integral of p du around the path"),
+    "hysteresis_loss_over_surface_energy": (
+        (),
+        "1",
+        "work lost over the energy of adhesion; 0 without adhesion",
+    ),
+    "loss_by_jump_in": ((), "J m-2", "part of the loss in jumps into contact"),
+    "loss_by_jump_off": ((), "J m-2", "part of the loss in jumps out of contact"),
+    "loss_by_coalescence": ((), "J m-2", "part of the loss in unions of spots and their undoing"),
+    "loss_by_load_jump": ((), "J m-2", "part of the loss in jumps at constant load, under load control"),
+    "loss_unattributed": ((), "J m-2", "part of the loss without an event: non-reciprocal interaction and integration"),
+    "largest_contact_area_fraction": ((), "1", "largest A/A0 on the path"),
+    "largest_reduced_pressure": ((), "1", "largest reduced pressure on the path"),
 }
 
 
@@ -138,7 +199,7 @@ def simulate(
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
-    """Load a surface against the half-space along a path.
+    """Press a surface against the half-space along a path, and pull it off again if the path does.
 
     Parameters
     ----------
@@ -149,7 +210,7 @@ def simulate(
     Returns
     -------
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable carries units and
-    a long name.
+    a long name. A path that goes on after the first loading has all its equilibria as steps, and a dimension event.
 
     Raises
     ------
@@ -179,25 +240,42 @@ def simulate(
                 f"heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m) up, far above any contact"
             )
     law = JKR(material)
-    steps, snapshots, failure = [], [], None
+    steps, snapshots, events, failure = [], [], [], None
+    pulled = None  # step and state of the largest tension
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
-        contact = Contact(law, find_summits(surface), surface.rms_height)
+        contact = Contact(law, find_summits(surface), surface.rms_height, path.united_until)
         unit = material.contact_modulus * surface.rms_slope
         try:
-            for target, state in load(contact, path, unit, material.contact_modulus, progress):
-                steps.append(_step(contact, target, state, unit))
-                if target.snapshot:
-                    snapshots.append(_snapshot(law, surface, target, state, len(steps) - 1))
+            before = None
+            for waypoint in follow(contact, path, unit, progress):
+                steps.append(_step(contact, waypoint, unit))
+                if waypoint.target.snapshot:
+                    snapshots.append(_snapshot(law, surface, waypoint.target, waypoint.state, len(steps) - 1))
+                if path.cyclic:
+                    steps[-1] |= _balance(contact, waypoint)
+                    events.append(Events.joined(()) if before is None else new_events(before, waypoint.state))
+                    before = waypoint.state
+                if pulled is None or waypoint.leg > pulled[2] or _pressure(steps[-1]) < _pressure(steps[pulled[0]]):
+                    pulled = len(steps) - 1, waypoint.state, waypoint.leg
+            if path.unload:
+                snapshots.append(_snapshot(law, surface, Target(PULL_OFF, 0.0), pulled[1], pulled[0]))
         except NotConverged as error:
             failure = f"the path ends {error}"
-        dataset = _dataset(surface, material, contact, steps, snapshots, seed)
+        dataset = _dataset(surface, material, contact, steps, snapshots, seed, path, events)
+        if failure is None and path.unload:
+            dataset = dataset.assign(_described(LOOP_VARIABLES, _loop(contact, steps, pulled[0])))
     if failure is not None:
         raise ConvergenceError(failure, dataset.assign_attrs(incomplete=failure)) from None
     return dataset
 
 
-def _step(contact, target, state, unit):
+def _pressure(step):
+    return step["nominal_pressure"]
+
+
+def _step(contact, waypoint, unit):
+    state, target = waypoint.state, waypoint.target
     spots = state.spots
     pressure = mean_pressure(contact, spots)
     single = spots.members == 1
@@ -212,7 +290,8 @@ def _step(contact, target, state, unit):
         "contact_stiffness": contact_stiffness(contact, state),
         "residual": state.residual,
         "converged": np.int8(1),
-        "branch": "loading",
+        "branch": "loading" if waypoint.loading else "unloading",
+        "leg": waypoint.leg,
         "reduced_pressure": pressure / unit,
         "reduced_separation": state.separation / contact.rms_height,
         "step_kind": target.kind,
@@ -220,8 +299,51 @@ def _step(contact, target, state, unit):
         "jump_in_count": state.jump_ins,
         "jump_off_count": state.jump_offs,
         "coalescence_count": state.coalescences,
+        "split_count": state.splits,
         "pending_count": state.pending,
         "outside_wu_fraction": outside / max(len(mu), 1) if adhesive else 0.0,
+    }
+
+
+def _balance(contact, waypoint):
+    """Energy at a waypoint of a cyclic path, J/m^2."""
+    balance = waypoint.balance
+    return {
+        "work": balance.work,
+        "stored_energy": stored_energy(contact, waypoint.state),
+        "dissipated_by_jump_in": balance.jump_in,
+        "dissipated_by_jump_off": balance.jump_off,
+        "dissipated_by_coalescence": balance.coalescence,
+        "dissipated_by_load_jump": balance.load_jump,
+    }
+
+
+def _loop(contact, steps, pulled):
+    """What a path from first contact to separation has cost; `pulled` is the step of its largest tension."""
+    material, last = contact.law.material, steps[-1]
+    adhesive = material.surface_energy > 0
+    touching = max((k for k, step in enumerate(steps) if step["spot_count"]), default=0)
+    tension = max(0.0, -_pressure(steps[pulled]))
+    # Nothing is stored at either end.
+    loss = last["work"]
+    losses = {
+        name: last[f"dissipated_{name}"] for name in ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
+    }
+    summits = 1.5 * np.pi * material.surface_energy * float(np.sum(contact.asperities.radius)) / contact.area
+    strength = 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range
+    return {
+        "pull_off_pressure": tension,
+        "pull_off_separation": steps[pulled]["mean_separation"],
+        "pull_off_over_strength": tension / strength if adhesive else 0.0,
+        "pull_off_over_summits": tension / summits if adhesive else 0.0,
+        "detachment_pressure": _pressure(steps[touching]),
+        "detachment_separation": steps[touching]["mean_separation"],
+        "hysteresis_loss": loss,
+        "hysteresis_loss_over_surface_energy": loss / material.surface_energy if adhesive else 0.0,
+        **{f"loss_{name}": value for name, value in losses.items()},
+        "loss_unattributed": loss - sum(losses.values()),
+        "largest_contact_area_fraction": max(step["contact_area_fraction"] for step in steps),
+        "largest_reduced_pressure": max(step["reduced_pressure"] for step in steps),
     }
 
 
@@ -247,6 +369,10 @@ def _snapshot(law, surface, target, state, step):
 
 
 _INTEGERS = {
+    "leg",
+    "split_count",
+    "event_step",
+    "event_members",
     "spot_count",
     "jump_in_count",
     "jump_off_count",
@@ -256,18 +382,40 @@ _INTEGERS = {
     "spot_snapshot",
     "spot_members",
 }
-_STRINGS = {"branch", "step_kind", "snapshot_kind"}
+_STRINGS = {"step_kind", "snapshot_kind"}
 
 
 def _dtype(name):
     if name in _STRINGS:
         return object
-    if name == "converged":
+    if name in ("converged", "event_kind"):
         return np.int8
     return np.int64 if name in _INTEGERS else np.float64
 
 
-def _dataset(surface, material, contact, steps, snapshots, seed):
+def _described(variables, values):
+    """Variables of a dataset with their dimensions, units and long names."""
+    return {
+        name: (dims, values[name], {"units": units, "long_name": long_name})
+        for name, (dims, units, long_name) in variables.items()
+    }
+
+
+def _event_columns(steps, events):
+    """The events of all steps, one after the other."""
+    counts = [len(each) for each in events]
+    joined = Events.joined(events)
+    return {
+        "event_kind": joined.kind,
+        "event_step": np.repeat(np.arange(len(steps)), counts),
+        "event_separation": np.repeat([step["mean_separation"] for step in steps], counts),
+        "event_x": joined.position[:, 0],
+        "event_y": joined.position[:, 1],
+        "event_members": joined.members,
+    }
+
+
+def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
     radius = 1 / surface.rms_curvature
     moments = spectral_moments(surface)
     values = {
@@ -289,10 +437,17 @@ def _dataset(surface, material, contact, steps, snapshots, seed):
         "tabor_parameter": float(material.tabor_parameter(radius)),
         "stickiness": stickiness(moments, material),
         "asperity_count": len(contact.asperities),
+        "control": path.control,
+        "united_until": path.united_until,
     }
+    wanted = VARIABLES | (CYCLE_VARIABLES if path.cyclic else {})
+    if path.cyclic:
+        values |= _event_columns(steps, events)
     bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
-    for name, (dims, _, _) in VARIABLES.items():
+    for name, (dims, _, _) in wanted.items():
         if name in values:
+            if dims == ("event",):
+                values[name] = np.asarray(values[name], _dtype(name))
             continue
         if dims == ("spot",):
             rows = [
@@ -303,13 +458,18 @@ def _dataset(surface, material, contact, steps, snapshots, seed):
         rows = [row[name] for row in (steps if dims[0] == "step" else snapshots)]
         shape = (len(rows), *(bins[d] for d in dims[1:]))
         values[name] = np.array(rows, dtype=_dtype(name)).reshape(shape)
-    variables = {
-        name: (dims, values[name], {"units": units, "long_name": long_name})
-        for name, (dims, units, long_name) in VARIABLES.items()
-    }
+    variables = _described(wanted, values)
+    if path.cyclic:
+        kinds = {"flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8), "flag_meanings": " ".join(EVENT_KINDS)}
+        variables["event_kind"][2].update(kinds)
     adhesion = "with" if material.surface_energy > 0 else "without"
     coordinates = {
-        "step": ("step", np.arange(len(steps)), {"units": "1", "long_name": "stop along the loading path"}),
+        "step": ("step", np.arange(len(steps)), {"units": "1", "long_name": "equilibrium along the path"}),
+        "branch": (
+            "step",
+            np.array([step["branch"] for step in steps], dtype=object),
+            {"units": "1", "long_name": "branch of the path: loading or unloading"},
+        ),
         "snapshot": ("snapshot", np.arange(len(snapshots)), {"units": "1", "long_name": "snapshot"}),
     }
     return xr.Dataset(
@@ -318,8 +478,8 @@ def _dataset(surface, material, contact, steps, snapshots, seed):
         attrs={
             "title": f"Rough contact {adhesion} adhesion, ICHA model",
             "summary": (
-                "Loading sweep of a periodic rough surface against an elastic half-space by interacting and "
-                "coalescing asperities with JKR adhesion and jump into contact."
+                f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a periodic rough surface against an "
+                "elastic half-space by interacting and coalescing asperities with JKR adhesion and jump into contact."
             ),
             "Conventions": "CF-1.11",
             "source": f"icha {importlib.metadata.version('icha')}",

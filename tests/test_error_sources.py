@@ -10,7 +10,7 @@ from icha.equilibrium import Contact, area_fraction
 from icha.figures import fig12_error_sources
 from icha.jkr import JKR
 from icha.pages.error_sources import page, ratios, split
-from icha.path import load
+from icha.path import follow
 from icha.reference.boundary_elements import NodalState, contact_state, perimeter_correction
 from icha.reference.error_sources import (
     ADHESIVE_CHAIN,
@@ -139,7 +139,8 @@ def test_a_lone_summit_is_hertz_and_its_images(switch):
 def test_without_overlaps_it_is_the_model(surface):
     contact = Contact(LAW, find_summits(surface), surface.rms_height)
     unit = 2.0 * surface.rms_slope
-    ((_, state),) = load(contact, icha.Path(reduced_pressures=[5e-4]), unit, 2.0)
+    (waypoint,) = follow(contact, icha.Path(reduced_pressures=[5e-4]), unit)
+    state = waypoint.state
     assert np.all(state.spots.members == 1)
     discs = discs_apart(contact.asperities, LAW, 5e-4 * unit, surface.rms_height)
     assert discs.separation == pytest.approx(state.separation, rel=1e-7)

@@ -18,7 +18,7 @@ import icha
 from icha.asperities import Asperities
 from icha.equilibrium import Contact, area_fraction
 from icha.jkr import JKR
-from icha.path import load
+from icha.path import follow
 
 REDUCED_PRESSURES = np.geomspace(5e-4, 8e-2, 20)
 MATERIAL = {False: icha.Material(25e6, 0.0, 2.071e-9), True: icha.Material(25e6, 0.05, 2.071e-9)}
@@ -56,7 +56,8 @@ def main(folder, patches, adhesion, answer):
     start = time.perf_counter()
     rows = []
     with threadpool_limits(1):
-        for _, state in load(contact, path, unit, material.contact_modulus):
+        for waypoint in follow(contact, path, unit):
+            state = waypoint.state
             rows.append(
                 {
                     "seconds": time.perf_counter() - start,

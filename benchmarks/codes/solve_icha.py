@@ -10,7 +10,7 @@ import icha
 from icha.asperities import find_summits
 from icha.equilibrium import Contact, area_fraction, mean_pressure
 from icha.jkr import JKR
-from icha.path import load
+from icha.path import follow
 
 
 def main():
@@ -20,12 +20,13 @@ def main():
         path = icha.Path(mean_separations=task.mean_gaps, snapshots=[])
     else:
         path = icha.Path(reduced_pressures=[pressure / unit for pressure in task.pressures], snapshots=[])
-    task.start("icha", "icha.path.load")
+    task.start("icha", "icha.path.follow")
     surface = icha.Surface(task.heights, task.period)
     material = icha.Material(task.contact_modulus, task.surface_energy, task.interaction_range)
     with threadpool_limits(1):
         contact = Contact(JKR(material), find_summits(surface), surface.rms_height)
-        for _, state in load(contact, path, unit, material.contact_modulus):
+        for waypoint in follow(contact, path, unit):
+            state = waypoint.state
             task.answer_stop(
                 pressure=mean_pressure(contact, state.spots),
                 area_fraction=area_fraction(contact, state.spots),

@@ -48,7 +48,7 @@ from icha.equilibrium import Contact, ContactState, area_fraction
 from icha.jkr import JKR
 from icha.material import Material
 from icha.observables import contact_cover
-from icha.path import Path, load
+from icha.path import Path, follow
 from icha.reference.boundary_elements import (
     DEFAULT_TOLERANCE,
     REFERENCES,
@@ -264,7 +264,7 @@ def _model(surface, law, path):
     """The contact problem, and the model's states at the stops of the path."""
     contact = Contact(law, find_summits(surface), surface.rms_height)
     modulus = law.material.contact_modulus
-    met = {target: state for target, state in load(contact, path, modulus * surface.rms_slope, modulus)}
+    met = {waypoint.target: waypoint.state for waypoint in follow(contact, path, modulus * surface.rms_slope)}
     return contact, [met[target] for target in path.targets]
 
 
