@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from icha.campaign import LABELS
+from icha.campaign import LABELS, loading_stops
 from icha.records import COMPLETE
 
 # Loads at which curves are compared, per decade.
@@ -62,14 +62,17 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     Returns
     -------
     Dataset on two grids of loads, `reduced_pressure` and `relative_load`, each over the range that all complete runs
-    cover (of length zero where there is no such range). On each, with the suffix `_at_load` on the second:
-    `contact_area_fraction` and `reduced_separation` along surface, seed, rms_slope and material, mean and standard
-    deviation of the area over seeds, `material_spread` and `slope_spread`, the largest over the smallest area of all
-    materials (slopes), less one. Runs that are not complete lack values, as `status` says, and do not count.
+    cover (of length zero where there is no such range) between stops of their first loading. On each, with the suffix
+    `_at_load` on the second: `contact_area_fraction` and `reduced_separation` along surface, seed, rms_slope and
+    material, mean and standard deviation of the area over seeds, `material_spread` and `slope_spread`, the largest over
+    the smallest area of all materials (slopes), less one. Runs that are not complete lack values, as `status` says, and
+    do not count.
     """
     complete = study["status"].transpose(*LABELS).values == COMPLETE
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].values[None, None, :, None, None]
+    # Loads of the first, tensile contacts have no logarithm.
+    shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
     loads = {"reduced_pressure": pressure, "relative_load": pressure * slope}
     curves = {
         name: study[name].transpose(*LABELS, "step").values for name in ("contact_area_fraction", "reduced_separation")
@@ -78,18 +81,16 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     variables, coords = {"status": study["status"]}, {label: study[label] for label in LABELS}
     for axis, load in loads.items():
         suffix = "" if axis == "reduced_pressure" else "_at_load"
-        at = _common_grid(load[complete])
+        at = _common_grid([load[index][shown[index]] for index in map(tuple, np.argwhere(complete))])
         coords[axis] = xr.Variable(axis, at, {"units": "1", "long_name": _AXES[axis]})
         shape = load.shape[:-1]
         on_grid = {}
         for name, values in curves.items():
             result = np.full((*shape, len(at)), np.nan)
-            for index in map(tuple, np.argwhere(complete)):
-                # Loads of the first, tensile contacts have no logarithm.
-                positive = load[index] > 0
+            for index in map(tuple, np.argwhere(complete) if len(at) else ()):
                 result[index] = interpolated(
-                    load[index][positive],
-                    values[index][positive],
+                    load[index][shown[index]],
+                    values[index][shown[index]],
                     at,
                     logarithmic=name == "contact_area_fraction",
                 )
@@ -125,12 +126,12 @@ def _spread(area, axis):
     return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
 
 
-def _common_grid(load):
-    """Loads, evenly spaced by their logarithm, that every run (a row of loads) covers."""
-    if not len(load):
+def _common_grid(loads):
+    """Loads, evenly spaced by their logarithm, that every run covers; `loads` are those of each, all positive."""
+    if not loads or not all(map(len, loads)):
         return np.empty(0)
-    lowest = max(float(row[row > 0].min()) for row in load)
-    highest = min(float(row.max()) for row in load)
+    lowest = max(float(own.min()) for own in loads)
+    highest = min(float(own.max()) for own in loads)
     if highest <= lowest:
         return np.empty(0)
     count = max(2, round(np.log10(highest / lowest) * _POINTS_PER_DECADE) + 1)
@@ -145,7 +146,8 @@ def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.
 
 
 def at_round_pressures(run: xr.Dataset) -> list[tuple[float, float, float]]:
-    """(p*, A/A0, mean separation over h_rms) of a run at the round reduced pressures that it covers."""
+    """(p*, A/A0, mean separation over h_rms) of a run at the round reduced pressures that its first loading covers."""
+    run = run.isel(step=loading_stops(run).values)
     load = run["reduced_pressure"].values
     positive = load > 0
     if not positive.any():

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from icha.labels import RunLabels
+from icha.path import BETWEEN
 from icha.records import COMPLETE, INCOMPLETE, MISSING, STATUS_MEANINGS
 
 LABELS = ("surface", "seed", "rms_slope", "material")
@@ -31,8 +32,10 @@ _VARIES_WITH = {
     "pressure_bin_edges": ("rms_slope", "material"),
     "snapshot_kind": (),
     "snapshot_target": (),
+    "control": (),
 }
-_SPOT_DIM = "spot"
+# Of these every run has as many as it has: in the campaign they stand one after the other.
+RAGGED = ("spot", "event")
 
 
 def campaign_tree(
@@ -48,14 +51,17 @@ def campaign_tree(
     runs : pairs of labels (study, surface, seed, rms_slope, material) and run dataset. Studies, surfaces and
         materials keep the order in which they first come, seeds and slopes are sorted.
     attrs : global attributes of the file (title, summary, campaign, license, …).
-    allow_missing : whether a study may lack combinations of its labels, or a run some of its steps. If so,
+    allow_missing : whether a study may lack combinations of its labels, or have runs that are incomplete: marked so
+        by their attribute `incomplete`, not converged, or without some of the study's snapshots. If so,
         `status(surface, seed, rms_slope, material)` says which, and their values are missing.
 
     Returns
     -------
     DataTree whose groups have the dimensions surface, seed, rms_slope and material, and those of the run
-    dataset. Spots of all runs stand one after the other along `spot`; `spot_surface`, `spot_seed`,
-    `spot_rms_slope`, `spot_material` and `spot_snapshot` are positions along these dimensions, from 0.
+    dataset. A run has `step_count` steps; beyond them, along `step`, numbers are missing and texts empty. Spots and
+    events of all runs stand one after the other along `spot` and `event`; `spot_surface`, `spot_seed`,
+    `spot_rms_slope` and `spot_material`, `event_surface` and so on, and `spot_snapshot`, are positions along these
+    dimensions, from 0.
 
     Raises
     ------
@@ -85,22 +91,27 @@ def _study_dataset(members: dict[RunLabels, xr.Dataset], allow_missing: bool) ->
     position = {key: tuple(axes[label].index(getattr(key, label)) for label in LABELS) for key in members}
     study = next(iter(members)).study
 
-    template = max(members.values(), key=lambda run: run.sizes.get("step", 0))
+    # Of runs that ended early some variables may be unknown: what they would have reached at the end.
+    template = max(members.values(), key=lambda run: ("incomplete" not in run.attrs, run.sizes.get("step", 0)))
     # Where a run meets its stops in another order than the others (a load and an area, say), so it does its snapshots.
     snapshots = list(dict.fromkeys(itertools.chain(_snapshots(template), *map(_snapshots, members.values()))))
     members = {key: _in_order_of(snapshots, run) for key, run in members.items()}
     snapshot_at = {key: [snapshots.index(each) for each in _snapshots(run)] for key, run in members.items()}
-    sizes = {dim: size for dim, size in template.sizes.items() if dim != _SPOT_DIM}
+    sizes = {dim: size for dim, size in template.sizes.items() if dim not in RAGGED}
     if "snapshot" in sizes:
         sizes["snapshot"] = len(snapshots)
-    status = np.full(shape, MISSING, np.int8)
+    if "step" in sizes:
+        sizes["step"] = max(run.sizes["step"] for run in members.values())
+    status, step_count = np.full(shape, MISSING, np.int8), np.zeros(shape, np.int32)
     for key, run in members.items():
         _check_labels(key, run)
-        whole = all(run.sizes.get(dim, 0) == size for dim, size in sizes.items())
-        status[position[key]] = COMPLETE if whole and _converged(run) else INCOMPLETE
-        if set(run.variables) != set(template.variables):
-            odd = sorted(set(run.variables) ^ set(template.variables))
-            raise ValueError(f"{key}: variables differ from those of the study's other runs: {', '.join(odd)}")
+        whole = all(run.sizes.get(dim, 0) == size for dim, size in sizes.items() if dim != "step")
+        ended = "incomplete" not in run.attrs and _converged(run)
+        status[position[key]] = COMPLETE if whole and ended else INCOMPLETE
+        step_count[position[key]] = run.sizes.get("step", 0)
+        odd = set(run.variables) ^ set(template.variables)
+        if odd - (set() if ended else set(template.variables)):
+            raise ValueError(f"{key}: variables differ from those of the study's other runs: {', '.join(sorted(odd))}")
     if not allow_missing and (status != COMPLETE).any():
         bad = []
         for index in np.argwhere(status != COMPLETE):
@@ -110,7 +121,7 @@ def _study_dataset(members: dict[RunLabels, xr.Dataset], allow_missing: bool) ->
 
     variables: dict[str, xr.Variable] = {}
     for name, model in template.variables.items():
-        if name in LABELS or _SPOT_DIM in model.dims:
+        if name in LABELS or set(RAGGED) & set(model.dims):
             continue
         if name in sizes:
             variables[name] = xr.Variable(name, np.arange(sizes[name], dtype=np.int32), model.attrs)
@@ -127,7 +138,17 @@ def _study_dataset(members: dict[RunLabels, xr.Dataset], allow_missing: bool) ->
             "comment": "values of a run that is incomplete or missing are filled with _FillValue",
         },
     )
-    variables |= _stack_spots(template, position, members, snapshot_at)
+    variables["step_count"] = xr.Variable(
+        LABELS,
+        step_count,
+        {
+            "units": "1",
+            "long_name": "number of steps of the run",
+            "comment": "from this position on along step, numbers are filled with _FillValue and texts are empty",
+        },
+    )
+    for dim in RAGGED:
+        variables |= _one_after_the_other(dim, template, position, members, snapshot_at)
     coords = {
         "surface": ("surface", np.array(axes["surface"], dtype=object), "name of the surface"),
         "seed": ("seed", np.array(axes["seed"], dtype=np.int32), "seed of the surface"),
@@ -137,7 +158,7 @@ def _study_dataset(members: dict[RunLabels, xr.Dataset], allow_missing: bool) ->
     coords = {
         name: xr.Variable(dim, values, {"units": "1", "long_name": long_name})
         for name, (dim, values, long_name) in coords.items()
-    } | {name: variables.pop(name) for name in list(variables) if name in sizes}
+    } | {name: variables.pop(name) for name in list(variables) if name in template.coords}
     keep = ("Conventions", "source", "license", "references", "config_sha256")
     attrs = {name: template.attrs[name] for name in keep if name in template.attrs}
     attrs = {"title": f"Study {study}", "study": study} | attrs
@@ -172,7 +193,7 @@ def _in_order_of(snapshots, run):
     run = run.isel(snapshot=order)
     now = np.argsort(order)[run["spot_snapshot"].values]
     run["spot_snapshot"] = run["spot_snapshot"].copy(data=now)
-    return run.isel({_SPOT_DIM: np.argsort(now, kind="stable")})
+    return run.isel(spot=np.argsort(now, kind="stable"))
 
 
 def _stack(name, model, axes, position, members, sizes, snapshot_at):
@@ -185,6 +206,8 @@ def _stack(name, model, axes, position, members, sizes, snapshot_at):
     values = np.empty(shape, object) if text else np.full(shape, np.nan, np.float64)
     chosen = [LABELS.index(label) for label in along]
     for key, run in members.items():
+        if name not in run:
+            continue
         value = run[name].variable.transpose(*model.dims).values
         own = [
             snapshot_at[key] if dim == "snapshot" else slice(0, size)
@@ -196,7 +219,7 @@ def _stack(name, model, axes, position, members, sizes, snapshot_at):
         same = there == value if text else np.isclose(np.asarray(there, float), value, rtol=1e-9, atol=0)
         if np.any(known & ~same):
             raise ValueError(f"{key}: {name} differs between runs that share {', '.join(along) or 'the study'}")
-        values[place] = np.where(known, there, value)
+        values[place] = np.where(known, there, value)[()]
         filled[place] = True
     attrs = dict(model.attrs)
     if text:
@@ -205,33 +228,36 @@ def _stack(name, model, axes, position, members, sizes, snapshot_at):
     if model.dtype.kind == "f":
         return xr.Variable(dims, values, attrs)
     if filled.all():
-        return xr.Variable(dims, values.astype(np.int8 if model.dtype == np.int8 else np.int32), attrs)
+        return xr.Variable(dims, _narrow(values, model.dtype), attrs)
     # A filled integer is read back as a float with missing values, so it is one here as well.
     return xr.Variable(dims, values, attrs, encoding={"dtype": np.dtype("int32")})
 
 
-def _stack_spots(template, position, members, snapshot_at):
-    """Spots of all runs one after the other, and the positions of their runs along the labels."""
-    names = [name for name, model in template.variables.items() if model.dims == (_SPOT_DIM,) and name != _SPOT_DIM]
+def _narrow(values, dtype):
+    """Integers, which were of a type, in the one they are kept in: 32 bits, which every netCDF tool reads, or flags."""
+    return values.astype(np.int8 if dtype == np.int8 else np.int32)
+
+
+def _one_after_the_other(dim, template, position, members, snapshot_at):
+    """What all runs have along a ragged dimension, one after the other, and their positions along the labels."""
+    names = [name for name, model in template.variables.items() if model.dims == (dim,) and name != dim]
     if not names:
         return {}
-    ordered = sorted(members, key=position.get)
-    columns = {name: [members[key][name].values for key in ordered] for name in names}
-    columns["spot_snapshot"] = [
-        np.asarray(snapshot_at[key], int)[spots] for key, spots in zip(ordered, columns["spot_snapshot"], strict=True)
-    ]
+    ordered = sorted((key for key, run in members.items() if dim in run.dims), key=position.get)
     stacked = {}
-    for name, parts in columns.items():
+    for name in names:
+        parts = [members[key][name].values for key in ordered]
+        if name == "spot_snapshot":
+            parts = [np.asarray(snapshot_at[key], int)[own] for key, own in zip(ordered, parts, strict=True)]
         values = np.concatenate(parts)
-        # Counts and positions fit into 32 bits, which every netCDF tool reads.
-        values = values.astype(np.int32) if values.dtype.kind in "iu" else values
-        stacked[name] = xr.Variable(_SPOT_DIM, values, dict(template[name].attrs))
-    counts = [members[key].sizes[_SPOT_DIM] for key in ordered]
+        values = _narrow(values, template[name].dtype) if values.dtype.kind in "iu" else values
+        stacked[name] = xr.Variable(dim, values, dict(template[name].attrs))
+    counts = [members[key].sizes[dim] for key in ordered]
     for axis, label in enumerate(LABELS):
-        stacked[f"spot_{label}"] = xr.Variable(
-            _SPOT_DIM,
+        stacked[f"{dim}_{label}"] = xr.Variable(
+            dim,
             np.repeat(np.array([position[key][axis] for key in ordered], np.int32), counts),
-            {"units": "1", "long_name": f"position of the spot's run along {label}, from 0"},
+            {"units": "1", "long_name": f"position of the {dim}'s run along {label}, from 0"},
         )
     return stacked
 
@@ -270,16 +296,32 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
         index[label] = int(at[0])
     if dataset["status"].isel(index) == MISSING:
         raise ValueError(f"{labels}: this run is missing")
-    run = dataset.isel({label: i for label, i in index.items()}).drop_vars("status")
-    if _SPOT_DIM in dataset.dims:
-        own = np.ones(dataset.sizes[_SPOT_DIM], bool)
-        for label, i in index.items():
-            own &= dataset[f"spot_{label}"].values == i
-        run = run.isel({_SPOT_DIM: np.flatnonzero(own)}).drop_vars([f"spot_{label}" for label in LABELS])
+    run = dataset.isel(index).drop_vars(["status", "step_count"])
+    if "step" in run.dims:
+        run = run.isel(step=slice(0, int(dataset["step_count"].isel(index))))
+    for dim in (dim for dim in RAGGED if dim in dataset.dims):
+        own = np.all([dataset[f"{dim}_{label}"].values == i for label, i in index.items()], axis=0)
+        run = run.isel({dim: np.flatnonzero(own)}).drop_vars([f"{dim}_{label}" for label in LABELS])
     if dataset["status"].isel(index) == INCOMPLETE:
-        run = run.isel(step=np.isfinite(run["nominal_pressure"].values))
         run = run.isel(snapshot=np.isfinite(run["overlap_fraction"].values))
-    return run.reset_coords(list(LABELS))
+        run = run.drop_vars([name for name, variable in run.data_vars.items() if _unknown(variable)])
+    integers = [name for name, variable in run.variables.items() if _filled_integer(variable)]
+    return run.assign({name: run[name].astype(np.int32) for name in integers}).reset_coords(list(LABELS))
+
+
+def _unknown(variable):
+    """Whether a variable of a run that ended early has no value."""
+    return variable.dtype.kind == "f" and not variable.dims and np.isnan(variable.values)
+
+
+def _filled_integer(variable):
+    """Whether a variable holds integers that are floats for others that are missing."""
+    return variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32")
+
+
+def loading_stops(data: xr.Dataset) -> xr.DataArray:
+    """Which steps of a run, or of all runs of a study, are stops of the first loading, and not between stops."""
+    return (data["leg"] == 0) & (data["step_kind"] != BETWEEN)
 
 
 def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:

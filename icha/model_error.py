@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.stats import wasserstein_distance
 
 from icha.bins import GAP_BINS, PRESSURE_BINS
-from icha.campaign import LABELS, find_snapshot, select_run, spots_of
+from icha.campaign import LABELS, RAGGED, find_snapshot, select_run, spots_of
 from icha.labels import SolutionLabels
 from icha.observables import nodes_in_discs
 from icha.path import REDUCED_PRESSURE
@@ -217,9 +217,9 @@ def check_same_contact(run: xr.Dataset, solution: xr.Dataset) -> None:
 
 
 def state_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
-    """What a run has of one snapshot, under the names of a boundary-element solution; without the spots."""
+    """What a run has of one snapshot, under the names of a boundary-element solution; without spots and events."""
     step = int(run["snapshot_step"].values[snapshot])
-    return run.drop_dims("spot", errors="ignore").isel(snapshot=snapshot, step=step)
+    return run.drop_dims(RAGGED, errors="ignore").isel(snapshot=snapshot, step=step)
 
 
 def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:

@@ -1,7 +1,7 @@
 """What is kept: surfaces, runs and whole campaigns as netCDF-4 files.
 
 A file appears whole or not at all, holds no value that is not finite except where it says that a run is
-missing, and has the same bytes whenever it is written from the same values.
+missing or has no more steps, and has the same bytes whenever it is written from the same values.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
     ------
     ValueError
         If a variable lacks units or holds a value that is not finite. A run marked as incomplete or missing by
-        the dataset's `status` may lack values; those are written as the variable's `_FillValue`.
+        the dataset's `status` may lack values, and none has any beyond its `step_count` steps; those are written as the
+        variable's `_FillValue`.
     """
     tree = data if isinstance(data, xr.DataTree) else None
     nodes = {node.path: node.to_dataset() for node in tree.subtree} if tree is not None else {"/": data}
@@ -77,8 +78,11 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
         if excused is not None and set(variable.dims) & set(excused.dims):
             # A value that several runs share is missing where all of them are.
             may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
-            may_lack = may_lack.set_dims(dict(zip(variable.dims, variable.shape, strict=True)))
-            bad &= ~(may_lack.values & np.isnan(variable.values))
+            may_lack = may_lack.set_dims(dict(zip(variable.dims, variable.shape, strict=True))).values
+            if "step" in variable.dims:
+                beyond = dataset["step"] >= dataset["step_count"]
+                may_lack = may_lack | beyond.transpose(*variable.dims).values
+            bad &= ~(may_lack & np.isnan(variable.values))
         if bad.any():
             first = ", ".join(f"{dim}={index}" for dim, index in zip(variable.dims, np.argwhere(bad)[0], strict=True))
             raise ValueError(

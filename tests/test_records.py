@@ -1,5 +1,6 @@
 """Datasets are whole, byte-stable, free of values that are not finite, and complete."""
 
+import cyclic_campaign as cyclic
 import netCDF4
 import numpy as np
 import pytest
@@ -199,6 +200,118 @@ def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing(tmp_
     tree = campaign_tree([(runs[0][0], holed), *runs[1:]], allow_missing=True)
     with pytest.raises(ValueError, match="contact_area_fraction"):
         write_dataset(tree, tmp_path / "c.nc")
+
+
+def same(taken, run, labels):
+    """That a run taken out of a campaign is what was put into it, and of the same kind."""
+    assert set(taken.data_vars) == {*run.data_vars, "surface", "material"}
+    assert set(taken.coords) == set(run.coords)
+    for name, variable in run.variables.items():
+        where = f"{labels} {name}"
+        assert taken[name].dims == variable.dims, where
+        assert taken[name].dtype.kind in ("iu" if variable.dtype.kind in "iu" else variable.dtype.kind + "OU"), where
+        np.testing.assert_array_equal(taken[name].values, variable.values, err_msg=where)
+
+
+@pytest.mark.parametrize("kept", [False, True], ids=["in memory", "from its file"])
+def test_runs_of_different_lengths_are_taken_out_unchanged(tmp_path, kept):
+    tree = cyclic.tree()
+    if kept:
+        write_dataset(tree, tmp_path / "c.nc")
+        tree = read_campaign(tmp_path / "c.nc")
+    lengths = set()
+    for labels, run in cyclic.runs().items():
+        # The slope is known by its label, which the surface has but for rounding.
+        same(select_run(tree, labels).drop_vars("rms_slope"), run.drop_vars("rms_slope"), labels)
+        lengths.add((labels.study, run.sizes["step"], run.sizes.get("event")))
+    assert len(lengths) == 5, "the runs must differ for this to mean anything"
+
+
+def test_padding_is_missing_and_nothing_else_is(tmp_path):
+    for name in ("one.nc", "two.nc"):
+        write_dataset(cyclic.tree() if name == "one.nc" else read_campaign(tmp_path / "one.nc"), tmp_path / name)
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+    study = read_campaign(tmp_path / "one.nc")["loops"].to_dataset()
+    count = study["step_count"]
+    assert count.dtype.kind == "i" and count.dims == ("surface", "seed", "rms_slope", "material")
+    assert int(count.max()) == study.sizes["step"] > int(count.min())
+    beyond = (study["step"] >= count).transpose("surface", "seed", "rms_slope", "material", "step")
+    for name, variable in study.variables.items():
+        if variable.dtype.kind != "f":
+            continue
+        lacking = np.isnan(variable.values)
+        np.testing.assert_array_equal(lacking, beyond.values if "step" in variable.dims else False, err_msg=name)
+    np.testing.assert_array_equal(study["branch"] == "", beyond)
+    assert "branch" in study.coords and set(study.indexes) == {
+        "surface",
+        "seed",
+        "rms_slope",
+        "material",
+        "step",
+        "snapshot",
+    }
+    with netCDF4.Dataset(tmp_path / "one.nc") as file:
+        group = file["loops"]
+        assert group["spot_count"].dtype == group["leg"].dtype == np.int32
+        assert "_FillValue" not in group["step_count"].ncattrs() and "_FillValue" not in group["event_step"].ncattrs()
+        assert group["event_kind"].dtype == np.int8
+    assert study["control"].item() == "separation"
+
+
+def test_a_hole_before_the_padding_is_refused(tmp_path):
+    labels = next(labels for labels in cyclic.runs() if labels.material == "hertz")
+    runs = {key: run for key, run in cyclic.runs().items() if key.study == "loops"}
+    holed = runs[labels].copy(deep=True)
+    holed["work"][-1] = np.nan
+    with pytest.raises(ValueError, match="'work' holds 1 of"):
+        write_dataset(campaign_tree((runs | {labels: holed}).items()), tmp_path / "c.nc")
+    tree = cyclic.tree().copy(deep=True)
+    tree["loops"]["work"].values[..., -1] = np.inf
+    with pytest.raises(ValueError, match="'work' holds"):
+        write_dataset(tree, tmp_path / "c.nc")
+
+
+def test_events_belong_to_their_runs():
+    study = cyclic.tree()["loops"].to_dataset()
+    runs = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
+    assert study.sizes["event"] == sum(run.sizes["event"] for run in runs.values())
+    for labels, run in runs.items():
+        own = (study["event_seed"] == labels.seed - 1) & (study["event_material"] == int(labels.material == "hertz"))
+        np.testing.assert_array_equal(study["event_separation"].values[own], run["event_separation"].values)
+
+
+def test_studies_without_any_event_can_be_kept(tmp_path):
+    labels, run = next(iter(cyclic.runs().items()))
+    tree = campaign_tree([(labels, run.isel(event=slice(0, 0)))])
+    write_dataset(tree, tmp_path / "c.nc")
+    assert select_run(read_campaign(tmp_path / "c.nc"), labels).sizes["event"] == 0
+
+
+def test_a_run_that_broke_off_on_its_way_back_has_no_pull_off(tmp_path):
+    runs = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
+    broken = next(iter(runs))
+    lost = [
+        name
+        for name, variable in runs[broken].data_vars.items()
+        if name.startswith(("loss_", "hysteresis_", "pull_off_"))
+    ]
+    short = runs[broken].isel(step=slice(0, 6)).drop_vars(lost).assign_attrs(incomplete="the path ends there")
+    with pytest.raises(ValueError, match="incomplete"):
+        campaign_tree((runs | {broken: short}).items())
+    # Whichever comes first: what the others have is what the study has.
+    for order in (runs | {broken: short}, {broken: short} | runs):
+        order = order | {broken: short}
+        write_dataset(campaign_tree(order.items(), allow_missing=True), tmp_path / "c.nc")
+        tree = read_campaign(tmp_path / "c.nc")
+        assert [int(n) for n in np.unique(tree["loops"]["status"], return_counts=True)[1]] == [3, 1]
+        taken = select_run(tree, broken)
+        assert set(lost).isdisjoint(taken.variables)
+        np.testing.assert_array_equal(taken["work"].values, short["work"].values)
+        whole = list(runs)[1]
+        same(select_run(tree, whole).drop_vars("rms_slope"), runs[whole].drop_vars("rms_slope"), whole)
+    odd = {**runs, broken: runs[broken].drop_vars("loss_unattributed")}
+    with pytest.raises(ValueError, match=r"variables differ.*loss_unattributed"):
+        campaign_tree(odd.items())
 
 
 def test_labels_that_contradict_the_dataset_are_refused():

@@ -1,0 +1,137 @@
+"""Runs that are unloaded, made of loading runs: what a way back adds to a dataset, with works that are known."""
+
+from functools import cache
+
+import numpy as np
+import small_campaign as small
+
+from icha.campaign import RunLabels, campaign_tree
+
+# In units of the largest pressure: by how much unloading with adhesion lies below loading; a tenth more for every step
+# between the stops, so that runs differ.
+TENSION = 0.3
+_UNKNOWN = {"units": "1", "long_name": "test"}
+
+
+def unloaded(run, between=0):
+    """A run with a way back to complete separation.
+
+    Without adhesion the way back is the way in. With it the pressure is less by `TENSION` of the largest one, up to the
+    jump off that ends all contact. Nothing has coalesced. Between the last two stops there are `between` more steps.
+    """
+    adhesive = float(run["surface_energy"]) > 0
+    run = run.drop_vars(["leg", "split_count", "control"]).reset_coords("branch")
+    count = run.sizes["step"]
+    stops = np.insert(np.arange(count, dtype=float), count - 1, count - 2 + np.arange(1, between + 1) / (between + 1))
+    back = np.append(stops[-2::-1], -1.0)
+    at = np.concatenate([stops, back])
+    first = len(stops)
+    leg = np.repeat([0, 1], [first, len(back)])
+    columns = {}
+    for name, variable in run.data_vars.items():
+        if variable.dims == ("step",):
+            floats = variable.dtype.kind == "f"
+            values = (
+                np.interp(at, np.arange(count), variable.values)
+                if floats
+                else variable.values[np.maximum(at, 0).astype(int)]
+            )
+            columns[name] = values
+    between_stops = (at % 1 != 0) | (leg > 0)
+    drop = TENSION * (1 + 0.1 * between) * columns["nominal_pressure"].max() if adhesive else 0.0
+    unit = float(run["contact_modulus"] * run["rms_slope"])
+    columns["nominal_pressure"] = columns["nominal_pressure"] - drop * leg
+    columns["mean_separation"][-1] *= 1.5
+    for name in ("nominal_pressure", "contact_area_fraction", "spot_count", "contact_stiffness"):
+        columns[name][-1] = 0
+    columns["reduced_pressure"] = columns["nominal_pressure"] / unit
+    columns["reduced_separation"] = columns["mean_separation"] / float(run["rms_height"])
+    columns["branch"] = np.where(leg == 0, "loading", "unloading").astype(object)
+    columns["leg"] = leg
+    columns["split_count"] = np.zeros(len(at), int)
+    columns["step_kind"] = np.where(between_stops, "path", columns["step_kind"]).astype(object)
+    columns["step_target"] = np.where(between_stops, columns["mean_separation"], columns["step_target"])
+    columns["coalescence_count"] = np.zeros(len(at), int)
+    spots = run["spot_count"].values
+    columns["jump_in_count"] = np.where(leg == 0, spots[np.maximum(at, 0).astype(int)], spots[-1])
+    columns["jump_off_count"] = np.where(np.arange(len(at)) == len(at) - 1, spots[-1], 0)
+
+    # The first contact is met without a load; the last step is the jump off, before which the work is the area between
+    # both ways. Everything else is stored.
+    p, u = columns["nominal_pressure"], columns["mean_separation"]
+    work = np.concatenate([[0.0], np.cumsum(-0.5 * (p[1:] + p[:-1]) * np.diff(u))])
+    if not adhesive:
+        work[-1] = 0.0
+    loss = work[-1]
+    ended = np.arange(len(at)) == len(at) - 1
+    columns["work"] = work
+    columns["dissipated_by_jump_off"] = np.where(ended, loss, 0.0)
+    columns["dissipated_by_jump_in"] = columns["dissipated_by_coalescence"] = np.zeros(len(at))
+    columns["stored_energy"] = work - columns["dissipated_by_jump_off"]
+
+    kinds = np.repeat(np.array([0, 1], np.int8), [spots[-1], spots[-1]])
+    formed = np.searchsorted(columns["jump_in_count"], np.arange(1, spots[-1] + 1))
+    steps = np.append(formed, np.full(spots[-1], len(at) - 1))
+    x = np.tile(np.linspace(0, float(run["period"]), spots[-1]), 2)
+    events = {
+        "event_kind": kinds,
+        "event_step": steps,
+        "event_separation": u[steps],
+        "event_x": x,
+        "event_y": x[::-1],
+        "event_members": np.ones(len(kinds), int),
+    }
+    energy = float(run["surface_energy"])
+    strength = 16 * energy / (9 * np.sqrt(3) * float(run["interaction_range"]))
+    pull_off = max(-p[leg == 1].min(), 0.0)
+    at_most = int(np.flatnonzero(leg == 1)[np.argmin(p[leg == 1])])
+    scalars = {
+        "pull_off_pressure": pull_off,
+        "pull_off_separation": u[at_most],
+        "pull_off_over_strength": pull_off / strength if adhesive else 0.0,
+        "pull_off_over_summits": 0.25 if adhesive else 0.0,
+        "detachment_pressure": p[-2] if adhesive else 0.0,
+        "detachment_separation": u[-2],
+        "hysteresis_loss": loss,
+        "hysteresis_loss_over_surface_energy": loss / energy if adhesive else 0.0,
+        "loss_by_jump_in": 0.0,
+        "loss_by_jump_off": loss,
+        "loss_by_coalescence": 0.0,
+        "loss_by_load_jump": 0.0,
+        "loss_unattributed": 0.0,
+        "largest_contact_area_fraction": columns["contact_area_fraction"].max(),
+        "largest_reduced_pressure": columns["reduced_pressure"].max(),
+    }
+    kept = run.drop_dims("step").assign_attrs(run.attrs)
+    new = {name: ("step", values, run[name].attrs if name in run else _UNKNOWN) for name, values in columns.items()}
+    new |= {name: ("event", values, _UNKNOWN) for name, values in events.items()}
+    new |= {name: ((), value, _UNKNOWN) for name, value in scalars.items()} | {"control": ((), "separation", _UNKNOWN)}
+    # A stop keeps its snapshot, wherever it now stands.
+    new["snapshot_step"] = (
+        "snapshot",
+        np.searchsorted(at[:first], run["snapshot_step"].values),
+        run["snapshot_step"].attrs,
+    )
+    step = ("step", np.arange(len(at)), run["step"].attrs)
+    return kept.assign(new).assign_coords(step=step).set_coords("branch")
+
+
+@cache
+def run(seed=1, material="soft", between=0):
+    return unloaded(small.run(seed=seed, material=material), between)
+
+
+@cache
+def runs():
+    """Of a study with ways back of different lengths, and of one that only loads."""
+    between = {(1, "soft"): 1, (1, "hertz"): 0, (2, "soft"): 4, (2, "hertz"): 3}
+    loops = {
+        RunLabels("loops", "rough", seed, 1.0, material): run(seed, material, count)
+        for (seed, material), count in between.items()
+    }
+    return loops | {labels: run for labels, run in small.runs() if labels.study == "single"}
+
+
+@cache
+def tree():
+    return campaign_tree(runs().items(), attrs={"title": "Cyclic campaign", "summary": "For tests."})
