@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from icha.campaign import RunLabels, run_labels, select_run
+from icha.campaign import RunLabels, loading_stops, run_labels, select_run
 from icha.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.files import whole_file
+from icha.path import BETWEEN
 from icha.records import INCOMPLETE, MISSING
 
 RESIDUAL_LIMIT = 1e-8
@@ -69,30 +70,31 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
     at_most("converged", int((run["converged"] != 1).sum()), 0, "number of steps that did not converge")
     at_most("targets", _miss(run), TARGET_LIMIT, "largest relative distance of a step from its target")
 
-    loading = run.isel(step=run["branch"].values == "loading")
+    # The way back is another curve, and so is loading again.
+    loading = run.isel(step=run["leg"].values == 0)
     adhesive = float(run["surface_energy"]) > 0
     height = float(run["rms_height"])
     # Two targets of different kinds may be one state but for the accuracy to which it is reached.
     at_most(
         "area rises",
-        _fall(loading["contact_area_fraction"]) / (float(loading["contact_area_fraction"].max()) or 1.0),
+        _fall_in_loading(loading, "contact_area_fraction"),
         TARGET_LIMIT,
-        "largest fall of A/A0 between loading steps, over its maximum",
+        "largest fall of A/A0 within the first loading, between stops or where nothing unites, over its maximum",
     )
     if not adhesive:
         # Adhesion may pull the surfaces together: between stops in separation or area the load is then free to fall.
-        scale = float(np.abs(loading["nominal_pressure"]).max()) or 1.0
         at_most(
             "pressure rises",
-            _fall(loading["nominal_pressure"]) / scale,
+            _fall_in_loading(loading, "nominal_pressure"),
             TARGET_LIMIT,
-            "largest fall of the nominal pressure between loading steps, over its maximum",
+            "largest fall of the nominal pressure within the first loading, between stops or where nothing unites, "
+            "over its maximum",
         )
     at_most(
         "separation falls",
-        _fall(-loading["mean_separation"]) / height,
+        _fall(-loading["mean_separation"].values) / height,
         SEPARATION_RISE_LIMIT,
-        "largest rise of the mean separation between loading steps, over h_rms (events under load control)",
+        "largest rise of the mean separation within the first loading, over h_rms (events under load control)",
     )
     if not adhesive:
         at_most(
@@ -104,12 +106,27 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
     if run.sizes.get("snapshot", 0):
         for name, value, description in _identities(run):
             at_most(name, value, IDENTITY_LIMIT, description)
+    if "work" in run:
+        for name, value, limit, description in _cycle(run):
+            at_most(name, value, limit, description)
     return tuple(checks)
 
 
 def _fall(values):
     """Largest fall from one value to the next; 0 if there is none."""
-    return float(np.max(-np.diff(values.values), initial=0.0))
+    return float(np.max(-np.diff(values), initial=0.0))
+
+
+def _fall_in_loading(loading, name):
+    """Largest fall of a variable from stop to stop and from step to step, over its largest absolute value.
+
+    Where two spots unite in one, it may carry less than both did at the same separation: a step may fall there, but no
+    stop may.
+    """
+    values, stops = loading[name].values, loading_stops(loading).values
+    united = np.cumsum(np.diff(loading["coalescence_count"].values, prepend=0) != 0)
+    parts = [values[stops], *(values[united == part] for part in np.unique(united))]
+    return max(map(_fall, parts)) / (float(np.max(np.abs(values))) or 1.0)
 
 
 def _miss(run):
@@ -120,10 +137,13 @@ def _miss(run):
         "relative_load": run["nominal_pressure"].values / scale,
         "area_fraction": run["contact_area_fraction"].values,
         "mean_separation": run["mean_separation"].values,
+        BETWEEN: run["mean_separation"].values,
     }
-    target = run["step_target"].values
-    value = np.array([reached[str(kind)][k] for k, kind in enumerate(run["step_kind"].values)])
-    return np.max(np.abs(value - target) / np.abs(target))
+    target, kinds = run["step_target"].values, [str(kind) for kind in run["step_kind"].values]
+    value = np.array([reached[kind][k] for k, kind in enumerate(kinds)])
+    # A path may turn back at no load, of which no part can be taken: then it is one of the run's largest load.
+    whole = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
+    return np.max(np.abs(value - target) / np.where(target != 0, np.abs(target), whole))
 
 
 def _identities(run):
@@ -168,6 +188,71 @@ def _identities(run):
         np.max(np.abs(spot_load - pressure) / load_scale),
         "sum of the spots' forces against F/A0, over the sum of compression and tension",
     )
+
+
+# What the hysteresis loss of a run consists of.
+LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump", "loss_unattributed")
+# The counts of events in a run, in the order of the flags of `event_kind`.
+EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
+
+
+def _cycle(run):
+    """Findings on the work of a run that goes on after its first loading: name, value, limit, what it is."""
+    # Energies are differences of works: they are as accurate as the largest of those.
+    scale = float(np.max(np.abs(run["work"].values))) or 1.0
+    last = run.isel(step=-1)
+    logged = np.bincount(run["event_kind"].values, minlength=len(EVENT_COUNTS))
+    counted = np.array([int(last[name]) for name in EVENT_COUNTS])
+    yield (
+        "events",
+        np.abs(logged - counted).sum(),
+        0,
+        "number of events that are counted and not logged, or logged only",
+    )
+    for name, what in (("jump_in", "jumping into contact"), ("jump_off", "jumping off")):
+        yield (
+            f"{name.replace('_', '-')} loses energy",
+            -min(float(last[f"dissipated_by_{name}"]), 0.0) / scale,
+            IDENTITY_LIMIT,
+            f"energy gained in {what}, which at a given separation can only lose some, over the largest work",
+        )
+    if "hysteresis_loss" not in run:
+        return
+    loss = float(run["hysteresis_loss"])
+    parts = sum(float(run[name]) for name in LOSSES if name in run)
+    yield (
+        "loss adds up",
+        abs(loss - parts) / scale,
+        IDENTITY_LIMIT,
+        "hysteresis loss against its parts, over the largest work",
+    )
+    yield (
+        "loss is the work",
+        abs(loss - float(last["work"])) / scale,
+        IDENTITY_LIMIT,
+        "hysteresis loss against the work done up to complete separation, over the largest work",
+    )
+    yield "separated: spots", float(last["spot_count"]), 0, "number of spots left in contact at the end of unloading"
+    yield (
+        "separated: pressure",
+        abs(float(last["nominal_pressure"])),
+        0,
+        "nominal pressure left at the end of unloading, in Pa",
+    )
+    back = run["nominal_pressure"].values[run["leg"].values == int(last["leg"])]
+    yield (
+        "pull-off pressure",
+        abs(float(run["pull_off_pressure"]) + back.min()) / (np.abs(back).max() or 1.0),
+        IDENTITY_LIMIT,
+        "pull-off pressure against the largest tension of the last unloading, over the largest pressure there",
+    )
+    if float(run["surface_energy"]) == 0 and int(last["coalescence_count"]) == 0:
+        yield (
+            "loop closes",
+            abs(loss) / scale,
+            IDENTITY_LIMIT,
+            "hysteresis loss without adhesion or coalescence, where nothing is irreversible, over the largest work",
+        )
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:

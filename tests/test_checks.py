@@ -1,5 +1,6 @@
 """Checks of results pass on true runs and catch each kind of damage."""
 
+import cyclic_campaign as cyclic
 import numpy as np
 import pytest
 import small_campaign as small
@@ -59,6 +60,86 @@ def test_each_kind_of_damage_is_caught_by_its_check(name):
     run = small.run(material="hertz").copy(deep=True)
     DAMAGES[name](run)
     assert name in failed(run)
+
+
+@pytest.mark.parametrize("material", ["soft", "hertz"])
+def test_runs_that_come_back_pass(material):
+    run = cyclic.run(material=material, between=2)
+    assert failed(run) == set()
+    names = {check.name for check in check_run(run)}
+    assert {"events", "loss adds up", "loss is the work", "pull-off pressure", "separated: spots"} <= names
+    # With adhesion a loop has an area.
+    assert ("loop closes" in names) == (material == "hertz")
+    assert float(run["hysteresis_loss"]) > 0 or material == "hertz"
+
+
+CYCLE_DAMAGES = {
+    "targets": scaled("mean_separation", 1 + 1e-6, -1),
+    "finite": written("work", np.nan, 3),
+    "events": written("split_count", 1, -1),
+    "jump-in loses energy": written("dissipated_by_jump_in", -1.0, -1),
+    "jump-off loses energy": written("dissipated_by_jump_off", -1.0, -1),
+    "loss adds up": written("loss_unattributed", 1.0),
+    "loss is the work": scaled("work", 1 + 1e-6, -1),
+    "separated: spots": written("spot_count", 1, -1),
+    "separated: pressure": written("nominal_pressure", -1e-3, -1),
+    "pull-off pressure": scaled("pull_off_pressure", 1 + 1e-6),
+}
+
+
+@pytest.mark.parametrize("name", CYCLE_DAMAGES)
+def test_each_kind_of_damage_to_a_cycle_is_caught_by_its_check(name):
+    run = cyclic.run(between=2).copy(deep=True)
+    CYCLE_DAMAGES[name](run)
+    assert name in failed(run)
+
+
+def test_a_loop_without_adhesion_must_close_unless_spots_have_united():
+    run = cyclic.run(material="hertz").copy(deep=True)
+    largest = float(np.abs(run["work"]).max())
+    for name in ("hysteresis_loss", "loss_by_coalescence"):
+        run[name].values[...] += 2e-8 * largest
+    run["work"].values[-1] += 2e-8 * largest
+    assert failed(run) == {"loop closes"}
+    run["coalescence_count"].values[-1] = 1
+    run["event_kind"].values[-1] = 2
+    run["jump_off_count"].values[-1] -= 1
+    assert failed(run) == set()
+
+
+def test_the_way_back_need_not_rise_but_the_way_in_must():
+    run = cyclic.run(material="hertz", between=2).copy(deep=True)
+    assert float(run["contact_area_fraction"].diff("step").min()) < 0
+    run["contact_area_fraction"].values[1] *= 1e-3
+    assert "area rises" in failed(run)
+
+
+def test_a_union_may_take_load_from_a_step_but_not_from_a_stop():
+    run = cyclic.run(material="hertz", between=2).copy(deep=True)
+    between = int(np.flatnonzero(run["step_kind"].values == "path")[0])
+    unions = run["coalescence_count"].values
+    for name in ("nominal_pressure", "contact_area_fraction"):
+        run[name].values[between] = 0.99 * run[name].values[between - 1]
+    assert {"pressure rises", "area rises"} <= failed(run)
+    unions[between:] = 1
+    assert {"pressure rises", "area rises"}.isdisjoint(failed(run))
+    stop = int(np.flatnonzero(run["leg"].values == 0)[-1])
+    unions[stop:] = 2
+    run["nominal_pressure"].values[stop] = 0.99 * run["nominal_pressure"].values[between - 1]
+    assert "pressure rises" in failed(run) and "area rises" not in failed(run)
+
+
+def test_a_turning_point_without_a_load_is_met_within_the_accuracy_of_the_others():
+    run = cyclic.run(material="hertz").copy(deep=True)
+    run["step_kind"].values[-1] = "reduced_pressure"
+    run["step_target"].values[-1] = 0.0
+    assert "targets" not in failed(run)
+    run["reduced_pressure"].values[-1] = 1e-6
+    assert "targets" in failed(run)
+
+
+def test_cyclic_campaign_passes():
+    assert all(check.passed for check in check_campaign(cyclic.tree()))
 
 
 @pytest.fixture(scope="module")
