@@ -1,6 +1,7 @@
 """Figures can be drawn from small and unusual campaigns, say what is wrong, and have the same bytes every time."""
 
 import compared_campaign as compared
+import cyclic_campaign as cyclic
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
-from icha.figures.select import path_steps
+from icha.figures.select import branches, path_steps, snapshot_label
 from icha.figures.spots import periodic_circles
 from icha.figures.style import BLUE, VERMILLION, material_label, number, quantity, save, unit_for
 from icha.model_error import jaccard
@@ -68,13 +69,15 @@ def draw(name, surface):
         "fig4_truth": lambda: fig4_contact_map.figure(compared.tree(), surface, solution(), study="one"),
         "fig10": lambda: fig10_model_error.figure(compared.errors(), study="one"),
         "fig11": lambda: fig11_distribution_error.figure(compared.errors(), study="one"),
+        "fig2_loops": lambda: fig2_area_and_gap.figure(cyclic.tree(), study="loops"),
+        "fig5_loops": lambda: fig5_multi_slope.figure(cyclic.tree(), study="loops"),
         "fig9_one": lambda: fig9_tabor.figure(tree, study="single", kind="area_fraction"),
     }[name]()
 
 
 NAMES = ["fig1", "fig2", "fig2_alone", "fig3", "fig3_one", "fig4", "fig5", "fig5_one", "fig6", "fig6_one"]
 NAMES += ["fig7", "fig7_alone", "fig8", "fig8_one", "fig9", "fig9_one"]
-NAMES += ["fig2_truth", "fig3_truth", "fig4_truth", "fig10", "fig11"]
+NAMES += ["fig2_loops", "fig5_loops", "fig2_truth", "fig3_truth", "fig4_truth", "fig10", "fig11"]
 FIGURES = [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope]
 FIGURES += [fig7_stiffness, fig8_patch_sizes, fig9_tabor]
 COMPARED = [fig10_model_error, fig11_distribution_error]
@@ -115,6 +118,79 @@ def test_fig2_shows_every_run_and_the_references():
     expected = path_steps(run)["contact_area_fraction"].values
     assert any(np.array_equal(line.get_ydata(), expected) for line in drawn)
     assert left.get_xscale() == left.get_yscale() == right.get_xscale() == right.get_yscale() == "log"
+
+
+def test_branches_begin_where_the_one_before_ends():
+    run = cyclic.run(between=2)
+    (one, way_in), (other, way_back) = branches(run)
+    assert (one, other) == ("loading", "unloading")
+    assert way_in["step"].values[-1] == way_back["step"].values[0] and set(way_back["leg"].values) == {0, 1}
+    assert way_in.sizes["step"] + way_back.sizes["step"] == run.sizes["step"] + 1
+    # A path that turns again and again has a branch for every turn.
+    again = xr.concat([run, run.assign(leg=run["leg"] + 2)], "step", data_vars="minimal")
+    assert [name for name, _ in branches(again)] == ["loading", "unloading"] * 2
+    assert [name for name, _ in branches(small.run())] == ["loading"]
+
+
+def test_stops_are_those_of_the_first_loading():
+    for material in ("soft", "hertz"):
+        xr.testing.assert_equal(
+            path_steps(cyclic.run(material=material, between=3)).drop_vars("step")["contact_area_fraction"],
+            path_steps(small.run(material=material)).drop_vars("step")["contact_area_fraction"],
+        )
+
+
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig5_multi_slope])
+def test_ways_back_are_thin_dashed_lines_in_the_colour_of_the_material(module):
+    figure = module.figure(cyclic.tree(), study="loops")
+    left, right = figure.axes
+    names = [text.get_text() for each in (*figure.axes, figure) for text in getattr(each, "texts", ())]
+    legends = [each for each in (left.get_legend(), right.get_legend(), *figure.legends) if each is not None]
+    names = [text.get_text() for legend in legends for text in legend.get_texts()]
+    assert names.count("unloading") == 1
+    for axes in (left, right):
+        ways = [line for line in axes.get_lines() if line.get_linewidth() == 0.7 and len(line.get_xdata())]
+        markers = [line for line in axes.get_lines() if line.get_marker() not in ("None", "") and len(line.get_xdata())]
+        assert len(ways) == len(markers) == 4
+        assert {line.get_color() for line in ways} == {line.get_markeredgecolor() for line in markers}
+        assert all(line.is_dashed() for line in ways)
+        for way in ways:
+            # From the largest load on, as long as it presses.
+            assert way.get_xdata()[0] in {line.get_xdata()[-1] for line in markers}
+            assert np.all(way.get_xdata()[np.isfinite(way.get_xdata())] > 0)
+    run = cyclic.run(seed=2, material="soft", between=4)
+    back = run.isel(step=run["leg"].values == 1)
+    pushed = back["reduced_pressure"].values > 0
+    assert 0 < np.count_nonzero(pushed) < len(pushed)
+    drawn = np.concatenate([line.get_xdata() for line in left.get_lines() if line.get_linewidth() == 0.7])
+    assert set(back["reduced_pressure"].values[pushed]) <= set(drawn)
+    alone = module.figure(small.tree(), study="slopes")
+    assert not [line for axes in alone.axes for line in axes.get_lines() if line.get_linewidth() == 0.7]
+
+
+def test_figures_of_the_first_loading_do_not_see_the_way_back():
+    study = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
+    there = campaign_tree((labels, small.run(labels.seed, 1.0, labels.material)) for labels in study)
+    for with_loops, without in zip(
+        fig7_stiffness.figure(cyclic.tree(), study="loops").axes,
+        fig7_stiffness.figure(there, study="loops").axes,
+        strict=True,
+    ):
+        for one, other in zip(with_loops.get_lines(), without.get_lines(), strict=True):
+            np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
+
+
+def test_the_state_of_pull_off_can_be_drawn(tmp_path):
+    run = cyclic.run(between=2).copy(deep=True)
+    run["snapshot_kind"].values[1] = "pull_off"
+    run["snapshot_target"].values[1] = 0.0
+    run["snapshot_step"].values[1] = run.sizes["step"] - 2
+    assert snapshot_label(run, 1) == "pull-off"
+    tree = campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)])
+    for module in (fig3_distributions, fig8_patch_sizes):
+        figure = module.figure(tree, study="one", kind="pull_off")
+        assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
+        assert not any(line.get_label() == "Persson" for axes in figure.axes for line in axes.get_lines())
 
 
 def test_fig3_points_keep_the_probability():

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from icha.figures.select import path_steps, study_runs
+from icha.figures.select import path_steps, study_runs, ways_back
 from icha.figures.style import COLOURS, MARKERS, material_label
 
 PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"
 AREA_LABEL = r"contact area  $A/A_0$"
 SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
 
+UNLOADING = {"ls": (0, (4, 2)), "lw": 0.7, "zorder": 2.2}
+
 
 class Curve(NamedTuple):
-    """A run on the stops of its study's path, and the look of its markers (arguments of `Axes.plot`)."""
+    """A run on its study's stops, its ways back, and the look of its markers (arguments of `Axes.plot`)."""
 
     run: xr.Dataset
+    back: list[xr.Dataset]
     look: dict
 
 
@@ -62,8 +68,15 @@ def study_curves(campaign: xr.DataTree, study: str) -> list[Curve]:
             "ms": 3.8 if adhesive else 5.6,
         }
         named.add(key)
-        curves.append(Curve(path_steps(run), look))
+        curves.append(Curve(path_steps(run), ways_back(run), look))
     return curves
+
+
+def draw_unloading(axes: Axes, load: xr.DataArray, values: xr.DataArray, colour: str) -> None:
+    """Draw one way back of a run on logarithmic axes of load, where it is compressive; the axes keep their range."""
+    # Just before separation loads are as small as can be.
+    shown = np.where(load.values > 0, load.values, np.nan)
+    axes.add_artist(Line2D(shown, values.values, color=colour, **UNLOADING))
 
 
 # More runs than this are named below the panels, and all lines if a panel had more names than this.

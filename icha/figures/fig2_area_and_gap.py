@@ -11,7 +11,9 @@ from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
     SEPARATION_LABEL,
+    UNLOADING,
     add_legends,
+    draw_unloading,
     study_curves,
 )
 from icha.figures.select import study_errors
@@ -20,7 +22,8 @@ from icha.figures.style import BLACK, COLOURS, GREY, TWO_COLUMNS, new_figure, pa
 CAPTION = (
     "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
     "F/(E* h'rms A0), on double logarithmic axes. Markers: ICHA, one for each stop of the loading path; open markers "
-    "are without adhesion. Upright crosses, where there are any: boundary elements, an independent code, on the same "
+    "are without adhesion. Thin dashed lines, where there are any: the way back, unloading, while the load is "
+    "compressive. Upright crosses, where there are any: boundary elements, an independent code, on the same "
     "topographies and with the same interaction range, in the colour of the material; their area is corrected by the "
     "perimeter of the contact. At the ranges that a grid resolves they show practically no hysteresis, so that with "
     "adhesion they bound the limit of short ranges (JKR), and do not prove it. Lines: adhesionless theories of Persson "
@@ -62,13 +65,18 @@ def figure(
     fig = new_figure(TWO_COLUMNS, 3.3)
     left, right = fig.subplots(1, 2)
     pressures, areas, gaps = [], [], []
-    for run, look in curves:
+    for run, back, look in curves:
         p = run["reduced_pressure"].values
         left.loglog(p, run["contact_area_fraction"].values, **look)
         right.loglog(p, run["reduced_separation"].values, **look)
+        for way in back:
+            for ax, name in ((left, "contact_area_fraction"), (right, "reduced_separation")):
+                draw_unloading(ax, way["reduced_pressure"], way[name], look["mec"])
         pressures.append(p[p > 0])
         areas.append(run["contact_area_fraction"].values)
         gaps.append(run["reduced_separation"].values)
+    if any(back for _, back, _ in curves):
+        left.plot([], [], color=GREY, label="unloading", **UNLOADING)
     materials = campaign[study]["material"].values.tolist()
     for p, area, gap in _draw_solutions(left, right, materials, study_errors(model_error, study)):
         pressures.append(p)

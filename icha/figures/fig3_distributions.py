@@ -78,8 +78,9 @@ def figure(
     if named:
         for ax in (left, right):
             ax.plot([], [], **_BROAD | {"color": GREY}, label="boundary elements")
-    line = np.linspace(0.002, highest, 300)
-    right.semilogy(line, persson_pressure_density(line, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
+    if load > 0:
+        line = np.linspace(0.002, highest, 300)
+        right.semilogy(line, persson_pressure_density(line, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
 
     left.set_xlabel(r"gap  $u/h_{\mathrm{rms}}$")
     left.set_ylabel(r"$P(u)\; h_{\mathrm{rms}}$")

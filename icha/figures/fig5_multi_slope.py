@@ -10,8 +10,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL
-from icha.figures.select import path_steps, study_runs
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, UNLOADING, draw_unloading
+from icha.figures.select import path_steps, study_runs, ways_back
 from icha.figures.style import (
     BLACK,
     COLOURS,
@@ -30,7 +30,8 @@ CAPTION = (
     "for several rms slopes (shape of the markers) and materials (colour and size). Without adhesion the curves of one "
     "topography, scaled to different slopes, are one curve in (a); what adhesion adds depends on the material and "
     "grows as the slope falls. In (b) the slope orders the curves: at a given load the area falls as the slope rises. "
-    "Measurements, where given, are drawn as lines."
+    "Thin dashed lines, where there are any: the way back, unloading, while the load is compressive. Measurements, "
+    "where given, are drawn as lines."
 )
 
 
@@ -82,6 +83,9 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
             "mew": 0.9,
             "ms": size[labels.material],
         }
+        for way in ways_back(run):
+            for ax, factor in ((left, 1.0), (right, float(run["rms_slope"]))):
+                draw_unloading(ax, factor * way["reduced_pressure"], way["contact_area_fraction"], look["mec"])
         run = path_steps(run)
         area = run["contact_area_fraction"].values
         p = run["reduced_pressure"].values
@@ -128,6 +132,8 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
         )
         for m in materials
     ]
+    if any(ways_back(run) for _, run in runs):
+        slope_handles.append(Line2D([], [], color=GREY, label="unloading", **UNLOADING))
     right.legend(handles=slope_handles, loc="lower right")
     first = left.legend(handles=material_handles, loc="lower right")
     if measurements:

@@ -38,7 +38,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     fig = new_figure(TWO_COLUMNS, 3.3)
     left, right = fig.subplots(1, 2)
     pressures, stiffnesses = [], []
-    for run, look in curves:
+    for run, _, look in curves:
         p, stiffness = stiffness_points(run)
         left.loglog(p, stiffness, **look)
         right.semilogx(p, stiffness / p, **look)

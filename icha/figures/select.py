@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import numpy as np
 import xarray as xr
 
-from icha.campaign import RunLabels, find_snapshot, run_labels, select_run
+from icha.campaign import RunLabels, find_snapshot, loading_stops, run_labels, select_run
 from icha.figures.style import number
 
 
@@ -40,10 +43,24 @@ def pick(labels: str, wanted, there: list):
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
-    """The stops of the study's list of targets, without those that were added for snapshots of another kind."""
+    """The first loading's stops in the study's list of targets, without those added for snapshots of another kind."""
+    run = run.isel(step=loading_stops(run).values)
     kinds = [str(kind) for kind in run["step_kind"].values]
     main = max(dict.fromkeys(kinds), key=kinds.count, default=None)
     return run.isel(step=[kind == main for kind in kinds])
+
+
+def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Name and steps of every leg of a run, in their order; a leg begins with the last step of the one before."""
+    legs = run["leg"].values
+    for leg in np.unique(legs):
+        own = np.flatnonzero(legs == leg)
+        yield str(run["branch"].values[own[0]]), run.isel(step=slice(max(own[0] - 1, 0), own[-1] + 1))
+
+
+def ways_back(run: xr.Dataset) -> list[xr.Dataset]:
+    """The legs on which a run is unloaded, each from its turning point on; none of a run that only loads."""
+    return [leg for name, leg in branches(run) if name == "unloading"]
 
 
 def first_line_runs(
@@ -76,6 +93,8 @@ _KIND_LABELS = {
 def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     """At which load, area or separation a snapshot was taken, for figures."""
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
+    if kind == "pull_off":
+        return "pull-off"
     return f"{_KIND_LABELS[kind]} = {number(value)}"
 
 
