@@ -23,9 +23,9 @@ import xarray as xr
 from markupsafe import Markup, escape
 
 from icha.aggregation import at_round_pressures
-from icha.campaign import RunLabels, run_labels, select_run
-from icha.checks import Check, worst
-from icha.figures.style import quantity
+from icha.campaign import RunLabels, loading_stops, run_labels, select_run
+from icha.checks import IDENTITY_LIMIT, Check, worst
+from icha.figures.style import quantity, unit_for
 from icha.files import whole_file
 from icha.model_error import SUMMARISED
 
@@ -178,11 +178,18 @@ def _study(campaign, name, comparison):
         ],
         "runs": [_run(each, run) for each, run in runs],
         "table": _table(runs),
+        "loops": _loops(runs),
         "spread": _spread(comparison[name].to_dataset()) if comparison is not None and name in comparison else None,
     }
 
 
+# What is counted of every run.
+_COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count")
+
+
 def _run(labels: RunLabels, run):
+    # After complete separation nothing is left to be counted: contact is shown at the end of the first loading.
+    loaded = np.flatnonzero(loading_stops(run).values)[-1:]
     snapshots = [
         {
             "kind": str(run["snapshot_kind"].values[k]),
@@ -204,12 +211,8 @@ def _run(labels: RunLabels, run):
         "nayak_parameter": float(run["nayak_parameter"]),
         "stickiness": float(run["stickiness"]),
         "residual": float(run["residual"].max()) if run.sizes["step"] else None,
-        "events": {
-            name: int(run[name].values[-1])
-            for name in ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count")
-            if run.sizes["step"]
-        },
-        "beyond_wu": float(run["outside_wu_fraction"].values[-1]) if run.sizes["step"] else None,
+        "events": {name: int(run[name].values[k]) for name in _COUNTS for k in loaded},
+        "beyond_wu": float(run["outside_wu_fraction"].values[loaded[0]]) if len(loaded) else None,
         "snapshots": snapshots,
     }
 
@@ -219,6 +222,74 @@ def _table(runs):
     rows = [(labels, {p: (area, gap) for p, area, gap in at_round_pressures(run)}) for labels, run in runs]
     pressures = sorted({p for _, cells in rows for p in cells})
     return {"pressures": pressures, "rows": [(labels, [cells.get(p) for p in pressures]) for labels, cells in rows]}
+
+
+# What a loss consists of, as the page calls it.
+_LOSS_NAMES = {
+    "loss_by_jump_in": "jumping in",
+    "loss_by_jump_off": "jumping off",
+    "loss_by_coalescence": "unions",
+    "loss_by_load_jump": "at fixed load",
+    "loss_unattributed": "no event",
+}
+_EVENT_NAMES = {
+    "Contacts formed, broken": ("jump_in_count", "jump_off_count"),
+    "Unions, undone": ("coalescence_count", "split_count"),
+}
+
+
+def _loops(runs):
+    """Pull-off and loss of the runs that were pulled off: means over the seeds of every surface, slope and material."""
+    lines: dict[tuple, list] = {}
+    for labels, run in runs:
+        if "hysteresis_loss" in run:
+            lines.setdefault((labels.surface, labels.rms_slope, labels.material), []).append(run)
+    rows = [_loop(*line, members) for line, members in lines.items()]
+    shown = {name for row in rows for name, share in row["shares"].items() if share}
+    return {"rows": rows, "parts": {name: text for name, text in _LOSS_NAMES.items() if name in shown}}
+
+
+def _loop(surface, rms_slope, material, members):
+    def values(name):
+        return np.array([float(run[name]) for run in members])
+
+    # What rounding leaves of a closed loop is no loss.
+    rounding = IDENTITY_LIMIT * np.array([float(np.abs(run["work"]).max()) for run in members])
+    loss = values("hysteresis_loss")
+    lost = np.abs(loss) > rounding
+    adhesive = float(members[0]["surface_energy"]) > 0
+    parts = {name: values(name).sum() for name in _LOSS_NAMES}
+    return {
+        "surface": surface,
+        "rms_slope": rms_slope,
+        "material": material,
+        "seeds": len(members),
+        "largest_pressure": _with_scatter(values("largest_reduced_pressure")),
+        "largest_area": _with_scatter(values("largest_contact_area_fraction")),
+        "pull_off": _with_scatter(values("pull_off_pressure"), "Pa"),
+        "at": _with_scatter(values("pull_off_separation") / values("rms_height")) if adhesive else None,
+        "over_strength": _with_scatter(values("pull_off_over_strength")) if adhesive else None,
+        "over_summits": _with_scatter(values("pull_off_over_summits")) if adhesive else None,
+        "detachment": _with_scatter(values("detachment_pressure"), "Pa") if adhesive else None,
+        "loss": _with_scatter(np.where(lost, loss, 0.0), "J/m²"),
+        "over_energy": _with_scatter(values("hysteresis_loss_over_surface_energy")) if adhesive else None,
+        "shares": {name: part / loss.sum() if lost.any() else None for name, part in parts.items()},
+        "events": {
+            text: [float(np.mean([run[name].values[-1] for run in members])) for name in names]
+            for text, names in _EVENT_NAMES.items()
+        },
+    }
+
+
+def _with_scatter(values, unit=""):
+    """Mean of values and, of several, their standard deviation below it, for the page; with a unit if they have one."""
+    mean, deviation = float(np.mean(values)), float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    factor, unit = unit_for(mean, unit) if unit else (1.0, "")
+    text = _scientific(mean * factor) + (f" {unit}" if unit else "")
+    # Loads that are met exactly do not scatter.
+    if deviation > 1e-6 * abs(mean):
+        text += Markup("<br>±&thinsp;") + _scientific(deviation * factor)
+    return text.replace("-", "−")
 
 
 def _spread(comparison):

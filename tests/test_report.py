@@ -4,6 +4,7 @@ import re
 from html.parser import HTMLParser
 
 import compared_campaign as compared
+import cyclic_campaign as cyclic
 import numpy as np
 import pytest
 import small_campaign as small
@@ -128,6 +129,77 @@ def test_error_of_one_seed_has_no_scatter_and_sources_are_cited(write):
     assert "±" not in section.split("<h3>")[1] and "0.0 %" in section and "-0.0" not in section
     assert text.count("B. Elements, J. Tests 1 (2020) 1") == 1
     Page(text)
+
+
+def loop_rows(text):
+    """The cells of the two tables on pull-off and loss, by material."""
+    tables = re.findall(r"<caption>(Pull-off|Hysteresis loss)</caption>(.*?)</table>", text, flags=re.DOTALL)
+    assert [name for name, _ in tables] == ["Pull-off", "Hysteresis loss"]
+    found = []
+    for _, table in tables:
+        head = [re.sub("<.*?>", "", cell) for cell in re.findall(r"<th[ >].*?</th>", table.split("<tbody>")[0])]
+        rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in table.split("<tbody>")[1].split("</tr>")[:-1]]
+        assert all(len(row) == len(head) for row in rows)
+        found.append({row[1]: dict(zip(head, row, strict=True)) for row in rows})
+    return found
+
+
+def plain(value):
+    """A small number as the page shows it, without its tags."""
+    exponent = int(np.floor(np.log10(value)))
+    mantissa = f"{value / 10.0**exponent:.2f}"
+    return f"{mantissa}&thinsp;×&thinsp;10−{-exponent}" if exponent < -3 else f"{value:.{2 - exponent}f}"
+
+
+def test_runs_that_come_back_have_tables_of_pull_off_and_loss(write):
+    assert "Hysteresis loss" not in write()
+    text = write(campaign=cyclic.tree(), comparison=compare_campaign(cyclic.tree()), checks=[])
+    Page(text)
+    pull_off, loss = loop_rows(text)
+    runs = [run for labels, run in cyclic.runs().items() if (labels.study, labels.material) == ("loops", "soft")]
+    tensions = np.array([float(run["pull_off_pressure"]) for run in runs]) / 1e3
+    assert tensions.min() > 10 and tensions.max() < 1000
+    assert pull_off["soft"]["Pull-off"] == f"{tensions.mean():.0f} kPa<br>±&thinsp;{tensions.std(ddof=1):.1f}"
+    assert pull_off["soft"]["Seeds"] == "2" and pull_off["soft"]["over all asperities"] == "0.250"
+    assert pull_off["soft"]["Last contact"].startswith("−")
+    assert pull_off["hertz"]["Pull-off"] == "0 Pa" and pull_off["hertz"]["Last contact"] == "–"
+    # All is lost in jumping off, and nothing without adhesion.
+    assert loss["soft"]["Jumping off, %"] == "100.0" and loss["hertz"]["Jumping off, %"] == "–"
+    assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["over Δγ"] == "–"
+    over = np.array([float(run["hysteresis_loss"]) / 0.05 for run in runs])
+    assert re.sub("<.*?>", "", loss["soft"]["over Δγ"]) == f"{plain(over.mean())}±&thinsp;{plain(over.std(ddof=1))}"
+    assert "Unions, %" not in loss["soft"], "what is nowhere lost has no column"
+    formed, broken = loss["soft"]["Contacts formed, broken"].split("<br>")
+    assert formed == broken == f"{np.mean([float(run['spot_count'].max()) for run in runs]):.4g}"
+    assert loss["soft"]["Unions, undone"] == "0<br>0"
+    # One seed has no scatter.
+    one = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops" and labels.seed == 1}
+    text = write(campaign=campaign_tree(one.items()), comparison=None, checks=[])
+    assert "±" not in "".join(loop_rows(text)[0]["soft"].values()) and "Seeds" not in loop_rows(text)[0]["soft"]
+
+
+def test_statistics_are_of_the_first_loading(write):
+    text = write(campaign=cyclic.tree(), comparison=None, checks=[])
+    statistics = text[text.index('<h2 id="statistics">') :]
+    run = cyclic.run(seed=2, material="soft", between=4)
+    spots = int(small.run(seed=2)["spot_count"][-1])
+    assert spots > 0
+    row = re.search(r"<tr><th>loops: rough, seed 2, slope 1, soft</th>(.*?)</tr>", statistics).group(1)
+    assert re.findall(r"<td[^>]*>(.*?)</td>", row)[:3] == [
+        str(run.sizes["step"]),
+        str(int(run["asperity_count"])),
+        str(spots),
+    ]
+
+
+def test_comparison_is_of_the_first_loading():
+    study = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
+    there = campaign_tree((labels, small.run(labels.seed, 1.0, labels.material)) for labels in study)
+    one, other = compare_campaign(cyclic.tree())["loops"], compare_campaign(there)["loops"]
+    assert one.sizes["reduced_pressure"] > 5
+    for name in other.data_vars:
+        np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=name)
+    assert at_round_pressures(cyclic.run(between=3)) == at_round_pressures(small.run())
 
 
 def test_failures_are_loud(write):
