@@ -1,0 +1,214 @@
+"""Fig. 13: load and contact area on the way in and on the way back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
+from icha.figures.hysteresis import (
+    BRANCH_DASHES,
+    Lines,
+    legend_below,
+    pull_off_step,
+    slope_label,
+    unloaded_runs,
+)
+from icha.figures.select import branches, pick
+from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.model_error import check_same_contact
+
+CAPTION = (
+    "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over nominal "
+    "area against the reduced pressure, on the way in (solid) and on the way back (dashed); tension is negative. "
+    "Symbols with a black edge: pull-off, the largest tension on the last way back, where there is any; where slopes "
+    "share a panel, symbols without it mark where the first way in ends. Insets enlarge the surroundings of zero load "
+    "where the tension is small beside the largest load. The energy lost per nominal area is the area between the "
+    "ways, of the pressure against the mean separation. Steps are jumps of single spots or of several. Dots and "
+    "rings, where given: boundary elements, an independent code, at some of their states, of the same topography, "
+    "half-space and range of attraction, dots on the way in and rings on the way back, with the area corrected by the "
+    "perimeter of the contact."
+)
+
+# More loops than this in one panel, and every slope has panels of its own.
+_MOST_LOOPS = 4
+# Tension below this part of the largest pressure is enlarged in an inset, up to so many times the largest tension.
+_SMALL_TENSION = 0.25
+_REACH = 1.4
+# The panel of areas is so much higher than its curves where it has an inset above them.
+_HEADROOM = 1.8
+# Distance between marks of boundary elements, in diagonals of the panel.
+_APART = 0.025
+_LOOP = {"lw": 0.9}
+_PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
+_TRUTH = {"ls": "none", "marker": "o", "mew": 0.6, "zorder": 5}
+# Rings are wider than dots, so that both show where the ways agree.
+_DOT, _RING = 2.0, 3.4
+
+
+class _Loop(NamedTuple):
+    """A run, boundary elements beside it, and the look of its markers."""
+
+    run: xr.Dataset
+    truths: list[xr.Dataset]
+    marker: dict
+
+
+@styled
+def figure(
+    campaign: xr.DataTree,
+    loops: Sequence[xr.Dataset] | None = None,
+    *,
+    study: str,
+    surface: str | None = None,
+    seed: int | None = None,
+) -> Figure:
+    """Draw the runs of all slopes and materials of a study, for one surface and seed.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    loops : boundary elements both ways of runs of the study, if there are any; those of other surfaces or seeds than
+        the one drawn are left out.
+    study : name of the study; its runs are unloaded, at least in part.
+    surface, seed : which topography; the study's first, if left out.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study, surface or seed, no run was unloaded, or boundary elements belong to no run of the
+        study.
+    """
+    runs = unloaded_runs(campaign, study)
+    surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
+    seed = pick("seed", seed, list(dict.fromkeys(labels.seed for labels, _ in runs if labels.surface == surface)))
+    truths = _truths(study, runs, loops or ())
+    own = {labels: run for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)}
+    slopes = sorted({labels.rms_slope for labels in own}, reverse=True)
+    own_rows = len(own) > _MOST_LOOPS and 1 < len(slopes) < len(own)
+    rows = [[slope] for slope in slopes] if own_rows else [slopes]
+    # Where every slope has its panels, they need not tell them apart in another way.
+    keys = {each: (each.material, surface, None if own_rows else each.rms_slope) for each in own}
+    lines = Lines(campaign, [study], list(keys.values()))
+
+    fig = new_figure(TWO_COLUMNS, 2.7 * len(rows))
+    panels = fig.subplots(len(rows), 2, squeeze=False)
+    letters = iter("abcdefghijklmnopqrstuvwxyz")
+    for (left, right), shown in zip(panels, rows, strict=True):
+        drawn = [
+            _Loop(run, truths.get(labels, []), lines.marker(keys[labels]))
+            for labels, run in own.items()
+            if labels.rms_slope in shown
+        ]
+        for ax, axis in ((left, _LOADS), (right, _AREAS)):
+            for loop in drawn:
+                _draw(ax, loop, axis, turn=len(shown) > 1)
+            ax.set_ylabel(axis.y_label)
+            ax.xaxis.set_major_locator(MaxNLocator(5))
+            panel_label(ax, next(letters))
+        if own_rows:
+            right.set_title(slope_label(shown[0]), loc="right")
+        _enlarge(left, right, drawn)
+    for ax, axis in zip(panels[-1], (_LOADS, _AREAS), strict=True):
+        ax.set_xlabel(axis.x_label)
+    legend_below(fig, _handles(lines, rows, own, truths))
+    return fig
+
+
+class _Axis(NamedTuple):
+    x: str
+    y: str
+    x_label: str
+    y_label: str
+
+
+_LOADS = _Axis("reduced_separation", "reduced_pressure", SEPARATION_LABEL, PRESSURE_LABEL)
+_AREAS = _Axis("reduced_pressure", "contact_area_fraction", PRESSURE_LABEL, AREA_LABEL)
+
+
+def _draw(ax, loop, axis, *, turn):
+    """Draw a loop, a mark at its pull-off and, if wanted, one where it turns first."""
+    run, colour = loop.run, loop.marker["mec"]
+    x, y = run[axis.x].values, run[axis.y].values
+    for branch, leg in branches(run):
+        ax.plot(leg[axis.x].values, leg[axis.y].values, ls=BRANCH_DASHES[branch], color=colour, **_LOOP)
+    if turn:
+        at = int(np.flatnonzero(run["leg"].values == 0)[-1])
+        ax.plot(x[at], y[at], ls="none", zorder=5, **loop.marker)
+    at = pull_off_step(run)
+    if at is not None:
+        ax.plot(x[at], y[at], **loop.marker | _PULL_OFF)
+    for truth in loop.truths:
+        for branch, face, size in (("loading", colour, _DOT), ("unloading", "none", _RING)):
+            way = truth.isel(step=truth["branch"].values == branch)
+            ax.plot(way[axis.x], way[axis.y], mec=colour, mfc=face, ms=size, markevery=_APART, **_TRUTH)
+
+
+def _enlarge(left, right, loops):
+    """Insets around zero load, if the tension is there but small."""
+    pressures = np.concatenate([loop.run["reduced_pressure"].values for loop in loops])
+    tension = -pressures.min()
+    if not 0 < tension < _SMALL_TENSION * pressures.max():
+        return
+    reach = np.array([-1, 1]) * _REACH * tension
+    near = [loop.run.isel(step=np.abs(loop.run["reduced_pressure"].values) <= reach[1]) for loop in loops]
+    near = [run.isel(step=run["contact_area_fraction"].values > 0) for run in near]
+    separations, areas = (
+        np.concatenate([run[name].values for run in near]) for name in ("reduced_separation", "contact_area_fraction")
+    )
+    room = 0.06 * np.ptp(separations)
+    right.set_ylim(top=_HEADROOM * right.dataLim.y1)
+    for ax, axis, corner, limits in (
+        (left, _LOADS, (0.5, 0.44), ((separations.min() - room, separations.max() + room), reach)),
+        (right, _AREAS, (0.1, 0.58), (reach, (0, 1.1 * areas.max()))),
+    ):
+        inset = ax.inset_axes((*corner, 0.46, 0.33 if ax is right else 0.48))
+        for loop in loops:
+            _draw(inset, loop, axis, turn=False)
+        inset.set_xlim(limits[0])
+        inset.set_ylim(limits[1])
+        inset.axhline(0, color=GREY, lw=0.5, zorder=1)
+        inset.tick_params(labelsize=6.5, pad=2)
+        inset.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
+        for each in (inset.xaxis, inset.yaxis):
+            each.get_offset_text().set_fontsize(6.5)
+            each.set_major_locator(MaxNLocator(4))
+
+
+def _handles(lines, rows, runs, truths):
+    """What the legend shows, by name."""
+    handles = lines.handles(**_LOOP)
+    if len(rows[0]) == 1:
+        handles = {name: Line2D([], [], color=handle.get_color(), **_LOOP) for name, handle in handles.items()}
+    for branch, dashes in BRANCH_DASHES.items():
+        handles[branch] = Line2D([], [], color=GREY, ls=dashes, **_LOOP)
+    if any(pull_off_step(run) is not None for run in runs.values()):
+        handles["pull-off"] = Line2D([], [], marker="o", mfc=GREY, **_PULL_OFF)
+    if any(labels in truths for labels in runs):
+        for branch, face, size in (("loading", GREY, _DOT), ("unloading", "none", _RING)):
+            handles[f"boundary elements, {branch}"] = Line2D([], [], mec=GREY, mfc=face, ms=size, **_TRUTH)
+    return handles
+
+
+def _truths(study, runs, loops):
+    """The boundary elements of every run of a study that has some, by its labels."""
+    found = {}
+    for loop in loops:
+        for labels, run in runs:
+            try:
+                check_same_contact(run, loop)
+            except ValueError:
+                continue
+            found.setdefault(labels, []).append(loop)
+            break
+        else:
+            names = ("contact_modulus", "surface_energy", "interaction_range", "rms_slope", "seed")
+            values = ", ".join(f"{name} {float(loop[name]):g}" for name in names)
+            raise ValueError(f"study {study}: no run is of the same contact as the boundary elements of {values}")
+    return found

@@ -1,0 +1,128 @@
+"""Fig. 14: how hard one has to pull, against the rms slope and against how hard it was pressed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from icha.figures.hysteresis import (
+    Lines,
+    averages,
+    detached_runs,
+    draw_averages,
+    legend_below,
+    several,
+    slope_label,
+)
+from icha.figures.select import pick
+from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_figure, number, panel_label, styled, unit_for
+
+CAPTION = (
+    "Pull-off, the largest tension on the way back to complete separation, against the rms slope (a) and, where "
+    "studies of several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached before "
+    "(b). It is drawn as nominal pressure, or over the strength of the interface (the largest attraction of the "
+    "Lennard-Jones traction), or over all summits pulling their most, 3/2 pi dgamma R, at once; the axis says which. "
+    "Points are means over the seeds, bars the standard deviation where there are several seeds. Without adhesion "
+    "(open markers) there is no pull-off. Where the values span decades the axis is logarithmic down to the "
+    "decade of the smallest, and linear from there to zero. Runs that were not separated completely are left out."
+)
+
+_QUANTITIES = {
+    "pull_off_pressure": "pull-off pressure",
+    "pull_off_over_strength": "pull-off / strength of the interface",
+    "pull_off_over_summits": "pull-off / all summits at their most",
+}
+# Values that span more than this are drawn on a logarithmic axis.
+_SPAN = 30.0
+_LINE = {"lw": 0.9}
+
+
+@styled
+def figure(
+    campaign: xr.DataTree,
+    *,
+    study: str,
+    load_studies: Sequence[str] = (),
+    quantity: str = "pull_off_pressure",
+) -> Figure:
+    """Draw the pull-off of all runs of the studies, averaged over the seeds.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    study : name of the study of panel (a).
+    load_studies : names of the studies of panel (b), which differ in their largest load; without any there is no (b).
+    quantity : "pull_off_pressure", "pull_off_over_strength" or "pull_off_over_summits".
+
+    Raises
+    ------
+    ValueError
+        If there is no such study or quantity, or no run of a study was unloaded to complete separation.
+    """
+    pick("quantity", quantity, list(_QUANTITIES))
+    by_slope, by_load = {}, {}
+    for labels, run in detached_runs(campaign, study):
+        at, value = labels.rms_slope, float(run[quantity])
+        line = by_slope.setdefault((labels.material, labels.surface, None), {})
+        line.setdefault(at, {})[labels.seed] = (at, value)
+    load_studies = several("load_studies", load_studies) if load_studies else []
+    for name in load_studies:
+        for labels, run in detached_runs(campaign, name):
+            at, value = float(run["largest_reduced_pressure"]), float(run[quantity])
+            line = by_load.setdefault((labels.material, labels.surface, labels.rms_slope), {})
+            line.setdefault(name, {})[labels.seed] = (at, value)
+    loaded_slopes = {slope for *_, slope in by_load}
+    if len(loaded_slopes) == 1:
+        # The panel's title names it, and the lines look like those of (a).
+        by_load = {(material, surface, None): line for (material, surface, _), line in by_load.items()}
+    lines = Lines(campaign, [study, *load_studies], [*by_slope, *by_load])
+    values = [
+        seeds[seed][1] for line in (*by_slope.values(), *by_load.values()) for seeds in line.values() for seed in seeds
+    ]
+    factor, unit = unit_for(max(values), "Pa") if quantity == "pull_off_pressure" else (1.0, "")
+
+    fig = new_figure(TWO_COLUMNS if by_load else ONE_COLUMN, 2.9)
+    panels = fig.subplots(1, 2 if by_load else 1, squeeze=False)[0]
+    for ax, letter, drawn in zip(panels, "ab", (by_slope, by_load), strict=False):
+        shown = {key: averages(list(line.values())) for key, line in drawn.items()}
+        for key, line in shown.items():
+            line = line._replace(y=factor * line.y, y_deviation=factor * line.y_deviation)
+            draw_averages(ax, line, color=lines.colour(key), **lines.marker(key), **_LINE)
+        _scale(ax, factor * np.concatenate([line.y for line in shown.values()]))
+        panel_label(ax, letter)
+    label = _QUANTITIES[quantity] + (f" ({unit})" if unit else "")
+    panels[0].set_ylabel(label)
+    panels[0].set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
+    slopes = sorted({slope for line in by_slope.values() for slope in line})
+    panels[0].set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
+    panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
+    panels[0].minorticks_off()
+    if by_load:
+        loads = np.array([at for line in by_load.values() for seeds in line.values() for at, _ in seeds.values()])
+        if loads.min() > 0 and loads.max() > 2 * loads.min():
+            panels[1].set_xscale("log")
+            panels[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+            panels[1].xaxis.set_major_formatter(lambda value, _: number(value))
+            panels[1].xaxis.set_minor_formatter(NullFormatter())
+        panels[1].set_ylabel(label)
+        panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
+        if len(loaded_slopes) == 1:
+            panels[1].set_title(slope_label(*loaded_slopes), loc="right")
+    legend_below(fig, lines.handles(**_LINE), columns=len(panels))
+    return fig
+
+
+def _scale(ax, values):
+    """An axis on which all values have a place, logarithmic where they span decades."""
+    positive = values[values > 0]
+    if len(positive) and positive.max() > _SPAN * positive.min():
+        least = 10.0 ** np.floor(np.log10(positive.min()))
+        ax.set_yscale("symlog", linthresh=least, linscale=0.4)
+        ax.set_ylim(-0.3 * least, 2 * positive.max())
+    elif len(positive):
+        ax.set_ylim(bottom=-0.04 * positive.max())
+    ax.axhline(0, color=GREY, lw=0.6, zorder=1)

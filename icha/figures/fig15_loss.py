@@ -1,0 +1,176 @@
+"""Fig. 15: the energy that a cycle costs, against the contact area reached, and what it consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from scipy.stats import linregress
+
+from icha.figures.hysteresis import Lines, averages, detached_runs, draw_averages, legend_below, several
+from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, styled, unit_for
+
+CAPTION = (
+    "(a) Hysteresis loss, the energy per nominal area that a path from first contact to the largest load and back to "
+    "separation dissipates, against the contact area over the nominal area, the largest on the path. Points: means "
+    "over the seeds, bars their standard deviations. Lines: least squares of a straight line through the points that "
+    "differ in their largest load only, three at least; the legend gives its coefficient of determination r² and the "
+    "exponent of a power law through the same points, 1 where the loss is proportional to the area (Violano and "
+    "Afferrante, Lubricants 9 (2021) 7, found it to grow linearly). The axes are logarithmic where both quantities "
+    "span decades. Runs without adhesion have no value where the loss is drawn over the surface energy, and are left "
+    "out there. (b) What the loss consists of at the largest load of every line, for runs with adhesion: jumps into "
+    "contact, jumps off, unions of spots and their undoing (a property of the model, of either sign), jumps at "
+    "controlled load, and what none of them explains; parts are over the sum of their magnitudes, and those below "
+    "zero are gains. Bars carry the markers of (a). Runs that were not separated completely are left out."
+)
+
+# Parts of the loss, with the look of their bars: none has the colour of a material.
+PARTS = {
+    "loss_by_jump_in": ("jump into contact", {"fc": "0.25"}),
+    "loss_by_jump_off": ("jump off", {"fc": "0.65"}),
+    "loss_by_coalescence": ("unions and their undoing", {"fc": "white", "hatch": "//////"}),
+    "loss_by_load_jump": ("jumps at controlled load", {"fc": "0.85", "hatch": "xxxx"}),
+    "loss_unattributed": ("unattributed", {"fc": "white", "hatch": "...."}),
+}
+# A straight line passes through any two points.
+_LEAST_POINTS = 3
+_FIT_POINTS = 100
+# Areas and losses that both span more than this are drawn on logarithmic axes.
+_SPAN = 30.0
+# Parts that are smaller than this everywhere are not in the legend.
+_LEAST_SHARE = 1e-6
+
+
+class LinearFit(NamedTuple):
+    """A straight line by least squares, its coefficient of determination, and the exponent of a power law.
+
+    The coefficient is None where y is constant, the exponent where x or y is not positive.
+    """
+
+    slope: float
+    intercept: float
+    r_squared: float | None
+    exponent: float | None
+
+
+@styled
+def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy: bool = True) -> Figure:
+    """Draw the loss of all runs of the studies, averaged over the seeds.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    studies : names of the studies; those that differ in their largest load only make up the lines.
+    over_surface_energy : whether the loss is drawn over the surface energy (without runs that have none) or in J/m².
+
+    Raises
+    ------
+    ValueError
+        If there is no such study, no run of a study was unloaded to complete separation, or none has adhesion where
+        the loss is over the surface energy.
+    """
+    studies = several("studies", studies)
+    # Of every line the runs of every study, by seed.
+    runs: dict[tuple, dict[str, dict[int, xr.Dataset]]] = {}
+    for study in studies:
+        for labels, run in detached_runs(campaign, study):
+            line = runs.setdefault((labels.material, labels.surface, labels.rms_slope), {})
+            line.setdefault(study, {})[labels.seed] = run
+    lines = Lines(campaign, studies, list(runs))
+    sticky = {key: line for key, line in runs.items() if lines.adhesive(key[0])}
+    if over_surface_energy and not sticky:
+        raise ValueError(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
+
+    fig = new_figure(TWO_COLUMNS, 3.1)
+    loss, parts = fig.subplots(1, 2, width_ratios=(1.25, 1)) if sticky else (fig.subplots(), None)
+    quantity = "hysteresis_loss_over_surface_energy" if over_surface_energy else "hysteresis_loss"
+    drawn = {
+        key: averages([{seed: _point(run, quantity) for seed, run in seeds.items()} for seeds in line.values()])
+        for key, line in (sticky if over_surface_energy else runs).items()
+    }
+    largest = max(np.abs(line.y).max() for line in drawn.values())
+    factor, unit = (1.0, "") if over_surface_energy else unit_for(largest, "J/m²")
+    handles = {}
+    for key, line in drawn.items():
+        line = line._replace(y=factor * line.y, y_deviation=factor * line.y_deviation)
+        look = {"color": lines.colour(key), "ls": "none"} | lines.marker(key)
+        points = draw_averages(loss, line, **look)
+        fit = linear_fit(line.x, line.y) if line.same_seeds else None
+        if fit is not None:
+            along = np.linspace(line.x.min(), line.x.max(), _FIT_POINTS)
+            loss.plot(along, fit.intercept + fit.slope * along, color=lines.colour(key), lw=0.9, zorder=2)
+        handles[lines.name(key) + _words(fit)] = points
+    x, y = (np.concatenate([getattr(line, name) for line in drawn.values()]) for name in "xy")
+    if all(np.all(values > 0) and values.max() > _SPAN * values.min() for values in (x, y)):
+        loss.set_xscale("log")
+        loss.set_yscale("log")
+    loss.axhline(0, color=GREY, lw=0.6, zorder=1)
+    loss.set_xlabel(r"contact area at the largest load  $A/A_0$")
+    loss.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")
+    panel_label(loss, "a")
+    if sticky:
+        shown = _draw_parts(parts, sticky, lines)
+        panel_label(parts, "b")
+        handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
+    legend_below(fig, handles)
+    return fig
+
+
+def _point(run, quantity):
+    return float(run["largest_contact_area_fraction"]), float(run[quantity])
+
+
+def linear_fit(x: np.ndarray, y: np.ndarray) -> LinearFit | None:
+    """Least squares through points; None of fewer than three different x."""
+    if len(np.unique(x)) < _LEAST_POINTS:
+        return None
+    line = linregress(x, y)
+    powers = np.all(x > 0) and np.all(y > 0)
+    return LinearFit(
+        float(line.slope),
+        float(line.intercept),
+        float(line.rvalue**2) if np.ptp(y) > 0 else None,
+        float(linregress(np.log(x), np.log(y)).slope) if powers else None,
+    )
+
+
+def _words(fit):
+    """What the legend says of a fit."""
+    if fit is None:
+        return ""
+    words = [] if fit.r_squared is None else [f"$r^2$ = {fit.r_squared:.4f}"]
+    words += [] if fit.exponent is None else [f"exponent {fit.exponent:.2f}"]
+    return ": " + ", ".join(words) if words else ""
+
+
+def shares(line: dict[str, dict[int, xr.Dataset]]) -> dict[str, float]:
+    """Parts of the loss at the largest load of a line, means over the seeds, over the sum of their magnitudes."""
+    top = max(
+        line.values(), key=lambda seeds: np.mean([float(run["largest_reduced_pressure"]) for run in seeds.values()])
+    )
+    found = {name: np.mean([float(run[name]) for run in top.values()]) for name in PARTS}
+    total = sum(map(abs, found.values()))
+    return {name: value / total if total > 0 else 0.0 for name, value in found.items()}
+
+
+def _draw_parts(ax, runs, lines):
+    """Draw a bar for every line; the parts that are there."""
+    bars = {key: shares(line) for key, line in runs.items()}
+    shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
+    for place, (key, bar) in enumerate(bars.items()):
+        above, below = 0.0, 0.0
+        for name in shown:
+            share = 100 * bar[name]
+            ax.bar(place, share, 0.8, bottom=above if share > 0 else below, ec="black", lw=0.4, **PARTS[name][1])
+            above, below = above + max(share, 0), below + min(share, 0)
+        ax.plot(place, -0.055, ls="none", transform=ax.get_xaxis_transform(), clip_on=False, **lines.marker(key))
+    ax.axhline(0, color="black", lw=0.6)
+    ax.set_xlim(-0.7, len(bars) - 0.3)
+    ax.set_xticks([])
+    ax.set_xlabel("lines of (a), at their largest load", labelpad=14)
+    ax.set_ylabel("share of the loss (%)")
+    return shown

@@ -1,0 +1,185 @@
+"""Fig. 16: where and when contacts form and break on the way in and on the way back."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from icha.figures.curves import SEPARATION_LABEL
+from icha.figures.fig4_contact_map import _means, _show_whole
+from icha.figures.hysteresis import BRANCH_DASHES, legend_below, slope_label, unloaded_runs
+from icha.figures.select import pick, ways_back
+from icha.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    TWO_COLUMNS,
+    VERMILLION,
+    material_label,
+    new_figure,
+    panel_label,
+    styled,
+    unit_for,
+)
+
+CAPTION = (
+    "(a) Where spots formed on the first way in and where they broke on the last way back, over the topography of one "
+    "period (the highest parts are white). With adhesion a spot forms by a jump into contact and breaks by a jump "
+    "off; without adhesion it forms and breaks where the surfaces touch, without a jump. Unions of two spots, and "
+    "united spots that fell back into their asperities, are marked at the centre of the united spot. The numbers in "
+    "the legend count the marks. (b) How many such events there have been on the way in (solid, from the right) and "
+    "on the way back (dashed, from the left), against the mean separation, of every kind that occurred there."
+)
+
+
+class _Kind(NamedTuple):
+    """An event: what it is called with and without adhesion, on which branch it is on the map, and its look."""
+
+    names: tuple[str, str]
+    branch: str
+    look: dict
+
+
+_KINDS = {
+    "jump_in": _Kind(("jump into contact", "contact formed"), "loading", {"marker": "o", "mfc": BLUE, "mec": BLUE}),
+    "jump_off": _Kind(("jump off", "contact broken"), "unloading", {"marker": "o", "mfc": "none", "mec": VERMILLION}),
+    "coalescence": _Kind(("union",) * 2, "loading", {"marker": "x", "mec": GREEN}),
+    "split": _Kind(("union undone",) * 2, "unloading", {"marker": "+", "mec": BLACK}),
+}
+# Of so many events the marks have this size in points; of more they cover about the same part of the map.
+_FEW = 60
+_SIZE = 5.0
+_LEAST_SIZE = 1.6
+
+
+@styled
+def figure(
+    campaign: xr.DataTree,
+    surface: xr.Dataset,
+    *,
+    study: str,
+    surface_name: str | None = None,
+    seed: int | None = None,
+    rms_slope: float | None = None,
+    material: str | None = None,
+) -> Figure:
+    """Draw the events of one run.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    surface : the surface file's dataset; it must be the topography of the run that is drawn.
+    study : name of the study; its runs are unloaded, at least in part.
+    surface_name, seed, rms_slope, material : which run; what is left out is the study's first. For the material that
+        is the first one with adhesion, if there is any.
+
+    Raises
+    ------
+    ValueError
+        If there is no such run, it was not unloaded, or the surface is another one's.
+    """
+    labels, run = _run(unloaded_runs(campaign, study), study, surface_name, seed, rms_slope, material)
+    period = float(run["period"])
+    if not np.isclose(float(surface["period"]), period, rtol=1e-9) or int(surface["grid"]) != int(run["grid"]):
+        raise ValueError(f"{labels}: the surface given has another period or grid")
+    if "seed" in surface and int(surface["seed"]) != labels.seed:
+        raise ValueError(f"{labels}: the surface given has seed {int(surface['seed'])}")
+    adhesive = float(run["surface_energy"]) > 0
+    events = _events(run)
+
+    fig = new_figure(TWO_COLUMNS, 3.1)
+    where, when = fig.subplots(1, 2, width_ratios=(1.3, 1))
+    heights = surface["height"].transpose("y", "x").values * float(run["rms_height"]) / float(surface["rms_height"])
+    length, length_unit = unit_for(period, "m")
+    height, height_unit = unit_for(float(np.abs(heights).max()), "m")
+    highest = float(np.abs(heights).max()) * height
+    side = period * length
+    # Light, so that the marks show.
+    look = {"origin": "lower", "cmap": "gray", "vmin": -2.2 * highest, "vmax": highest}
+    image = _show_whole(where, _means(heights) * height, len(heights), side, **look)
+    marks = {
+        name: np.flatnonzero((events["kind"] == name) & (events["branch"] == kind.branch))
+        for name, kind in _KINDS.items()
+    }
+    size = max(_LEAST_SIZE, _SIZE * min(1.0, (_FEW / max(map(len, marks.values()), default=1)) ** 0.5))
+    handles = {}
+    for name, own in marks.items():
+        kind = _KINDS[name]
+        # A ring around a dot: a spot that formed and broke at the same place.
+        ring = 1.6 if name == "jump_off" else 1.0
+        look = {"ls": "none", "ms": ring * size, "mew": 0.9} | kind.look
+        (points,) = where.plot(events["x"][own] * length, events["y"][own] * length, **look)
+        if len(own):
+            handles[f"{kind.names[0 if adhesive else 1]} ({len(own)})"] = points
+    where.set_xlim(0, side)
+    where.set_ylim(0, side)
+    where.set_xlabel(f"x ({length_unit})")
+    where.set_ylabel(f"y ({length_unit})")
+    where.tick_params(direction="out", top=False, right=False)
+    bar = fig.colorbar(image, ax=where, shrink=0.9, pad=0.02, aspect=28)
+    bar.set_label(f"height ({height_unit})")
+    bar.ax.set_ylim(-highest, highest)
+
+    for name, kind in _KINDS.items():
+        for branch, dashes in BRANCH_DASHES.items():
+            own = (events["kind"] == name) & (events["branch"] == branch)
+            if own.any():
+                _draw_count(when, events["separation"][own], color=kind.look["mec"], ls=dashes, lw=1.1)
+    most = max((line.get_ydata()[-1] for line in when.get_lines()), default=1)
+    if most > _FEW:
+        when.set_yscale("log")
+        when.set_ylim(bottom=0.8)
+    else:
+        when.set_ylim(0, 1.06 * most)
+        when.yaxis.set_major_locator(MaxNLocator(integer=True))
+    when.set_xlabel(SEPARATION_LABEL)
+    when.set_ylabel("events so far")
+    title = f"{material_label(campaign[study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
+    when.set_title(title, loc="right", fontsize="small")
+    for ax, letter in ((where, "a"), (when, "b")):
+        panel_label(ax, letter)
+    handles |= {name: Line2D([], [], color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
+    legend_below(fig, handles, columns=3)
+    return fig
+
+
+def _run(runs, study, surface, seed, slope, material):
+    """The first of the runs asked for, with adhesion if there is one and nothing else is asked."""
+    runs = [(labels, run) for labels, run in runs if surface in (None, labels.surface)]
+    runs = [(labels, run) for labels, run in runs if seed in (None, labels.seed)]
+    runs = [(labels, run) for labels, run in runs if slope is None or np.isclose(slope, labels.rms_slope)]
+    if not runs:
+        raise ValueError(f"study {study}: no unloaded run of surface {surface}, seed {seed}, rms slope {slope}")
+    adhesive = [labels.material for labels, run in runs if float(run["surface_energy"]) > 0]
+    material = pick("material", material, adhesive + [labels.material for labels, _ in runs])
+    return next((labels, run) for labels, run in runs if labels.material == material)
+
+
+def _events(run):
+    """Kind, branch, place (m) and separation (h_rms) of the events of the first loading and of the last way back."""
+    kind = run["event_kind"]
+    names = dict(
+        zip(np.atleast_1d(kind.attrs["flag_values"]).tolist(), kind.attrs["flag_meanings"].split(), strict=True)
+    )
+    steps = run["event_step"].values.astype(int)
+    leg = run["leg"].sel(step=steps).values
+    back = ways_back(run)[-1]["leg"].values[-1]
+    own = (leg == 0) | (leg == back)
+    return {
+        "kind": np.array([names[int(value)] for value in kind.values], dtype=object)[own],
+        "branch": run["branch"].sel(step=steps).values.astype(object)[own],
+        "x": run["event_x"].values[own],
+        "y": run["event_y"].values[own],
+        "separation": run["event_separation"].values[own] / float(run["rms_height"]),
+    }
+
+
+def _draw_count(ax, separation, **look):
+    """Draw how many events there have been, from none on, in the order in which they come."""
+    ax.plot(np.append(separation[0], separation), np.arange(len(separation) + 1), drawstyle="steps-post", **look)

@@ -1,0 +1,192 @@
+"""Runs that were unloaded: their branches, means over their seeds, and one look for all figures that show them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from icha.figures.curves import UNLOADING
+from icha.figures.errors import _interfaces
+from icha.figures.select import study_runs, ways_back
+from icha.figures.style import COLOURS, GREY, MARKERS, material_label
+from icha.labels import RunLabels
+
+# More names than this are written smaller.
+_MANY_NAMES = 12
+BRANCH_DASHES = {"loading": "-", "unloading": UNLOADING["ls"]}
+
+
+def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
+    """The runs of a study with a way back.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study, or no run in it was unloaded.
+    """
+    runs = [(labels, run) for labels, run in study_runs(campaign, study) if ways_back(run)]
+    if not runs:
+        raise ValueError(f"study {study}: no run was unloaded, so there is no way back to draw")
+    return runs
+
+
+def detached_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
+    """The runs of a study that were unloaded to complete separation, so that they have a pull-off and a loss.
+
+    Raises
+    ------
+    ValueError
+        If there is no such study, or no such run in it.
+    """
+    runs = [(labels, run) for labels, run in unloaded_runs(campaign, study) if "hysteresis_loss" in run]
+    if not runs:
+        raise ValueError(f"study {study}: no run was unloaded to complete separation")
+    return runs
+
+
+def pull_off_step(run: xr.Dataset) -> int | None:
+    """The step of largest tension on the last unloading; None where there is no tension on it."""
+    back = ways_back(run)[-1]
+    lowest = int(np.argmin(back["nominal_pressure"].values))
+    step = np.flatnonzero(run["step"].values == back["step"].values[lowest])[0]
+    return int(step) if run["nominal_pressure"].values[step] < 0 else None
+
+
+class Averages(NamedTuple):
+    """Means over seeds of the points of a line, their standard deviations, and whether all are of the same seeds."""
+
+    x: np.ndarray
+    y: np.ndarray
+    x_deviation: np.ndarray
+    y_deviation: np.ndarray
+    same_seeds: bool
+
+
+def averages(points: Sequence[Mapping[int, tuple[float, float]]]) -> Averages:
+    """Means over the seeds that all points of a line have, or over each point's own where they share none.
+
+    Parameters
+    ----------
+    points : for every point of the line x and y of every seed.
+
+    Returns
+    -------
+    Averages in the order of x; deviations of a single seed are 0.
+    """
+    common = set.intersection(*(set(point) for point in points))
+    samples = [np.array([point[seed] for seed in sorted(common or point)]) for point in points]
+    mean = np.array([sample.mean(axis=0) for sample in samples])
+    deviation = np.array([sample.std(axis=0, ddof=1) if len(sample) > 1 else np.zeros(2) for sample in samples])
+    order = np.argsort(mean[:, 0], kind="stable")
+    return Averages(*mean[order].T, *deviation[order].T, bool(common))
+
+
+def draw_averages(axes, line: Averages, **look):
+    """Draw the points of a line with bars where there is scatter."""
+    bars = {
+        name: deviation if np.any(deviation > 0) else None
+        for name, deviation in (("xerr", line.x_deviation), ("yerr", line.y_deviation))
+    }
+    return axes.errorbar(line.x, line.y, **bars, elinewidth=0.6, capsize=1.5, **look)
+
+
+class Lines:
+    """Look and name of every line of a figure: a colour for every material, a marker for every surface and slope.
+
+    The markers of lines without adhesion are open. A figure of one material has a colour for every surface and slope.
+    """
+
+    def __init__(self, campaign: xr.DataTree, studies: Sequence[str], keys: Sequence[tuple]):
+        """Take the studies that are drawn, and material, surface and slope (None: not told apart) of every line."""
+        self.keys = list(dict.fromkeys(keys))
+        self.materials = list(dict.fromkeys(material for material, *_ in self.keys))
+        self.places = list(dict.fromkeys((surface, slope) for _, surface, slope in self.keys))
+        self.interfaces = _interfaces({study: campaign[study].to_dataset() for study in studies}, self.materials)
+
+    def adhesive(self, material: str) -> bool:
+        """Whether a material has surface energy."""
+        return float(self.interfaces["surface_energy"].sel(material=material)) > 0
+
+    def colour(self, key: tuple) -> str:
+        """Colour of a line."""
+        material, *place = key
+        if len(self.materials) == 1:
+            return COLOURS[self.places.index(tuple(place)) % len(COLOURS)]
+        return COLOURS[(self.materials.index(material) + 1) % len(COLOURS)]
+
+    def marker(self, key: tuple) -> dict:
+        """Look of a line's markers, arguments of `Axes.plot`."""
+        material, *place = key
+        colour = self.colour(key)
+        return {
+            "marker": MARKERS[self.places.index(tuple(place)) % len(MARKERS)],
+            "mec": colour,
+            "mfc": colour if self.adhesive(material) else "white",
+            "mew": 0.8,
+            "ms": 4,
+        }
+
+    def handles(self, **look) -> dict[str, Line2D]:
+        """Legend of what tells the lines apart: materials by colour, surfaces and slopes by marker, in `look`."""
+        first = self.places[0]
+        if len(self.materials) == 1:
+            return {
+                self.name(key): Line2D([], [], color=self.colour(key), **look | self.marker(key)) for key in self.keys
+            }
+        handles = {
+            material_label(self.interfaces, material): Line2D(
+                [], [], color=self.colour((material, *first)), **look | self.marker((material, *first))
+            )
+            for material in self.materials
+        }
+        # Places that are not told apart by slope have the first marker, which the materials show.
+        for place in self.places if len(self.places) > 1 else []:
+            name = self._place_name(place)
+            if name:
+                grey = {"mec": GREY, "mfc": GREY, "ls": "none"}
+                handles[name] = Line2D([], [], **look | self.marker((self.materials[0], *place)) | grey)
+        return handles
+
+    def _place_name(self, place):
+        surface, slope = place
+        parts = [surface] if len({each for each, _ in self.places}) > 1 else []
+        if slope is not None and len({each for _, each in self.places}) > 1:
+            parts.append(slope_label(slope))
+        return ", ".join(parts)
+
+    def name(self, key: tuple) -> str:
+        """What a line is called: what tells it apart in this figure."""
+        material, *place = key
+        parts = [material_label(self.interfaces, material)] if len(self.materials) > 1 else []
+        parts.append(self._place_name(place))
+        return ", ".join(filter(None, parts)) or material_label(self.interfaces, material)
+
+
+def slope_label(slope: float) -> str:
+    """An rms slope in text."""
+    return rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"
+
+
+def legend_below(figure: Figure, handles: Mapping[str, object], columns: int = 2) -> None:
+    """Add a legend below the panels; the figure grows by its height."""
+    size = 8 if len(handles) <= _MANY_NAMES else 7
+    figure.set_figheight(figure.get_figheight() + 0.06 + 0.0194 * size * -(-len(handles) // columns))
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)
+
+
+def several(name: str, studies: Sequence[str]) -> list[str]:
+    """The studies of an argument, each once.
+
+    Raises
+    ------
+    ValueError
+        If it is not a list, or empty.
+    """
+    if isinstance(studies, str) or not studies:
+        raise ValueError(f"{name}: {studies!r} is not a list of at least one study")
+    return list(dict.fromkeys(studies))
