@@ -1,0 +1,180 @@
+"""Runs both ways of asperities that do not feel each other: JKR's law of every one of them, in closed form.
+
+They have the variables of a simulated run that is unloaded; their pressure, area, work and losses are exact.
+"""
+
+from functools import cache
+
+import numpy as np
+import xarray as xr
+
+import icha
+from icha.campaign import RunLabels, campaign_tree
+from icha.jkr import JKR
+
+PERIOD, GRID, RMS_HEIGHT, RADIUS = 100e-6, 32, 0.5e-6, 4e-6
+COUNT = 30
+MATERIALS = {
+    "sticky": icha.Material(1e6, 0.05, 20e-9),
+    "weak": icha.Material(1e6, 0.01, 20e-9),
+    "hertz": icha.Material(1e6, 0.0, 20e-9),
+}
+EVENTS = ("jump_in", "jump_off", "coalescence", "split")
+
+
+class Asperities:
+    """Paraboloids of one radius and different heights, all pressed by the same half-space, each on its own."""
+
+    def __init__(self, material, rms_slope=1.0, seed=1):
+        rng = np.random.default_rng(seed)
+        # Steeper is higher and sharper.
+        self.height = RMS_HEIGHT * rms_slope * np.sort(rng.normal(size=COUNT))[::-1]
+        self.position = rng.uniform(0, PERIOD, (COUNT, 2))
+        self.radius = RADIUS / rms_slope
+        self.law, self.material = JKR(material), material
+        self.rms_height, self.rms_slope = RMS_HEIGHT * rms_slope, rms_slope
+
+    @property
+    def jump_in(self):
+        """Mean separations at which contacts form, m."""
+        return self.height - self.law.jump_in_approach(self.radius)
+
+    @property
+    def jump_off(self):
+        """Mean separations at which contacts break, m."""
+        return self.height - self.law.jump_off_approach(self.radius)
+
+    def energy(self, approach):
+        """Elastic and adhesive energy of a contact, J: the integral of JKR's force along its curve from a = 0."""
+        a, R = self.law.contact_radius(approach, self.radius), self.radius
+        E, gamma = self.material.contact_modulus, self.material.surface_energy
+        neck = np.sqrt(2 * np.pi * gamma * E)
+        return 8 / 15 * E * a**5 / R**2 - 4 / 3 * neck * a**3.5 / R + np.pi * gamma * a**2
+
+    def state(self, separation, touching):
+        """Pressure (Pa), area fraction and stored energy (J/m^2) of some of the asperities in contact."""
+        approach = (self.height - separation)[touching]
+        a = self.law.contact_radius(approach, self.radius)
+        values = np.sum(self.law.force(a, self.radius)), np.pi * np.sum(a**2), np.sum(self.energy(approach))
+        return np.array(values) / PERIOD**2
+
+    def run(self, depth, points=60, seed=1):
+        """Down to a mean separation of -`depth` rms heights, and back, as a dataset."""
+        lowest = -depth * self.rms_height
+        formed = np.flatnonzero(self.jump_in >= lowest)
+        grid = np.linspace(1.05 * max(self.jump_in.max(), self.jump_off.max()), lowest, points)
+        # (separation, leg, asperities in contact, event); every event has a step before it and one after it.
+        steps, touching = [], np.zeros(COUNT, bool)
+        ways = ((0, grid, self.jump_in, -1), (1, grid[-2::-1], self.jump_off, 1))
+        for leg, stops, event_at, sign in ways:
+            moves = [(u, -1) for u in stops] + [(event_at[k], k) for k in formed]
+            for u, k in sorted(moves, key=lambda move: (sign * move[0], move[1])):
+                steps.append((u, leg, touching, -1))
+                if k >= 0:
+                    touching = touching.copy()
+                    touching[k] = leg == 0
+                    steps.append((u, leg, touching, k))
+        return self._dataset(steps, seed)
+
+    def _dataset(self, steps, seed):
+        u, leg, event = (
+            np.array(column) for column in list(zip(*[(u, leg, k) for u, leg, _, k in steps], strict=True))
+        )
+        pressure, area, stored = np.array([self.state(u, touching) for u, _, touching, _ in steps]).T
+        released = np.zeros((2, len(steps)))
+        for at in np.flatnonzero(event >= 0):
+            released[leg[at], at] = stored[at - 1] - stored[at]
+        jump_in, jump_off = np.cumsum(released, axis=1)
+        work = stored + jump_in + jump_off
+        unit = self.material.contact_modulus * self.rms_slope
+        gamma = self.material.surface_energy
+        back = np.flatnonzero(leg == 1)
+        weakest = back[np.argmin(pressure[back])]
+        tension = max(-pressure[weakest], 0.0)
+        last = np.flatnonzero(event >= 0)[-1] - 1
+        found = np.flatnonzero(event >= 0)
+        per_step = {
+            "mean_separation": u,
+            "nominal_pressure": pressure,
+            "contact_area_fraction": area,
+            "spot_count": np.array([np.count_nonzero(touching) for _, _, touching, _ in steps]),
+            "converged": np.ones(len(steps), np.int8),
+            "leg": leg,
+            "reduced_pressure": pressure / unit,
+            "reduced_separation": u / self.rms_height,
+            "step_kind": np.full(len(steps), "path", object),
+            "step_target": u,
+            "work": work,
+            "stored_energy": stored,
+            "dissipated_by_jump_in": jump_in,
+            "dissipated_by_jump_off": jump_off,
+            "dissipated_by_coalescence": 0 * u,
+            "dissipated_by_load_jump": 0 * u,
+        }
+        per_event = {
+            "event_kind": leg[found].astype(np.int8),
+            "event_step": found,
+            "event_separation": u[found],
+            "event_x": self.position[event[found], 0],
+            "event_y": self.position[event[found], 1],
+            "event_members": np.ones(len(found), int),
+        }
+        per_run = {
+            "contact_modulus": self.material.contact_modulus,
+            "surface_energy": gamma,
+            "interaction_range": self.material.interaction_range,
+            "rms_slope": self.rms_slope,
+            "rms_height": self.rms_height,
+            "period": PERIOD,
+            "grid": GRID,
+            "seed": seed,
+            "control": "separation",
+            "pull_off_pressure": tension,
+            "pull_off_separation": u[weakest],
+            "pull_off_over_strength": tension / (16 * gamma / (9 * np.sqrt(3) * 20e-9)) if gamma else 0.0,
+            "pull_off_over_summits": tension / (1.5 * np.pi * gamma * COUNT * self.radius / PERIOD**2)
+            if gamma
+            else 0.0,
+            "detachment_pressure": pressure[last],
+            "detachment_separation": u[last],
+            "hysteresis_loss": work[-1],
+            "hysteresis_loss_over_surface_energy": work[-1] / gamma if gamma else 0.0,
+            "loss_by_jump_in": jump_in[-1],
+            "loss_by_jump_off": jump_off[-1],
+            "loss_by_coalescence": 0.0,
+            "loss_by_load_jump": 0.0,
+            "loss_unattributed": 0.0,
+            "largest_contact_area_fraction": area.max(),
+            "largest_reduced_pressure": pressure.max() / unit,
+        }
+        described = {"units": "1", "long_name": "test"}
+        flags = {"flag_values": np.arange(4, dtype=np.int8), "flag_meanings": " ".join(EVENTS)}
+        variables = {name: ("step", values, described) for name, values in per_step.items()}
+        variables |= {name: ("event", values, described) for name, values in per_event.items()}
+        variables |= {name: ((), value, described) for name, value in per_run.items()}
+        variables["event_kind"] = ("event", per_event["event_kind"], described | flags)
+        branch = np.where(leg == 0, "loading", "unloading").astype(object)
+        return xr.Dataset(
+            variables, {"step": ("step", np.arange(len(u)), described), "branch": ("step", branch, described)}
+        )
+
+
+@cache
+def run(material="sticky", rms_slope=1.0, seed=1, depth=0.5):
+    """A run of one of the materials."""
+    return Asperities(MATERIALS[material], rms_slope, seed).run(depth, seed=seed)
+
+
+def study(name, materials=("sticky", "hertz"), slopes=(1.0, 0.5), seeds=(1, 2), depth=0.5):
+    """Labels and runs of a study."""
+    return [
+        (RunLabels(name, "rough", seed, slope, material), run(material, slope, seed, depth))
+        for seed in seeds
+        for slope in slopes
+        for material in materials
+    ]
+
+
+def tree(*studies):
+    """A campaign of studies."""
+    return campaign_tree([run for study in studies for run in study], attrs={"title": "Test", "summary": "For tests."})
