@@ -25,8 +25,8 @@ class RunLabels(NamedTuple):
         return self.path
 
 
-class SourceLabels(NamedTuple):
-    """Which study of the sources of the error: the entry that asks for it, and what is pressed against what."""
+class ContactLabels(NamedTuple):
+    """What an entry beside a study asks for: the entry, and what is pressed against what."""
 
     entry: str
     surface: str

@@ -6,8 +6,8 @@ import hashlib
 import itertools
 import json
 
-from icha.configuration.model import BesideStudy, Campaign, SelfAffineSurface
-from icha.labels import RunLabels, SolutionLabels, SourceLabels, number_label
+from icha.configuration.model import BesideStudy, Campaign, MapFigure, SelfAffineSurface, SnapMapFigure
+from icha.labels import ContactLabels, RunLabels, SolutionLabels, number_label
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
@@ -31,12 +31,19 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
     ]
 
 
-def source_cases(campaign: Campaign) -> list[SourceLabels]:
+def source_cases(campaign: Campaign) -> list[ContactLabels]:
     """All studies of the sources of the model's error, entry by entry."""
+    return _cases(campaign, campaign.error_sources)
+
+
+def loop_cases(campaign: Campaign) -> list[ContactLabels]:
+    """All boundary elements both ways of a campaign, entry by entry."""
+    return _cases(campaign, campaign.boundary_element_loops)
+
+
+def _cases(campaign: Campaign, entries: dict[str, BesideStudy]) -> list[ContactLabels]:
     return [
-        SourceLabels(label, *contact)
-        for label, entry in campaign.error_sources.items()
-        for contact in _contacts(campaign, entry)
+        ContactLabels(label, *contact) for label, entry in entries.items() for contact in _contacts(campaign, entry)
     ]
 
 
@@ -50,10 +57,17 @@ def _contacts(campaign: Campaign, entry: BesideStudy) -> list[tuple[str, int, fl
     ]
 
 
-def source_settings(campaign: Campaign, case: SourceLabels) -> dict:
+def source_settings(campaign: Campaign, case: ContactLabels) -> dict:
     """Everything but the topography that determines a study of the sources of the error, in SI units."""
     entry = campaign.error_sources[case.entry]
     return _solver_settings(campaign, entry, case) | {"reduced_pressures": entry.reduced_pressures}
+
+
+def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
+    """Everything but the topography that determines boundary elements both ways, in SI units."""
+    entry = campaign.boundary_element_loops[case.entry]
+    own = {"largest_reduced_pressure": campaign.loop_load(entry), "separation_step": entry.separation_step}
+    return _solver_settings(campaign, entry, case) | own
 
 
 def asperity_cases(campaign: Campaign) -> dict[str, float | None]:
@@ -75,14 +89,13 @@ def map_solution(campaign: Campaign) -> SolutionLabels | None:
         return None
     if kind != "reduced_pressure":
         return None
-    run = map_case(campaign)
+    run = map_case(campaign, figure)
     found = [case for case in solution_cases(campaign) if case.run == run and case.reduced_pressure == value]
     return max(found, key=lambda case: campaign.boundary_elements[case.entry].refinement, default=None)
 
 
-def map_case(campaign: Campaign) -> RunLabels:
-    """The run that the contact map (figure 4) shows: of its study's first, with adhesion if it does not say."""
-    figure = campaign.figures.fig4_contact_map
+def map_case(campaign: Campaign, figure: MapFigure | SnapMapFigure) -> RunLabels:
+    """The run that a map (figures 4 and 16) shows: of its study's first, with adhesion if it does not say."""
     cases = [
         case
         for case in run_cases(campaign)
@@ -101,7 +114,7 @@ def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
     return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
 
 
-def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabels | SourceLabels) -> dict:
+def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabels | ContactLabels) -> dict:
     """What boundary elements are told but for their loads."""
     return {
         "material": campaign.materials[case.material].model_dump(),
@@ -119,11 +132,9 @@ def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
 
 def run_settings(campaign: Campaign, case: RunLabels) -> dict:
     """Everything that determines a run's numbers, in SI units: arguments of the model's own objects."""
-    study = campaign.studies[case.study]
-    targets = study.targets.model_dump(exclude_none=True)
     return {
         "material": campaign.materials[case.material].model_dump(),
-        "path": targets | {"snapshots": campaign.snapshots_of(case.study), "max_step": study.max_step},
+        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
         "rms_slope": case.rms_slope,
         "seed": case.seed,
     }

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from icha.configuration.height_map import read_height_map
 from icha.configuration.measurement import read_columns
-from icha.configuration.model import NAME_PATTERN, Campaign, FileSurface
+from icha.configuration.model import BESIDE_STUDIES, NAME_PATTERN, Campaign, FileSurface
 
 
 class ConfigurationError(ValueError):
@@ -198,6 +198,7 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
         "materials": model.Material,
         "studies": model.Study,
         "boundary_elements": model.BoundaryElements,
+        "boundary_element_loops": model.BoundaryElementLoops,
         "error_sources": model.ErrorSources,
         "measurements": model.Measurement,
         "authors": model.Author,
@@ -216,7 +217,7 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
     if len(location) == 2:
         return sections.get(location[0])
     if location[0] == "studies":
-        return model.Targets if location[2] == "targets" else model.Snapshot
+        return {"targets": model.Targets, "turning_points": model.TurningPoint}.get(location[2], model.Snapshot)
     if location[0] == "figures":
         return model.Snapshot
     return model.Column if location[0] == "measurements" else None
@@ -235,7 +236,7 @@ def _problems_of_files(campaign: Campaign) -> Iterable[tuple[tuple, Any, str]]:
             except ValueError as error:
                 yield ("surfaces", name, "path"), surface.path, str(error)
                 continue
-            for section in ("boundary_elements", "error_sources"):
+            for section in BESIDE_STUDIES:
                 for label, entry in getattr(campaign, section).items():
                     if name in campaign.solved(entry)["surfaces"]:
                         yield from campaign.unresolved(section, label, name, len(heights))

@@ -31,6 +31,8 @@ from icha.material import Material as Interface
 NAME_PATTERN = r"^[a-z0-9_-]+$"
 # Nodes along a side of a surface or of boundary elements.
 MAX_GRID = 32768
+# Sections of entries that belong to a study.
+BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
 # Rounding of the quotient of two lengths must not decide whether a wave has its cells.
 _ROUNDING = 1e-9
 
@@ -84,6 +86,12 @@ def _integer(least, most=2**31 - 1):
     return Annotated[int, BeforeValidator(read), WithJsonSchema(schema)]
 
 
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError("is neither true nor false; allowed: true, false")
+    return value
+
+
 def _distinct(values):
     for index, value in enumerate(values):
         if value in values[:index]:
@@ -123,6 +131,7 @@ ReducedPressure = _number(
 )
 AreaFraction = _number(f"a number in (0, {MAX_AREA_FRACTION}], which the model covers", above=0, most=MAX_AREA_FRACTION)
 Positive = _number("a number greater than 0", above=0)
+Flag = Annotated[bool, BeforeValidator(_flag)]
 
 
 class Section(BaseModel):
@@ -280,8 +289,27 @@ def _names(description):
     return Annotated[list[Name], Field(min_length=1, description=description), AfterValidator(_distinct)]
 
 
+class TurningPoint(Section):
+    """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
+
+    reduced_pressure: (
+        _number(f"a number of at most {MAX_REDUCED_PRESSURE}, which the model covers", most=MAX_REDUCED_PRESSURE) | None
+    ) = Field(default=None, description="At this p/(E* h'rms).")
+    relative_load: _number("a number") | None = Field(default=None, description="At this p/E* = F/(E* A0).")
+    area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
+    mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
+
+    _check = model_validator(mode="after")(_exactly_one)
+
+    @property
+    def target(self) -> tuple[str, float]:
+        """Kind and value (SI units) of the state."""
+        ((kind, value),) = self.model_dump(exclude_none=True).items()
+        return kind, value
+
+
 class Study(Section):
-    """Every surface, seed, slope and material of the lists, each with each, along one loading path."""
+    """Every surface, seed, slope and material of the lists, each with each, along one path."""
 
     surfaces: _names("Names of surfaces.")
     seeds: Annotated[list[_integer(0)], Field(min_length=1), AfterValidator(_distinct)] = Field(
@@ -295,6 +323,24 @@ class Study(Section):
     snapshots: Annotated[list[Snapshot], AfterValidator(_distinct)] | None = Field(
         default=None,
         description="States of which spots and distributions are kept; each is hit exactly. Left out: the last target.",
+    )
+    unload: Flag = Field(
+        default=False, description="Whether the surfaces are pulled apart again, until nothing touches any more."
+    )
+    turning_points: list[TurningPoint] = Field(
+        default=[],
+        description="States at which the path turns after its last target: the first ends unloading, the second "
+        "loading again, and so on.",
+    )
+    control: Literal["separation", "load"] = Field(
+        default="separation",
+        description="What is imposed: the mean separation, or the load, under which the state jumps where the curve "
+        "turns back; then all targets and turning points are loads.",
+    )
+    united_until: Literal["detachment", "overlap"] = Field(
+        default="detachment",
+        description="Until when coalesced spots stay one on the way back: until they detach as a whole and fall back "
+        "into their asperities, or until the two spots that they were made of would no longer overlap.",
     )
     max_step: _number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
@@ -312,6 +358,26 @@ class Study(Section):
                         f"pressure of {snapshot.relative_load / slope:g}; allowed: relative loads up to {most:g}"
                     )
         return snapshots
+
+    def check_path(self, snapshots: list[tuple[str, float]] | None) -> None:
+        """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
+        from icha.path import Path  # the solver, which others who read configurations need not wait for
+
+        Path(**self.path_settings(snapshots))
+
+    def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
+        """Arguments of the path of its runs (`icha.Path`); those that are left at their defaults are left out."""
+        settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
+        if self.unload or self.turning_points:
+            settings |= {
+                "unload": self.unload,
+                "turning_points": [point.target for point in self.turning_points],
+                "control": self.control,
+                "united_until": self.united_until,
+            }
+        elif self.control != "separation":
+            settings["control"] = self.control
+        return settings
 
 
 class Column(Section):
@@ -408,19 +474,41 @@ class BesideStudy(Section):
         description="Materials, of the study's. Left out: all. With adhesion the grid must resolve their "
         "`interaction_range`.",
     )
-    reduced_pressures: _stops(ReducedPressure, _increasing) = Field(
-        description="Loads p/(E* h'rms), increasing. Those of `boundary_elements` become snapshots of the study's runs."
-    )
     tolerance: _number("a number in [1e-12, 1e-4]", least=1e-12, most=1e-4) = Field(
         default=1e-8, description="Relative error at which the solver may stop."
     )
 
 
+Loads = Annotated[
+    _stops(ReducedPressure, _increasing),
+    Field(
+        description="Loads p/(E* h'rms), increasing. Those of `boundary_elements` become snapshots of the study's runs."
+    ),
+]
+Refinement = Annotated[
+    _integer(1, 16),
+    Field(description="Cells per cell of the surface's own grid, along a side; heights are interpolated."),
+]
+
+
 class BoundaryElements(BesideStudy):
     """Boundary-element solutions of a study's own topographies, beside its runs."""
 
-    refinement: _integer(1, 16) = Field(
-        default=1, description="Cells per cell of the surface's own grid, along a side; heights are interpolated."
+    reduced_pressures: Loads
+    refinement: Refinement = 1
+
+    @property
+    def coarsest(self) -> int:
+        """Smallest number of cells per cell of the surface's grid."""
+        return self.refinement
+
+
+class BoundaryElementLoops(BesideStudy):
+    """Boundary elements from separation to the largest load of a study's runs and back."""
+
+    refinement: Refinement = 1
+    separation_step: _number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
+        default=0.05, description="Change of the mean gap from one solution to the next, in units of h_rms."
     )
 
     @property
@@ -432,6 +520,7 @@ class BoundaryElements(BesideStudy):
 class ErrorSources(BesideStudy):
     """Variants between the model and boundary elements, each of which changes one thing."""
 
+    reduced_pressures: Loads
     refinement: _integer(1, 16) = Field(
         default=2, description="Cells per cell of the surface's own grid, along a side: even, since half is tried too."
     )
@@ -507,6 +596,51 @@ class ComparedFigure(StudyFigure):
     """A figure of a study's runs beside their boundary elements."""
 
 
+class LoopsFigure(StudyFigure):
+    """A figure of the runs of a study both ways, for one topography."""
+
+    surface: Name | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
+    seed: _integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+
+
+class PullOffFigure(StudyFigure):
+    """A figure of the pull-off of all runs of some studies."""
+
+    load_studies: _names("Studies that differ in their largest load.") | None = Field(
+        default=None, description="Names of studies that differ in their largest load, for a second panel."
+    )
+    quantity: Literal["pull_off_pressure", "pull_off_over_strength", "pull_off_over_summits"] = Field(
+        default="pull_off_pressure",
+        description="What is drawn: the largest tension, or its part of the interface's strength or of what all "
+        "asperities could pull at once.",
+    )
+
+    @property
+    def studies(self) -> list[str]:
+        """All studies that are drawn."""
+        return list(dict.fromkeys([self.study, *(self.load_studies or [])]))
+
+
+class LossFigure(Section):
+    """A figure of the energy lost in the runs of some studies."""
+
+    studies: _names("Studies that are drawn; those that differ in their largest load only make up the lines.")
+    over_surface_energy: Flag = Field(
+        default=True, description="Whether the loss is drawn over the surface energy, or in J/m²."
+    )
+
+
+class SnapMapFigure(StudyFigure):
+    """A figure of the events of one run; what is left out is the study's first."""
+
+    surface: Name | None = Field(default=None, description="Surface that is shown.")
+    seed: _integer(0) | None = Field(default=None, description="Seed that is shown.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
+    material: Name | None = Field(
+        default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
+    )
+
+
 class SourcesFigure(Section):
     """A figure of where the model's error comes from."""
 
@@ -558,6 +692,19 @@ class Figures(Section):
         default=None, description="From the model to boundary elements, one thing at a time."
     )
 
+    fig13_loops: LoopsFigure | None = Field(
+        default=None, description="Pressure and contact area against mean separation, both ways."
+    )
+    fig14_pull_off: PullOffFigure | None = Field(
+        default=None, description="Pull-off against rms slope, and against the largest load."
+    )
+    fig15_loss: LossFigure | None = Field(
+        default=None, description="Energy lost in a loop against contact area, and what it was lost in."
+    )
+    fig16_snap_map: SnapMapFigure | None = Field(
+        default=None, description="Where and when spots of one run snap into and out of contact."
+    )
+
     def drawn(self) -> dict[str, Section]:
         """The figures that are drawn, by name."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
@@ -588,6 +735,9 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
     boundary_elements: dict[Name, BoundaryElements] = Field(
         default={}, description="Boundary-element solutions by name, compared with the runs of a study."
+    )
+    boundary_element_loops: dict[Name, BoundaryElementLoops] = Field(
+        default={}, description="Boundary elements both ways by name, beside the runs of a study that unload."
     )
     error_sources: dict[Name, ErrorSources] = Field(
         default={}, description="Studies of where the model's error comes from, by name."
@@ -620,7 +770,12 @@ class Campaign(Section):
                     "mixes random surfaces with surfaces read from a file, which have no seed; allowed: a study each"
                 )
                 found.append((("studies", label, "surfaces"), ", ".join(study.surfaces), reason))
-        for section in ("boundary_elements", "error_sources"):
+        for label, study in self.studies.items():
+            found += self._path_problems(("studies", label), study)
+        for label, entry in self.boundary_element_loops.items():
+            if entry.study in self.studies:
+                found += self._loop_problems(("boundary_element_loops", label), entry)
+        for section in BESIDE_STUDIES:
             for label, entry in getattr(self, section).items():
                 known((section, label, "study"), entry.study, self.studies)
                 if entry.study in self.studies:
@@ -634,12 +789,59 @@ class Campaign(Section):
                 known(("figures", label, "entry"), figure.entry, self.error_sources)
                 if figure.entry in self.error_sources:
                     found += self._sources_problems(("figures", label, "entry"), figure.entry)
+            for key in ("studies", "load_studies"):
+                names = figure.model_dump().get(key) or []
+                for index, name in enumerate(names):
+                    known(("figures", label, key, index), name, self.studies)
+                    found += self._apart_problems(("figures", label, key, index), figure, name)
             if not hasattr(figure, "study"):
                 continue
             known(("figures", label, "study"), figure.study, self.studies)
+            found += self._apart_problems(("figures", label, "study"), figure, figure.study)
             if figure.study in self.studies:
                 found += self._figure_problems(("figures", label), figure, self.studies[figure.study])
         return found
+
+    def _apart_problems(self, location, figure, name):
+        """Studies that do not come back, in figures of the way back."""
+        if name not in self.studies or not isinstance(figure, LoopsFigure | PullOffFigure | LossFigure | SnapMapFigure):
+            return
+        study = self.studies[name]
+        if not study.unload and (isinstance(figure, PullOffFigure | LossFigure) or not study.turning_points):
+            yield location, name, "is not unloaded; allowed: a study with `unload: true`"
+
+    def _path_problems(self, location, study):
+        """What keeps the way back of a study from being a path."""
+        if not (study.unload or study.turning_points or study.control != "separation"):
+            return
+        try:
+            study.check_path(self.snapshots_of(location[1]))
+        except ValueError as error:
+            key, _, reason = str(error).partition(": ")
+            name, _, index = key.partition("[")
+            place = (name, int(index.rstrip("]"))) if index else (name,)
+            value = study.model_dump(exclude_none=True).get(name)
+            yield (*location, *place), value[place[1]] if index else value, reason
+
+    def _loop_problems(self, location, entry):
+        """What boundary elements both ways need of their study."""
+        study = self.studies[entry.study]
+        if not study.unload or study.turning_points:
+            yield (
+                (*location, "study"),
+                entry.study,
+                "does not come straight back; allowed: a study with `unload: true` and without turning points",
+            )
+        if study.targets.last[0] != "reduced_pressure":
+            yield (
+                (*location, "study"),
+                entry.study,
+                "has no reduced pressures for targets; allowed: a study with them, whose last one is where to turn",
+            )
+
+    def loop_load(self, entry: BoundaryElementLoops) -> float:
+        """The reduced pressure at which boundary elements both ways turn: the last one of their study."""
+        return self.studies[entry.study].targets.last[1]
 
     def surface_seeds(self, study: str, surface: str) -> list[int]:
         """Seeds of a surface in a study; a surface that is read from a file has one realisation, numbered 0."""
@@ -694,8 +896,7 @@ class Campaign(Section):
                 yield (*location, "refinement"), entry.refinement, reason
 
     def unresolved(self, section: str, entry: str, surface: str, grid: int) -> Iterator[tuple[tuple, Any, str]]:
-        """Materials of an entry of `boundary_elements` or `error_sources` whose attraction the grid of a surface does
-        not resolve."""
+        """Materials of an entry beside a study whose attraction the grid of a surface does not resolve."""
         asked = getattr(self, section)[entry]
         spacing = self.surfaces[surface].period / (grid * asked.coarsest)
         for label in self.solved(asked)["materials"]:

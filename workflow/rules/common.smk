@@ -12,6 +12,8 @@ from fingerprint import code_fingerprint
 from icha.configuration.expansion import (
     asperity_cases,
     campaign_sha256,
+    loop_cases,
+    loop_settings,
     map_case,
     map_solution,
     measurement_settings,
@@ -43,8 +45,10 @@ SOLUTION_LABELS = [tuple(case) for case in SOLUTION_CASES.values()]
 SOLUTIONS = [f"{RESULTS}/references/boundary_elements/{path}" for path in SOLUTION_CASES]
 SOURCE_CASES = {f"{case.path}.nc": case for case in source_cases(CAMPAIGN)}
 ERROR_SOURCES = [f"{RESULTS}/references/error_sources/{path}" for path in SOURCE_CASES]
+LOOP_CASES = {f"{case.path}.nc": case for case in loop_cases(CAMPAIGN)}
+LOOPS = [f"{RESULTS}/references/loops/{path}" for path in LOOP_CASES]
 ASPERITIES = [f"{RESULTS}/references/one_asperity/{name}.nc" for name in asperity_cases(CAMPAIGN)]
-REFERENCES = [*THEORIES, *SOLUTIONS, *ERROR_SOURCES, *ASPERITIES]
+REFERENCES = [*THEORIES, *SOLUTIONS, *LOOPS, *ERROR_SOURCES, *ASPERITIES]
 DATASET = f"{RESULTS}/dataset/{CAMPAIGN.name}.nc"
 COMPARISON = f"{RESULTS}/aggregated/{CAMPAIGN.name}.nc"
 # Only a campaign with boundary elements has an error to tell.
@@ -100,7 +104,7 @@ def threads_of(surface):
 
 def figure_memory(name):
     """Megabytes that a figure needs: the map holds a topography."""
-    return 2000 + (16 * max(map(points_of, CAMPAIGN.surfaces)) // 10**6 if name == "fig4_contact_map" else 0)
+    return 2000 + (16 * max(map(points_of, CAMPAIGN.surfaces)) // 10**6 if name in ("fig4_contact_map", "fig16_snap_map") else 0)
 
 
 def solution_of(wildcards):
@@ -109,6 +113,10 @@ def solution_of(wildcards):
 
 def sources_of(wildcards):
     return SOURCE_CASES["{entry}/{surface}/seed{seed}/slope{slope}/{material}.nc".format(**wildcards)]
+
+
+def loop_of(wildcards):
+    return LOOP_CASES["{entry}/{surface}/seed{seed}/slope{slope}/{material}.nc".format(**wildcards)]
 
 
 def solution_memory(surface, entry):
@@ -144,6 +152,15 @@ def sources_drawn(entry):
     ]
 
 
+def loops_of(study):
+    """Files of boundary elements both ways beside a study."""
+    return [
+        file
+        for file, case in zip(LOOPS, LOOP_CASES.values(), strict=True)
+        if CAMPAIGN.boundary_element_loops[case.entry].study == study
+    ]
+
+
 def figure_data(name):
     """Files that a figure needs, by the names of its arguments."""
     options = CAMPAIGN.figures.drawn()[name]
@@ -154,14 +171,21 @@ def figure_data(name):
     if name in ("fig10_model_error", "fig11_distribution_error"):
         return {"model_error": MODEL_ERROR[0]}
     data = {"campaign": DATASET}
+    if name == "fig15_loss":
+        return data
     study = CAMPAIGN.studies[options.study]
+    if name == "fig13_loops" and loops_of(options.study):
+        data["loops"] = loops_of(options.study)
+    if name == "fig16_snap_map":
+        case = map_case(CAMPAIGN, options)
+        data["surface"] = f"{RESULTS}/surfaces/{case.surface}/seed{case.seed}.nc"
     if name in ("fig2_area_and_gap", "fig7_stiffness"):
         data["references"] = f"{RESULTS}/references/{study.surfaces[0]}.nc"
     if name in ("fig2_area_and_gap", "fig3_distributions"):
         if any(entry.study == options.study for entry in CAMPAIGN.boundary_elements.values()):
             data["model_error"] = MODEL_ERROR[0]
     if name == "fig4_contact_map":
-        case = map_case(CAMPAIGN)
+        case = map_case(CAMPAIGN, options)
         data["surface"] = f"{RESULTS}/surfaces/{case.surface}/seed{case.seed}.nc"
         solution = map_solution(CAMPAIGN)
         if solution is not None:
@@ -179,7 +203,7 @@ def figure_options(name):
     snapshot = getattr(CAMPAIGN.figures.drawn()[name], "snapshot", None)
     if snapshot is not None:
         options["kind"], options["target"] = snapshot.target
-    if name == "fig4_contact_map" and "surface" in options:
+    if name in ("fig4_contact_map", "fig16_snap_map") and "surface" in options:
         options["surface_name"] = options.pop("surface")
     return options
 

@@ -1,6 +1,7 @@
 # references/<surface>.nc: what theories say of a surface, and published points;
 # references/boundary_elements/<entry>/<surface>/seed<k>/slope<g>/<material>/p<p*>.nc: one load each, by boundary
 # elements on the topography of the run;
+# references/loops/<entry>/<surface>/seed<k>/slope<g>/<material>.nc: boundary elements both ways;
 # references/error_sources/<entry>/<surface>/seed<k>/slope<g>/<material>.nc: variants between the model and them;
 # references/one_asperity/<hertz or mu<mu>>.nc: where the answer is known.
 
@@ -59,6 +60,32 @@ rule boundary_elements:
         "{wildcards.material}, p* = {wildcards.pressure}"
     script:
         "../scripts/solve_boundary_elements.py"
+
+
+rule boundary_element_loop:
+    input:
+        surface=f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+    output:
+        f"{RESULTS}/references/loops/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.nc",
+    log:
+        f"{LOGS}/loops/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.log",
+    benchmark:
+        f"{BENCHMARKS}/loops/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    threads: 1
+    resources:
+        mem_mb=lambda wildcards: solution_memory(wildcards.surface, CAMPAIGN.boundary_element_loops[wildcards.entry]),
+        runtime=480,
+    params:
+        settings=lambda wildcards: loop_settings(CAMPAIGN, loop_of(wildcards)),
+        attributes=ATTRIBUTES,
+        code=code_of("follow_boundary_elements.py"),
+    message:
+        "Boundary elements both ways {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, "
+        "slope {wildcards.slope}, {wildcards.material}"
+    script:
+        "../scripts/follow_boundary_elements.py"
 
 
 rule error_sources:

@@ -14,6 +14,7 @@ READERS = {
     "surface": read_dataset,
     "model_error": read_campaign,
     "solution": read_dataset,
+    "loops": lambda paths: [read_dataset(path) for path in _several(paths)],
     "error_sources": lambda paths: [read_dataset(path) for path in _several(paths)],
 }
 

@@ -1,0 +1,24 @@
+"""Press one surface against one material and pull it off again, by boundary elements."""
+
+from job import logged
+
+from icha.material import Material
+from icha.records import read_surface, write_dataset
+from icha.reference.loops import boundary_element_loop
+
+
+def follow_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
+    """Solve for the surface of the file `surface`, scaled to `rms_slope`, both ways, and write it to `output`."""
+    scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
+    write_dataset(boundary_element_loop(scaled, Material(**material), **settings).assign_attrs(attributes), output)
+
+
+if "snakemake" in globals():
+    with logged(snakemake.log[0]):
+        follow_boundary_elements(
+            snakemake.input.surface,
+            snakemake.output[0],
+            **snakemake.params.settings,
+            attributes=snakemake.params.attributes,
+            progress=lambda line: print(line, flush=True),
+        )
