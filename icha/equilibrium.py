@@ -604,10 +604,10 @@ class _Search:
         near = a < _NEAR_JUMP_OFF * lowest
         part, R, a, lowest = part[near], R[near], a[near], lowest[near]
         change = _radius_response(law, a, R, np.maximum(point.approach, off)[part], off[part]) * step[part]
-        # What is left of a step where the radius ends is one of the approach.
+        # Where the radius ends, what is left of the error is made up by the approach alone.
         left = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
         reached = law.approach(np.maximum(a + change, lowest), R)
-        moved[part] = reached + np.where(change < 0, left * step[part], 0.0)
+        moved[part] = reached + np.where(change < 0, left * np.minimum(step, -point.error)[part], 0.0)
         back = drawn_back[part]
         part, far = part[back], np.maximum(reached[back] - off[part[back]], 1e-300)
         lacking = point.approach[part] - point.error[part] - off[part]

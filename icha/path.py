@@ -596,7 +596,10 @@ class _Journey:
         # What a union makes of two spots depends on how far they overlap when it is found.
         if step.unites and abs(step.width) > _UNITING_STEP * self.longest:
             return False
-        unbalanced = step.roughness > _ROUGH_WORK * effort and abs(step.lost) > _BALANCED_WORK * effort
+        scale = effort
+        if step.width > 0 and mean_pressure(self.contact, beyond.spots) < 0:
+            scale = min(effort, 10 * self.jumped)  # there is no way in here that has the same error
+        unbalanced = step.roughness > _ROUGH_WORK * scale and abs(step.lost) > _BALANCED_WORK * scale
         if not len(step.events) and unbalanced and abs(step.width) > self.longest / 256:
             return False
         if step.width < 0:
