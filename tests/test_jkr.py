@@ -154,6 +154,25 @@ def test_force_and_second_moment_are_integrals_of_the_pressure(energy):
 
 
 @pytest.mark.parametrize("energy", [0.0, ENERGY])
+@pytest.mark.parametrize("relative", [0.3, 0.732296, 1.523237, 2.417988, 40.0])
+def test_energy_is_the_work_that_makes_the_spot(energy, relative):
+    """The integral of the force over the approach, from no spot on, over the unstable branch too where there is one."""
+    law = JKR(Material(MODULUS, energy, RANGE))
+    a_unit, delta_unit, force_unit = units(R)
+
+    def work(x):  # a = x^2 makes the lower end regular
+        a = x**2 * a_unit
+        # Not the law's own derivative, which is infinite where there is no spot.
+        slope = 4 * x**3 - np.sqrt(2 * np.pi) * (energy > 0)
+        return float(law.force(a, R)) / force_unit * slope
+
+    expected = scipy.integrate.quad(work, 0, np.sqrt(relative), epsabs=1e-12, epsrel=1e-12)[0]
+    unit = force_unit * delta_unit
+    assert law.energy(relative * a_unit, R) / unit == pytest.approx(expected, rel=1e-11, abs=1e-11)
+    assert law.energy(0.0, R) == 0
+
+
+@pytest.mark.parametrize("energy", [0.0, ENERGY])
 @pytest.mark.parametrize("relative", [0.7, 2.0, 40.0])
 def test_displacement_against_quadrature_of_the_pressure(energy, relative):
     law = JKR(Material(MODULUS, energy, RANGE))

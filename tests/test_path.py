@@ -16,7 +16,7 @@ from icha.equilibrium import (
     untouched,
 )
 from icha.jkr import JKR
-from icha.path import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, load
+from icha.path import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, follow
 
 PERIOD, MODULUS = 100e-6, 25e6
 ADHESIVE = Material(MODULUS, 0.05, 2.071e-9)
@@ -158,7 +158,7 @@ def test_no_step_is_longer_than_asked(surface, monkeypatch):
 
     monkeypatch.setattr(icha.path, "equilibrium", spy)
     contact = contact_of(surface, BARE)
-    for _ in load(contact, Path(reduced_pressures=[1e-2], max_step=0.07), MODULUS, MODULUS):
+    for _ in follow(contact, Path(reduced_pressures=[1e-2], max_step=0.07), MODULUS):
         pass
     assert 0.069 < max(seen) <= 0.07 * (1 + 1e-9)
 
@@ -179,8 +179,8 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface, monkeypatch):
         return original(contact, state, separation, control)
 
     monkeypatch.setattr(icha.path, "equilibrium", failing)
-    stops = load(contact, Path(reduced_pressures=[1e-3, 1e-1]), MODULUS * surface.rms_slope, MODULUS)
-    assert next(stops)[0].value == 1e-3
+    stops = follow(contact, Path(reduced_pressures=[1e-3, 1e-1]), MODULUS * surface.rms_slope)
+    assert next(stops).target.value == 1e-3
     with pytest.raises(NotConverged, match=r"after 1 of 2 stops: on purpose"):
         next(stops)
     assert min(widths) < 1e-4 * max(widths)
@@ -210,8 +210,8 @@ def test_progress_tells_every_stop(surface):
         ({"reduced_pressures": ["0.1"]}, r"reduced_pressures\[0\]"),
         ({"reduced_pressures": [MAX_REDUCED_PRESSURE * 1.001]}, r"reduced_pressures\[0\].*beyond"),
         ({"area_fractions": [0.1, MAX_AREA_FRACTION * 1.001]}, r"area_fractions\[1\].*beyond"),
-        ({"reduced_pressures": [0.1], "unload": True}, "unload"),
-        ({"reduced_pressures": [0.1], "unload": 1}, "unload"),
+        ({"reduced_pressures": [0.1], "unload": 1}, "unload: 1 is neither True nor False"),
+        ({"reduced_pressures": [0.1], "unload": "yes"}, "unload: 'yes' is neither"),
         ({"reduced_pressures": [0.1], "max_step": 0.0}, "max_step"),
         ({"reduced_pressures": [0.1], "max_step": 0.51}, "max_step"),
         ({"reduced_pressures": [0.1], "max_step": None}, "max_step"),
@@ -231,7 +231,7 @@ def test_bad_paths_are_refused_by_name(arguments, message):
 def test_the_way_to_first_contact_costs_nothing(surface):
     """A stop a metre up is met, without a step for every tenth of h_rms on the way down."""
     path = Path(mean_separations=[1.0, 1.5 * surface.rms_height], snapshots=[])
-    stops = list(load(contact_of(surface, BARE), path, MODULUS, MODULUS))
+    stops = [(w.target, w.state) for w in follow(contact_of(surface, BARE), path, MODULUS)]
     assert [len(state.spots) > 0 for _, state in stops] == [False, True]
     reached = [state.separation for _, state in stops]
     assert reached == pytest.approx([1.0, 1.5 * surface.rms_height], rel=1e-12)
