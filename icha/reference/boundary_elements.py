@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
+import scipy.fft
 import tamaas
 import tamaas.utils
 import xarray as xr
@@ -38,6 +39,8 @@ DEFAULT_TOLERANCE = 1e-8
 LOAD_TOLERANCE = 2e-4
 _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
+# Between looks at a gap that has been open everywhere, and at one that has not.
+_OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
 # The first steps of the search, in h_rms: loads fall by a factor e over about this distance, on rough surfaces.
 _DECAY = 0.4
 _LONGEST_STEP = 0.3
@@ -134,6 +137,17 @@ class NodalState:
             return raw
         return raw - self.outside_pressure * material.interaction_range / material.surface_energy
 
+    def stored_energy(self, material: Material) -> float:
+        """Elastic energy less that of adhesion over the nominal area, J/m^2; 0 far apart.
+
+        The elastic one is half the mean of traction times displacement. Without a jump its derivative to the mean gap
+        is minus the nominal pressure.
+        """
+        displacement = self.gap + self.surface.heights
+        displacement -= displacement.mean()
+        elastic = float(np.mean(self.traction * displacement)) / 2
+        return elastic - material.surface_energy * self.energetic_area_fraction(material)
+
 
 def boundary_elements(
     surface: Surface,
@@ -186,11 +200,11 @@ def contact_state(
     """The state of which `boundary_elements` makes a dataset, node by node; arguments and errors are the same."""
     target = positive("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
     say = progress or _silent
-    fine = _resolved(surface, material, refinement, say)
+    fine = resolved(surface, material, refinement, say)
     state = _without_adhesion(fine, material, target, positive("tolerance", tolerance))
     if material.surface_energy == 0:
         return state
-    return _carrying(_AdhesiveContact(fine, material, tolerance, state.gap), target, state.mean_separation, say)
+    return _carrying(GapContact(fine, material, tolerance, state.gap), target, state.mean_separation, say)
 
 
 def states_at_mean_separations(
@@ -218,9 +232,9 @@ def states_at_mean_separations(
     """
     if material.surface_energy == 0:
         raise ValueError("surface_energy: 0; without adhesion the load is given, not the mean gap")
-    fine = _resolved(surface, material, refinement, progress or _silent)
+    fine = resolved(surface, material, refinement, progress or _silent)
     separations = [positive("mean_separations", separation, "m") for separation in mean_separations]
-    contact = _AdhesiveContact(fine, material, positive("tolerance", tolerance))
+    contact = GapContact(fine, material, positive("tolerance", tolerance))
     return (contact.at(separation) for separation in separations)
 
 
@@ -228,7 +242,7 @@ def _silent(line):
     pass
 
 
-def _resolved(surface, material, refinement, say):
+def resolved(surface, material, refinement, say):
     """The surface on the solution's grid, which has to resolve the attraction."""
     fine = surface.refined(integer("refinement", refinement, 1))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
@@ -260,13 +274,20 @@ class _Solver:
         self.solver = tamaas.PolonskyKeerRey(self.model, self.heights, tolerance, variable, variable)
         self.solver.max_iter = _MAX_ITERATIONS
 
-    def solve(self, mean):
-        """Solve for a mean pressure or gap; the error reached."""
+    def iterate(self, mean):
+        """Iterate towards a mean pressure or gap, at most `max_iter` times; the error reached."""
         try:
             with tamaas.utils.log_context(tamaas.LogLevel.error):
-                residual = self.solver.solve(mean)
+                return self.solver.solve(mean)
         except tamaas.FloatingPointError as error:
             raise NotSolved(f"boundary elements: {error}") from None
+
+    def solve(self, mean):
+        """Solve for a mean pressure or gap; the error reached."""
+        return self.checked(self.iterate(mean))
+
+    def checked(self, residual):
+        """The error reached, which has to be within the tolerance."""
         if not residual <= self.tolerance:
             raise NotSolved(f"boundary elements did not converge: error {residual:.3g}, tolerance {self.tolerance:g}")
         return residual
@@ -284,33 +305,78 @@ def _without_adhesion(fine, material, pressure, tolerance):
     return NodalState(fine, gap * solver.unit, traction * material.contact_modulus, contact, residual)
 
 
-class _AdhesiveContact:
-    """States with adhesion at given mean gaps; every solution starts from the last, the first from `gap` (m)."""
+class GapContact:
+    """States at given mean gaps; every solution starts from the last, the first from `gap` (m).
+
+    Tamaas relates its error to what the contact carries; where nothing touches it iterates for ever on a solution that
+    it has. So it is stopped now and then, and a gap that is open everywhere is held against the law of the interface.
+    """
 
     def __init__(self, fine, material, tolerance, gap=None):
+        """Set the solver up."""
         self.fine, self.material = fine, material
         self.solver = _Solver(fine, tamaas.PolonskyKeerRey.gap, tolerance)
         unit = self.solver.unit
-        # Tamaas keeps a reference only.
-        self.attraction = tamaas.ExponentialAdhesionFunctional(self.solver.heights)
-        self.attraction.parameters = {
-            "rho": material.interaction_range / unit,
-            "surface_energy": material.adhesion_length / unit,
-        }
-        self.solver.solver.addFunctionalTerm(self.attraction)
+        if material.surface_energy > 0:
+            # Tamaas keeps a reference only.
+            self.attraction = tamaas.ExponentialAdhesionFunctional(self.solver.heights)
+            self.attraction.parameters = {
+                "rho": material.interaction_range / unit,
+                "surface_energy": material.adhesion_length / unit,
+            }
+            self.solver.solver.addFunctionalTerm(self.attraction)
         if gap is not None:
-            self.solver.model["gap"][:] = np.maximum(gap, 0.0) / unit
+            self.start_from(gap)
         self.solves = 0
+
+    def start_from(self, gap):
+        """Let the next solution start from a gap, m."""
+        self.solver.model["gap"][:] = np.maximum(gap, 0.0) / self.solver.unit
 
     def at(self, separation):
         """The state at a mean gap, m."""
         unit, model = self.solver.unit, self.solver.model
-        residual = self.solver.solve(separation / unit)
         self.solves += 1
+        if self.material.surface_energy == 0 and separation >= self.fine.heights.max():
+            self.start_from(separation - self.fine.heights)
+            nothing = np.zeros_like(self.fine.heights)
+            return NodalState(self.fine, separation - self.fine.heights, nothing, nothing > 0, 0.0, self.solves)
+        residual = self._solved(separation / unit)
         gap, traction = np.array(model["gap"]), np.array(model.traction)
         return NodalState(
             self.fine, gap * unit, traction * self.material.contact_modulus, gap <= 0, residual, self.solves
         )
+
+    def _solved(self, mean):
+        """Solve for a mean gap, looking at the gap now and then; the error reached."""
+        iterations = 0
+        while iterations < _MAX_ITERATIONS:
+            self.solver.solver.max_iter = _OPEN_ITERATIONS if self._is_open() else _TOUCHING_ITERATIONS
+            iterations += self.solver.solver.max_iter
+            residual = self.solver.iterate(mean)
+            if not residual <= self.solver.tolerance and self._is_open():
+                residual = self._imbalance()
+            if residual <= self.solver.tolerance:
+                break
+        return self.solver.checked(residual)
+
+    def _is_open(self):
+        """Whether nothing touches."""
+        return np.min(self.solver.model["gap"]) > 0
+
+    def _imbalance(self):
+        """Largest difference between traction and attraction over the interface's strength, where nothing touches.
+
+        The half-space's traction is E* q/2 times the modes of its displacement; its mean is free.
+        """
+        gap, n = np.array(self.solver.model["gap"]), self.fine.grid
+        q = np.pi * np.hypot(scipy.fft.fftfreq(n, 1 / n)[:, None], scipy.fft.rfftfreq(n, 1 / n)) / self.fine.period
+        displacement = scipy.fft.rfft2(gap + self.solver.heights)
+        traction = scipy.fft.irfft2(q * self.solver.unit * displacement, s=gap.shape)
+        length = self.material.interaction_range / self.solver.unit
+        attraction = np.exp(-gap / length)
+        strength = self.material.adhesion_length / self.material.interaction_range
+        return float(np.max(np.abs(traction / strength + attraction - attraction.mean())))
 
 
 def _carrying(contact, pressure, separation, say):
