@@ -35,7 +35,7 @@ class Step:
     """From one equilibrium of a path to the next: work, change of energy and events.
 
     work: done on the contact, -(integral of p du), J/m^2. gained: stored energy, J/m^2. pressure_jump: by which events
-    changed the pressure, Pa. roughness: bound of the error of the integral where it is smooth, J/m^2.
+    changed the pressure, Pa. sudden: whether there are any that may. roughness: bound of the error of the integral where it is smooth, J/m^2.
     """
 
     width: float
@@ -43,6 +43,7 @@ class Step:
     gained: float
     pressure_jump: float
     roughness: float
+    sudden: bool
     events: Events
 
     @classmethod
@@ -64,6 +65,7 @@ class Step:
             gained=stored_energy(contact, after) - stored_energy(contact, before),
             pressure_jump=q - p - 0.5 * width * (slope + end_slope) if jumps else 0.0,
             roughness=abs(bend) / 24,
+            sudden=bool(jumps),
             events=events,
         )
 

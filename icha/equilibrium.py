@@ -70,6 +70,9 @@ _NEAR_JUMP_OFF = 1.5
 # So large a part of a step that leads back over jump-off may be lost by ending there.
 _NEXT_TO_JUMP_OFF = 0.2
 
+# Spots whose distances from jump-off differ by this part are equal.
+_SAME_STRENGTH = 1e-3
+
 # Until when united spots stay united.
 DETACHMENT, OVERLAP = "detachment", "overlap"
 
@@ -364,7 +367,7 @@ class Control:
 
 
 def equilibrium(
-    contact: Contact, state: ContactState, separation: float, control: Control | None = None
+    contact: Contact, state: ContactState, separation: float, control: Control | None = None, *, let_go: int = 0
 ) -> ContactState:
     """Bring the contact from one state to another mean separation, or to a given load or area.
 
@@ -378,6 +381,7 @@ def equilibrium(
     ----------
     separation : m; a first guess if there is a `control`.
     control : a load or an area to hold instead of the separation.
+    let_go : so many spots break contact at once, those that would reach jump-off first.
 
     Raises
     ------
@@ -386,7 +390,10 @@ def equilibrium(
     FullContact
         If the contact spreads over the whole surface.
     """
-    return _Search(contact, state, separation, control).run()
+    search = _Search(contact, state, separation, control)
+    if let_go:
+        search.let_go(state, let_go)
+    return search.run()
 
 
 class _Search:
@@ -695,6 +702,15 @@ class _Search:
         self.fallen[falls] = before[falls]
         self.split |= falls
         self.locked |= freed & ~falls
+
+    def let_go(self, state, count):
+        """Break the contact of `count` spots of the state from which the search starts, and of their equals."""
+        here = self.approach - self.response * (self.separation - state.separation)
+        rate = np.maximum(-self.response, 1e-3)
+        left = np.where(self.status == _CONTACT, (here - self.sites.jump_off) / rate, np.inf)
+        last = np.partition(left, count - 1)[count - 1]
+        self.approach = here
+        self._jump_off(left <= last * (1 + _SAME_STRENGTH))
 
     def _part(self, a):
         """Undo unions whose two spots would no longer overlap; whether there were any."""

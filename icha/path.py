@@ -408,6 +408,7 @@ class _Journey:
         self.step = self.longest
         self.first_contact = self.state = untouched(contact)
         self.missed, self.reached = [], 0
+        self.stations = []  # separations met on the legs before, in increasing order
         self.total = len(path.targets)
         self.effort = 0.0  # work and losses of all steps so far, without their signs
         self.jumped = 0.0  # energy that jumps have set free so far, as if every spot were alone
@@ -499,43 +500,39 @@ class _Journey:
         """All equilibria of a path that goes on after the first loading."""
         path = self.path
         yield self._between(0)
-        visited = [self.state.separation]
-        between = _SAME_SEPARATION * self.contact.rms_height
         if self.contact.adhesive:
             self.step = _SHARP * self.contact.rms_height
-            between = self.longest / 64  # not every one of those around an event
-        for waypoint in self._until(0, [self._stop(t) for t in path.targets]):
-            if waypoint.state.separation < visited[-1] - between:
-                visited.append(waypoint.state.separation)
-            yield waypoint
+        yield from self._until(0, [self._stop(t) for t in path.targets])
         if self.missed:
             raise self._end()
-        stations = visited[::-1]
         for leg, turn in enumerate(path.turning_points, start=1):
             stop = self._stop(turn)
             if (stop.excess(self.state) > 0) != (leg % 2 == 1):
                 raise self._end(NotConverged(f"the turning point {_name(turn)} lies behind where leg {leg} begins"))
-            yield from self._until(leg, [stop], stations)
+            yield from self._until(leg, [stop])
             self._tell(f"turning point {_name(turn)}")
         if path.unload:
             leg = len(path.turning_points) + (len(path.turning_points) % 2 == 0)
             stops = [self._stop(replace(target, snapshot=False)) for target in path.targets]
-            yield from self._until(leg, [s for s in stops if s.excess(self.state) > _SAME_EXCESS], stations, apart=True)
+            yield from self._until(leg, [s for s in stops if s.excess(self.state) > _SAME_EXCESS], apart=True)
             self._tell("apart")
 
     def _between(self, leg):
         return Waypoint(Target(BETWEEN, self.state.separation), self.state, leg)
 
-    def _until(self, leg, waiting, stations=(), apart=False) -> Iterator[Waypoint]:
-        """One leg: until all stops are met or, `apart`, nothing touches any more; not farther than the next station."""
+    def _until(self, leg, waiting, apart=False) -> Iterator[Waypoint]:
+        """One leg: until all stops are met or, `apart`, nothing touches any more."""
         direction = 1 if leg % 2 else -1
-        waiting = list(waiting)
+        waiting, visited = list(waiting), [self.state.separation]
+        # Not every separation around an event is one to come back to.
+        between = self.longest / 64 if self.contact.adhesive else _SAME_SEPARATION * self.contact.rms_height
+        highest = self.first_contact.separation - _SAME_SEPARATION * self.contact.rms_height
         while waiting or apart:
-            if direction > 0 and not len(self.state.spots) and self.state.separation >= self.first_contact.separation:
+            if direction > 0 and not len(self.state.spots) and self.state.separation >= highest:
                 if apart:
                     return
                 raise self._end(NotConverged(f"the surfaces are apart before {_name(waiting[0].target)}"))
-            beyond, step = self._resolved(direction, stations)
+            beyond, step = self._resolved(direction)
             try:
                 stop, met = self._first_passed(waiting, beyond, direction)
             except InsideJump as jump:
@@ -556,6 +553,8 @@ class _Journey:
             self.lowest = min(self.lowest, mean_pressure(self.contact, met.spots))
             self.step = self.longest if self.step <= 2 * _SHARP * self.contact.rms_height else 2 * self.step
             self.step = min(self.longest, self.step)
+            if abs(met.separation - visited[-1]) > between:
+                visited.append(met.separation)
             if stop is None:
                 yield self._between(leg)
                 continue
@@ -563,15 +562,25 @@ class _Journey:
             if leg == 0:
                 self._tell_stop(stop.target)
             yield Waypoint(stop.target, met, leg)
+        self.stations = sorted({*self.stations, *visited, self.state.separation})
 
-    def _resolved(self, direction, stations):
-        """The next equilibrium, near enough that the work up to it is known, and the step to it."""
-        start = self.state
-        apart = start.separation + _SAME_SEPARATION * self.contact.rms_height
-        width = next((s - start.separation for s in stations if direction > 0 and s > apart), self.step)
+    def _next_station(self, direction):
+        """How far it is to the next separation of the legs before; without one a step."""
+        apart = _SAME_SEPARATION * self.contact.rms_height
+        ahead = [d for d in ((s - self.state.separation) * direction for s in self.stations) if d > apart]
+        return min(ahead, default=self.step)
+
+    def _resolved(self, direction):
+        """The next equilibrium, near enough that the work up to it is known, and the step to it.
+
+        On the way back the spots may lose their equilibrium together before any of them has come to its own jump-off:
+        then the one that is nearest to it, at the rate at which all of them run towards it, lets go.
+        """
+        start, width = self.state, self._next_station(direction)
         while True:
+            collective = direction > 0 and self.contact.adhesive and width < _CLOSE_TO_A_JUMP * self.contact.rms_height
             try:
-                beyond = equilibrium(self.contact, start, start.separation + direction * width)
+                beyond = self._equilibrium(start, start.separation + direction * width, collective)
             except NotConverged as failure:
                 self._shorten(failure)
                 width = min(0.5 * width, self.step)
@@ -588,6 +597,22 @@ class _Journey:
                 width *= 0.5
             self.step = min(self.step, width)
 
+    def _equilibrium(self, start, separation, collective):
+        """The equilibrium at a separation; if there is none and it may be lost `collectively`, with spots let go."""
+        try:
+            return equilibrium(self.contact, start, separation)
+        except NotConverged:
+            if not collective:
+                raise
+        count = 1
+        while True:
+            try:
+                return equilibrium(self.contact, start, separation, let_go=count)
+            except NotConverged:
+                count *= 2
+                if count > len(start.spots):
+                    raise
+
     def _is_resolved(self, start, beyond, step):
         effort = self.effort + abs(step.work) + abs(step.lost)
         jumped = _UNRESOLVED_LOSS * (self.jumped + step.set_free(self.contact))
@@ -600,7 +625,7 @@ class _Journey:
         if step.width > 0 and mean_pressure(self.contact, beyond.spots) < 0:
             scale = min(effort, 10 * self.jumped)  # there is no way in here that has the same error
         unbalanced = step.roughness > _ROUGH_WORK * scale and abs(step.lost) > _BALANCED_WORK * scale
-        if not len(step.events) and unbalanced and abs(step.width) > self.longest / 256:
+        if not step.sudden and unbalanced and abs(step.width) > self.longest / 256:
             return False
         if step.width < 0:
             return True

@@ -228,7 +228,7 @@ def simulate(
         if not isinstance(value, kind):
             raise ValueError(f"{name}: a {type(value).__name__} is not an icha.{kind.__name__}")
     seed = integer("seed", seed, -1)
-    for target in path.targets:
+    for target in (*path.targets, *path.turning_points):
         if target.kind == RELATIVE_LOAD and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
             raise ValueError(
                 f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} lies "
