@@ -34,8 +34,9 @@ def new_events(before: ContactState, after: ContactState) -> Events:
 class Step:
     """From one equilibrium of a path to the next: work, change of energy and events.
 
-    work: done on the contact, -(integral of p du), J/m^2. gained: stored energy, J/m^2. pressure_jump: by which events
-    changed the pressure, Pa. sudden: whether there are any that may. roughness: bound of the error of the integral where it is smooth, J/m^2.
+    width: change of the mean separation, m. work: done on the contact, -(integral of p du), J/m^2. gained: stored
+    energy, J/m^2. pressure_jump: by which events changed the pressure, Pa. roughness: bound of the error of the
+    integral where it is smooth, J/m^2. sudden: whether there are events that may change the pressure.
     """
 
     width: float
