@@ -12,11 +12,12 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help environment run validation test lint format schema benchmarks benchmarks-page clean
+.PHONY: help environment run validation hysteresis test lint format schema benchmarks benchmarks-page clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
 	@echo "make validation  run campaign validation (an hour) and write docs/validation.md and docs/error_sources.md from it"
+	@echo "make hysteresis  run campaign hysteresis (half an hour) and write docs/hysteresis.md from it"
 	@echo "make test    run the tests"
 	@echo "make lint    check style of Python code and workflow"
 	@echo "make format  put Python code and workflow into that style"
@@ -41,9 +42,9 @@ run: environment
 	snakemake --cores $(CORES) $(if $(CONFIG),--configfile $(CONFIG))
 	@python workflow/scripts/show_results.py $(CONFIG)
 
-validation: environment
-	$(MAKE) run CONFIG=config/campaigns/validation.yaml
-	python docs/write_pages.py
+validation hysteresis: environment
+	$(MAKE) run CONFIG=config/campaigns/$@.yaml
+	python docs/write_pages.py $@
 
 test: environment
 	pytest -n $(CORES) --dist loadfile

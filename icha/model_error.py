@@ -12,7 +12,7 @@ from scipy.stats import wasserstein_distance
 
 from icha.bins import GAP_BINS, PRESSURE_BINS
 from icha.campaign import LABELS, RAGGED, find_snapshot, select_run, spots_of
-from icha.labels import SolutionLabels
+from icha.labels import RunLabels, SolutionLabels
 from icha.observables import nodes_in_discs
 from icha.path import REDUCED_PRESSURE
 from icha.records import COMPLETE
@@ -214,6 +214,25 @@ def check_same_contact(run: xr.Dataset, solution: xr.Dataset) -> None:
             raise ValueError(f"{name} is {own:.7g} for the run, {other:.7g} for the solution (in {units})")
     if int(solution["seed"]) != int(run["seed"]):
         raise ValueError(f"seed is {int(run['seed'])} for the run, {int(solution['seed'])} for the solution")
+
+
+def run_of_same_contact(runs: Iterable[tuple[RunLabels, xr.Dataset]], solution: xr.Dataset) -> RunLabels:
+    """Labels of the first run that is of the same contact as a solution.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    for labels, run in runs:
+        try:
+            check_same_contact(run, solution)
+        except ValueError:
+            continue
+        return labels
+    names = ("contact_modulus", "surface_energy", "interaction_range", "rms_slope", "seed")
+    values = ", ".join(f"{name} {float(solution[name]):g}" for name in names)
+    raise ValueError(f"no run is of the same contact as the boundary elements of {values}")
 
 
 def state_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:

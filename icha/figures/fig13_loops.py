@@ -22,7 +22,7 @@ from icha.figures.hysteresis import (
 )
 from icha.figures.select import branches, pick
 from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, styled
-from icha.model_error import check_same_contact
+from icha.model_error import run_of_same_contact
 
 CAPTION = (
     "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over nominal "
@@ -200,15 +200,8 @@ def _truths(study, runs, loops):
     """The boundary elements of every run of a study that has some, by its labels."""
     found = {}
     for loop in loops:
-        for labels, run in runs:
-            try:
-                check_same_contact(run, loop)
-            except ValueError:
-                continue
-            found.setdefault(labels, []).append(loop)
-            break
-        else:
-            names = ("contact_modulus", "surface_energy", "interaction_range", "rms_slope", "seed")
-            values = ", ".join(f"{name} {float(loop[name]):g}" for name in names)
-            raise ValueError(f"study {study}: no run is of the same contact as the boundary elements of {values}")
+        try:
+            found.setdefault(run_of_same_contact(runs, loop), []).append(loop)
+        except ValueError as error:
+            raise ValueError(f"study {study}: {error}") from None
     return found
