@@ -101,7 +101,7 @@ def boundary_element_loop(
     refinement: int = 1,
     tolerance: float = DEFAULT_TOLERANCE,
     seed: int = -1,
-    say: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
     """Bring two surfaces from apart to a load and apart again, by boundary elements.
 
@@ -113,7 +113,7 @@ def boundary_element_loop(
     refinement : nodes per node of the surface's grid, along a side.
     tolerance : relative error at which the solver may stop.
     seed : recorded in the dataset.
-    say : called with lines of text.
+    progress : called with lines of text.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def boundary_element_loop(
     """
     target = positive("largest_reduced_pressure", largest_reduced_pressure)
     step = positive("separation_step", separation_step) * surface.rms_height
-    say = say or _silent
+    say = progress or _silent
     fine = resolved(surface, material, refinement, say)
     way = _Way(fine, material, positive("tolerance", tolerance), say)
     legs = _down_and_up(way, step, target * surface.rms_slope * material.contact_modulus)
