@@ -173,7 +173,10 @@ class Path:
                         "turning points that are loads"
                     )
             if not turns and not unload:
-                raise ValueError(f"control: {control!r} is for paths with unload=True or turning_points")
+                raise ValueError(
+                    f"control: {control!r} without a way back; allowed: {SEPARATION_CONTROL!r}, or a path that unloads "
+                    "or has turning points"
+                )
         object.__setattr__(self, "targets", tuple(targets))
         object.__setattr__(self, "turning_points", turns)
         object.__setattr__(self, "unload", unload)
@@ -211,8 +214,11 @@ def _turns(turning_points, last):
         if kind == before.kind:
             opened = value > before.value if kind == MEAN_SEPARATION else value < before.value
             if value == before.value or opened != (k % 2 == 0):
-                way, side = ("unloading", "beyond") if k % 2 == 0 else ("loading", "before")
-                raise ValueError(f"{label}: {value!r} ends {way} {side} {before.value!r}, where it begins")
+                way = "unloading" if k % 2 == 0 else "loading"
+                side = "less" if (k % 2 == 0) != (kind == MEAN_SEPARATION) else "more"
+                raise ValueError(
+                    f"{label}: {value!r} cannot end {way} that begins at {before.value!r}; allowed: {side} than that"
+                )
         before = Target(kind, value)
         turns.append(before)
     return tuple(turns)

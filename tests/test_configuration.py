@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 import yaml
 
+import icha
 from icha.configuration import model
 from icha.configuration.expansion import (
     asperity_cases,
     campaign_sha256,
+    loop_cases,
+    loop_settings,
     map_solution,
     measurement_settings,
     run_cases,
@@ -207,6 +210,30 @@ def test_a_study_is_a_product_of_its_lists(load):
     }
 
 
+def test_the_way_back_is_part_of_the_path(load):
+    campaign = load(
+        {
+            "studies.one.unload": True,
+            "studies.one.turning_points": [{"reduced_pressure": -1e-3}, {"area_fraction": 0.03}],
+            "studies.one.united_until": "overlap",
+        }
+    ).campaign
+    path = run_settings(campaign, run_cases(campaign)[0])["path"]
+    assert path["unload"] is True and path["united_until"] == "overlap" and path["control"] == "separation"
+    assert path["turning_points"] == [("reduced_pressure", -1e-3), ("area_fraction", 0.03)]
+    assert icha.Path(**path).turning_points[1].value == 0.03
+
+
+def test_boundary_elements_turn_where_their_study_does(load):
+    loops = {"both": {"study": "one", "seeds": [2], "rms_slopes": [1.0], "separation_step": 0.1}}
+    bare = {"materials.soft.surface_energy": "0 mJ/m^2"}
+    campaign = load({"studies.one.unload": True, "boundary_element_loops": loops} | bare).campaign
+    (case,) = loop_cases(campaign)
+    assert case.path == "both/rough/seed2/slope1/soft"
+    settings = loop_settings(campaign, case)
+    assert settings["largest_reduced_pressure"] == 0.01 and settings["separation_step"] == 0.1
+
+
 def test_settings_depend_on_values_not_on_how_they_are_written(load):
     def checksum(campaign):
         return run_sha256(campaign, run_cases(campaign)[0]), campaign_sha256(campaign)
@@ -302,6 +329,47 @@ BAD = {
         "exactly one of reduced_pressure, relative_load",
     ),
     "load beyond the model": ("studies.one.snapshots", [{"relative_load": 0.1}], "a reduced pressure of 0.5"),
+    "unload that is no truth value": ("studies.one.unload", 1, "studies.one.unload: 1 is neither true nor false"),
+    "unknown control": ("studies.one.control", "force", "'separation' or 'load'"),
+    "load control with areas": (
+        "studies.one.control",
+        "load",
+        "studies.one.control: 'load' with the stop area_fraction = 0.02; allowed: stops and turning points that are",
+    ),
+    "unknown end of unions": ("studies.one.united_until", "ever", "'detachment' or 'overlap'"),
+    "turning point of two kinds": (
+        "studies.one.turning_points",
+        [{"area_fraction": 0.1, "relative_load": 0.1}],
+        "studies.one.turning_points[0]",
+    ),
+    "unknown turning point": ("studies.one.turning_points", [{"area": 0.1}], "turning_points[0].area: unknown key"),
+    "turning point behind": (
+        "studies.one.turning_points",
+        [{"reduced_pressure": 0.02}],
+        "studies.one.turning_points[0].reduced_pressure: 0.02 cannot end unloading that begins at 0.01; allowed: less",
+    ),
+    "turning point beyond the model": (
+        "studies.one.turning_points",
+        [{"reduced_pressure": 0}, {"relative_load": 0.1}],
+        "studies.one.turning_points[1].relative_load: 0.1 at rms slope 0.2 is a reduced pressure of 0.5",
+    ),
+    "loops of a study that does not come back": (
+        "boundary_element_loops",
+        {"both": {"study": "one"}},
+        "boundary_element_loops.both.study: 'one' does not come straight back",
+    ),
+    "loops of no study": ("boundary_element_loops", {"both": {"study": "two"}}, "'two' is not defined; allowed: one"),
+    "figure of a loss without a way back": (
+        "figures",
+        {"fig15_loss": {"studies": ["one"]}},
+        "figures.fig15_loss.studies[0]: 'one' is not unloaded",
+    ),
+    "figure of loops without a way back": ("figures", {"fig13_loops": {"study": "one"}}, "is not unloaded"),
+    "figure of pull-off of no study": (
+        "figures",
+        {"fig14_pull_off": {"study": "one", "load_studies": ["two"]}},
+        "figures.fig14_pull_off.load_studies[0]: 'two' is not defined",
+    ),
     "step too long": ("studies.one.max_step", 0.6, "(0, 0.5]"),
     "figure of no study": ("figures", {"fig2_area_and_gap": {"study": "two"}}, "'two' is not defined; allowed: one"),
     "unknown figure": ("figures", {"fig7": {}}, "figures.fig7: unknown key"),

@@ -63,3 +63,9 @@ def test_boundary_elements_can_be_added_to_it(campaign):
     (text,), (more,) = blocks("yaml", "name: mine"), blocks("yaml", "boundary_elements:")
     cases = solution_cases(campaign(text + "\n" + more))
     assert len(cases) == 3 * 2 and {case.material for case in cases} == {"bare"}
+
+
+def test_a_way_back_can_be_added_to_it(campaign):
+    (text,), (more,) = blocks("yaml", "name: mine"), blocks("yaml", "unload: true")
+    study = campaign(text.replace("studies:\n", f"studies:\n{more}")).studies["pull"]
+    assert study.unload and [point.target[1] for point in study.turning_points] == [0.0, 1e-2]

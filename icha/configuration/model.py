@@ -812,6 +812,15 @@ class Campaign(Section):
 
     def _path_problems(self, location, study):
         """What keeps the way back of a study from being a path."""
+        for index, point in enumerate(study.turning_points):
+            for slope in study.rms_slopes:
+                if (point.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
+                    yield (
+                        (*location, "turning_points", index, "relative_load"),
+                        point.relative_load,
+                        f"at rms slope {slope:g} is a reduced pressure of {point.relative_load / slope:g}; allowed: "
+                        f"relative loads up to {MAX_REDUCED_PRESSURE * min(study.rms_slopes):g}",
+                    )
         if not (study.unload or study.turning_points or study.control != "separation"):
             return
         try:
@@ -819,9 +828,11 @@ class Campaign(Section):
         except ValueError as error:
             key, _, reason = str(error).partition(": ")
             name, _, index = key.partition("[")
-            place = (name, int(index.rstrip("]"))) if index else (name,)
-            value = study.model_dump(exclude_none=True).get(name)
-            yield (*location, *place), value[place[1]] if index else value, reason
+            place, value = (name,), getattr(study, name)
+            if index:
+                kind, value = value[int(index.rstrip("]"))].target
+                place = (name, int(index.rstrip("]")), kind)
+            yield (*location, *place), value, reason.removeprefix(f"{value!r} ")
 
     def _loop_problems(self, location, entry):
         """What boundary elements both ways need of their study."""
