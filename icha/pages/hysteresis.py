@@ -178,12 +178,10 @@ def rules(overlap: xr.Dataset, detachment: xr.Dataset) -> str:
     return table(head, rows)
 
 
-def largest_loads(studies: Sequence[xr.Dataset], slopes: xr.Dataset) -> str:
-    """Pull-off and loss against the largest load, for the slope that all studies have."""
-    ((slope,), *_) = (
-        [float(s) for s in study["rms_slope"].values] for study in studies if study.sizes["rms_slope"] == 1
-    )
-    studies = [study.sel(rms_slope=slope, method="nearest").isel(surface=0) for study in studies]
+def largest_loads(studies: Sequence[xr.Dataset]) -> str:
+    """Pull-off and loss against the largest load, for the first slope that all studies have."""
+    slope = min(set.intersection(*(set(study["rms_slope"].values.tolist()) for study in studies)))
+    studies = [study.sel(rms_slope=slope).isel(surface=0) for study in studies]
     studies.sort(key=lambda study: float(study["largest_reduced_pressure"].mean()))
     head = ["Δγ, mJ/m²", "", *(f"p\\* = {float(s['largest_reduced_pressure'].mean()):.2g}" for s in studies), ""]
     rows = []
@@ -232,7 +230,7 @@ def controls(separation: xr.Dataset, load: xr.Dataset) -> str:
     rows = []
     for slope, material, one in _cells(_adhesive(load)):
         one = one.isel(seed=0)
-        other = separation.sel(rms_slope=slope, material=material, seed=one["seed"]).isel(surface=0)
+        other = separation.sel(rms_slope=slope, material=material, seed=int(one["seed"])).isel(surface=0)
         row = [_energy(one)]
         for name, form in (
             ("pull_off_pressure", "{:.4g}"),
