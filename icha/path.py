@@ -414,7 +414,7 @@ class _Journey:
         self.step = self.longest
         self.first_contact = self.state = untouched(contact)
         self.missed, self.reached = [], 0
-        self.stations = []  # separations met on the legs before, in increasing order
+        self.stations = []  # separations met on the way in, in increasing order
         self.total = len(path.targets)
         self.effort = 0.0  # work and losses of all steps so far, without their signs
         self.jumped = 0.0  # energy that jumps have set free so far, as if every spot were alone
@@ -568,10 +568,13 @@ class _Journey:
             if leg == 0:
                 self._tell_stop(stop.target)
             yield Waypoint(stop.target, met, leg)
-        self.stations = sorted({*self.stations, *visited, self.state.separation})
+        if direction < 0:
+            # A way back meets the separations of the way in; what an inner loop adds to them it takes away again.
+            lowest = min(self.stations, default=np.inf)
+            self.stations = sorted({*self.stations, *(s for s in [*visited, self.state.separation] if s < lowest)})
 
     def _next_station(self, direction):
-        """How far it is to the next separation of the legs before; without one a step."""
+        """How far it is to the next separation of the way in; without one a step."""
         apart = _SAME_SEPARATION * self.contact.rms_height
         ahead = [d for d in ((s - self.state.separation) * direction for s in self.stations) if d > apart]
         return min(ahead, default=self.step)
