@@ -360,7 +360,8 @@ def _dataset(surface, way, legs, separation_step, seed):
         for name, (dims, units, long_name) in VARIABLES.items()
     }
     branch = np.array(["loading", "unloading"], dtype=object)[leg]
-    variables["branch"] = (
+    named = {"units": "1", "long_name": "loading on the way down, unloading on the way up"}
+    variables["branch"] = ("step", branch, named)
         "step",
         branch,
         {"units": "1", "long_name": "loading on the way down, unloading on the way up"},
