@@ -362,10 +362,6 @@ def _dataset(surface, way, legs, separation_step, seed):
     branch = np.array(["loading", "unloading"], dtype=object)[leg]
     named = {"units": "1", "long_name": "loading on the way down, unloading on the way up"}
     variables["branch"] = ("step", branch, named)
-        "step",
-        branch,
-        {"units": "1", "long_name": "loading on the way down, unloading on the way up"},
-    )
     adhesion = "with" if adhesive else "without"
     return xr.Dataset(
         variables,
