@@ -37,7 +37,9 @@ _HEADINGS = {
     "Study": "`studies.<name>`",
     "Targets": "`studies.<name>.targets`",
     "Snapshot": "`studies.<name>.snapshots`, each",
+    "TurningPoint": "`studies.<name>.turning_points`, each",
     "BoundaryElements": "`boundary_elements.<name>`",
+    "BoundaryElementLoops": "`boundary_element_loops.<name>`",
     "ErrorSources": "`error_sources.<name>`",
     "OneAsperity": "`one_asperity`",
     "Measurement": "`measurements.<name>`",
@@ -51,6 +53,10 @@ _HEADINGS = {
     "TaborFigure": "`figures.fig9_tabor`",
     "ComparedFigure": "`figures.fig10_model_error`, `figures.fig11_distribution_error`",
     "SourcesFigure": "`figures.fig12_error_sources`",
+    "LoopsFigure": "`figures.fig13_loops`",
+    "PullOffFigure": "`figures.fig14_pull_off`",
+    "LossFigure": "`figures.fig15_loss`",
+    "SnapMapFigure": "`figures.fig16_snap_map`",
     "Author": "`authors`, each",
 }
 
@@ -63,6 +69,8 @@ def _table(heading: str, section: dict) -> str:
             default = "needed"
         elif value.get("default") is None:
             default = "none"
+        elif isinstance(value["default"], dict):
+            default = "none"  # a section of its own
         else:
             default = f"`{json.dumps(value['default'])}`"
         lines.append(f"| `{key}` | {default} | {value['description']} |")
