@@ -30,6 +30,10 @@ def new_events(before: ContactState, after: ContactState) -> Events:
     return Events.joined(after.history[len(before.history) :])
 
 
+# Of the work of a step, the part from which on its loss is that of its jumps, and not what is not reciprocal.
+_PLAIN_LOSS = 0.1
+
+
 @dataclass(frozen=True)
 class Step:
     """From one equilibrium of a path to the next: work, change of energy and events.
@@ -113,15 +117,17 @@ class EnergyBalance:
     def after(self, contact: Contact, step: Step) -> EnergyBalance:
         """The balance after one more step.
 
-        A step with jumps has lost its energy in them, if that is about what they would lose, were their spots alone.
-        Otherwise, as in steps in which spots also united, they have lost just that. The rest is that of unions and
-        their undoing, where there were any, and else unattributed.
+        A step with jumps alone has lost its energy in them, if it is about what they would lose, were their spots
+        alone, or not small beside the work; those of both kinds share it as if every spot were alone. Otherwise, and
+        where spots also united, they have lost just what their spots would alone. The rest is that of unions and their
+        undoing, where there were any, and else unattributed.
         """
         events, united = step.events, step.unites
         jump_in, jump_off = (
             float(events.energy[events.kind == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF)
         )
-        if not united and 0.5 < step.lost / ((jump_in + jump_off) or np.inf) < 2:
+        ratio = step.lost / ((jump_in + jump_off) or np.inf)
+        if not united and ratio and (0.5 < ratio < 2 or abs(step.lost) > _PLAIN_LOSS * abs(step.work)):
             scale = step.lost / (jump_in + jump_off)
             jump_in, jump_off = scale * jump_in, scale * jump_off
         rest = step.lost - jump_in - jump_off

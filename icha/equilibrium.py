@@ -275,6 +275,11 @@ class ContactState:
             sites.position[c], sites.height[c], sites.radius[c], self.radius[c], self.approach[c], sites.members[c]
         )
 
+    @property
+    def responses(self) -> np.ndarray:
+        """d(delta)/du of the spots."""
+        return self.response[self._in_contact]
+
     @cached_property
     def owner(self) -> np.ndarray:
         """For every asperity the index of the spot that it is, or is part of, or lies under; -1 where free."""

@@ -67,6 +67,8 @@ _UNITING_STEP = 1 / 16
 # Of the largest tension so far, the part by which it may be missed between two equilibria: at an event, and else.
 _MISSED_TENSION = 1e-3
 _MISSED_SMOOTH_TENSION = 1e-8
+# At such a rate to the separation the approach of a spot rises, as the surfaces part, on an unstable branch only.
+_RUNAWAY = 10.0
 # The first contact is made and the last one broken within this change of separation, in h_rms.
 _SHARP = 1e-12
 
@@ -557,8 +559,8 @@ class _Journey:
             self.effort += abs(step.work) + abs(step.lost)
             self.jumped += step.set_free(self.contact)
             self.lowest = min(self.lowest, mean_pressure(self.contact, met.spots))
-            self.step = self.longest if self.step <= 2 * _SHARP * self.contact.rms_height else 2 * self.step
-            self.step = min(self.longest, self.step)
+            first = leg == 0 and len(visited) == 1
+            self.step = self.longest if first else min(self.longest, 2 * self.step)
             if abs(met.separation - visited[-1]) > between:
                 visited.append(met.separation)
             if stop is None:
@@ -609,7 +611,10 @@ class _Journey:
     def _equilibrium(self, start, separation, collective):
         """The equilibrium at a separation; if there is none and it may be lost `collectively`, with spots let go."""
         try:
-            return equilibrium(self.contact, start, separation)
+            beyond = equilibrium(self.contact, start, separation)
+            if separation > start.separation and np.max(beyond.responses, initial=0.0) > _RUNAWAY:
+                raise NotConverged("spots would come closer as the surfaces part: an unstable equilibrium")
+            return beyond
         except NotConverged:
             if not collective:
                 raise
