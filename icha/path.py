@@ -415,9 +415,10 @@ class _Journey:
         self.longest = path.max_step * contact.rms_height
         self.step = self.longest
         self.first_contact = self.state = untouched(contact)
-        self.missed, self.reached = [], 0
+        self.missed, self.reached, self.loading = [], 0, True
         self.stations = []  # separations met on the way in, in increasing order
         self.total = len(path.targets)
+        self.event_at = np.inf  # where, counted along the leg, events were seen that are not resolved yet
         self.effort = 0.0  # work and losses of all steps so far, without their signs
         self.jumped = 0.0  # energy that jumps have set free so far, as if every spot were alone
         self.lowest = 0.0  # pressure so far
@@ -426,7 +427,8 @@ class _Journey:
         return _Stop(target, self.contact, self.scale.get(target.kind, 1.0))
 
     def _end(self, *failures):
-        return NotConverged(_epitaph(self.contact, self.state, self.reached, self.total, [*self.missed, *failures]))
+        reasons = [*self.missed, *failures]
+        return NotConverged(_epitaph(self.contact, self.state, self.reached, self.total, reasons, self.loading))
 
     def _shorten(self, failure):
         """Halve the step after an equilibrium that was not found."""
@@ -530,8 +532,8 @@ class _Journey:
 
     def _until(self, leg, waiting, apart=False) -> Iterator[Waypoint]:
         """One leg: until all stops are met or, `apart`, nothing touches any more."""
-        direction = 1 if leg % 2 else -1
-        waiting, visited = list(waiting), [self.state.separation]
+        direction, self.loading = (1, False) if leg % 2 else (-1, True)
+        waiting, visited, self.event_at = list(waiting), [self.state.separation], np.inf
         # Not every separation around an event is one to come back to.
         between = self.longest / 64 if self.contact.adhesive else _SAME_SEPARATION * self.contact.rms_height
         highest = self.first_contact.separation - _SAME_SEPARATION * self.contact.rms_height
@@ -539,7 +541,7 @@ class _Journey:
             if direction > 0 and not len(self.state.spots) and self.state.separation >= highest:
                 if apart:
                     return
-                raise self._end(NotConverged(f"the surfaces are apart before {_name(waiting[0].target)}"))
+                raise self._end(NotConverged(self._never_so_far(waiting[0].target)))
             beyond, step = self._resolved(direction)
             try:
                 stop, met = self._first_passed(waiting, beyond, direction)
@@ -575,6 +577,13 @@ class _Journey:
             lowest = min(self.stations, default=np.inf)
             self.stations = sorted({*self.stations, *(s for s in [*visited, self.state.separation] if s < lowest)})
 
+    def _never_so_far(self, target):
+        """That the surfaces come apart before a turning point; of a load, what tension they bear."""
+        reason = f"the surfaces are apart before the turning point {_name(target)}"
+        if target.kind in self.scale:
+            reason += f"; the largest tension is {max(-self.lowest / self.scale[target.kind], 0.0):.4g}"
+        return reason
+
     def _next_station(self, direction):
         """How far it is to the next separation of the way in; without one a step."""
         apart = _SAME_SEPARATION * self.contact.rms_height
@@ -597,14 +606,21 @@ class _Journey:
                 width = min(0.5 * width, self.step)
                 continue
             step = Step.between(self.contact, start, beyond)
-            if width <= _SHARP * self.contact.rms_height:
+            sharp = _SHARP * self.contact.rms_height
+            # Within the accuracy of an equilibrium an event may happen after a long step and not after a short one.
+            passed = step.sudden and direction * start.separation + sharp >= self.event_at
+            if width <= sharp or passed:
+                self.event_at = np.inf if step.sudden else self.event_at
                 return beyond, step
             if self._is_resolved(start, beyond, step):
+                self.event_at = np.inf if step.sudden else self.event_at
                 at = self._largest_tension(start, beyond, step)
                 if at is None:
                     return beyond, step
                 width = at - start.separation
             else:
+                if step.sudden:
+                    self.event_at = min(self.event_at, direction * beyond.separation)
                 width *= 0.5
             self.step = min(self.step, width)
 
@@ -671,8 +687,8 @@ class _Journey:
 def _under_load(contact, waypoints) -> Iterator[Waypoint]:
     """Of the states of a path those that load control visits.
 
-    Where the pressure would have to go back, the state jumps at constant pressure to where the curve goes on. When the
-    last contact breaks the load is taken away.
+    Where the pressure would have to go back, the state jumps at constant pressure to where the curve goes on; with the
+    last contact, to where nothing touches any more.
     """
     visited = hidden = None
     balance = EnergyBalance()
@@ -703,7 +719,8 @@ def _under_load(contact, waypoints) -> Iterator[Waypoint]:
         yield replace(waypoint, balance=balance)
         visited, level = state, pressure
     if hidden is not None:
-        balance = balance.after_load_jump(0.0, stored_energy(contact, hidden.state) - stored_energy(contact, visited))
+        work = -level * (hidden.state.separation - visited.separation)
+        balance = balance.after_load_jump(work, stored_energy(contact, hidden.state) - stored_energy(contact, visited))
         yield replace(hidden, balance=balance)
 
 
@@ -729,13 +746,13 @@ def _name(target, digits=None):
     return f"{target.kind} = {target.value:{f'.{digits}' if digits else ''}g}"
 
 
-def _epitaph(contact, state, reached, total, failures):
+def _epitaph(contact, state, reached, total, failures, loading):
     """Where the path ended and why; a surface that sticks together by itself is called so."""
     pressure = mean_pressure(contact, state.spots)
     sticky = ""
     # Without a load, adhesion alone has spread the contact, or the very first one does not come to rest.
     lone = not len(state.spots) and not any(isinstance(failure, InsideJump) for failure in failures)
-    if contact.adhesive and (pressure < 0 or lone):
+    if contact.adhesive and loading and (pressure < 0 or lone):
         sticky = "; the load is not yet compressive: the surface is sticky, adhesion is pulling it towards full contact"
     return (
         f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "

@@ -129,7 +129,12 @@ VARIABLES = {
 
 # Those of a path that goes on after the first loading ...
 CYCLE_VARIABLES = {
-    "work": (("step",), "J m-2", "work done on the contact since first contact, -(integral of p du)"),
+    "work": (
+        ("step",),
+        "J m-2",
+        "work done on the contact since first contact, -(integral of p du), "
+        "cubic between steps, by pressure and contact stiffness, and at constant pressure in a jump under load control",
+    ),
     "stored_energy": (("step",), "J m-2", "elastic energy less that of adhesion, 0 out of contact"),
     "dissipated_by_jump_in": (("step",), "J m-2", "energy lost so far as contacts formed"),
     "dissipated_by_jump_off": (("step",), "J m-2", "energy lost so far as contacts broke"),

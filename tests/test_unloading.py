@@ -16,7 +16,17 @@ from scipy.optimize import brentq, minimize_scalar
 import icha
 from icha import Material, Path
 from icha.asperities import Asperities, find_summits
-from icha.equilibrium import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Contact, Events, area_fraction, mean_pressure
+from icha.equilibrium import (
+    COALESCENCE,
+    JUMP_IN,
+    JUMP_OFF,
+    SPLIT,
+    Contact,
+    Events,
+    NotConverged,
+    area_fraction,
+    mean_pressure,
+)
 from icha.jkr import JKR
 from icha.path import LOAD_CONTROL, MAX_REDUCED_PRESSURE, follow
 from icha.reference.one_asperity import paraboloid
@@ -408,3 +418,25 @@ def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
 def test_wrong_ways_back_are_refused_by_name(settings, message):
     with pytest.raises(ValueError, match=message):
         Path([0.1], **settings)
+
+
+def test_an_edge_of_contact_within_the_accuracy_of_the_solver_is_passed():
+    """A sticky bump, as wide as a quarter of the cell, is drawn off; near the end no step is too short to go on."""
+    n, period = 64, 100e-6
+    x = (np.arange(n) + 0.5) * period / n - period / 2
+    heights = 1e-6 * np.exp(-(x[:, None] ** 2 + x**2) / (2 * (10e-6) ** 2))
+    surface = icha.Surface(heights=heights, period=period)
+    sticky = icha.Material(contact_modulus=0.24e6, surface_energy=0.05, interaction_range=2e-9)
+    run = icha.simulate(surface, sticky, icha.Path(mean_separations=[5e-7, 2e-7], unload=True))
+    assert run.sizes["step"] < 400
+    (radius,) = find_summits(surface).radius
+    most = 1.5 * np.pi * 0.05 * radius / period**2
+    assert float(run.pull_off_pressure) == pytest.approx(most, rel=1e-6)
+    assert float(run.detachment_pressure) == pytest.approx(-5 / 9 * most, rel=1e-3)
+
+
+def test_a_tension_that_is_never_reached_is_said_to_be_so():
+    contact = contact_of([HEIGHT], [(0, 0)])
+    path = Path(reduced_pressures=[0.005], turning_points=[("reduced_pressure", -0.1)])
+    with pytest.raises(NotConverged, match=r"apart before the turning point reduced_pressure = -0.1; the largest"):
+        list(follow(contact, path, 1e3 / FAR**2))

@@ -47,8 +47,8 @@ loads (largest over smallest, less one).
 
 _CONTROL = """## Under load control
 
-The state runs along the same curve and jumps where the load would have to turn back; the last contacts break together
-at the largest tension, and what they held is lost in that jump. First seed.
+The state runs along the same curve and jumps, at constant load, where the load would have to turn back; the last
+contacts break together at the largest tension. First seed.
 """
 
 _ELEMENTS = """## Beside boundary elements
