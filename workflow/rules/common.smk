@@ -104,7 +104,9 @@ def threads_of(surface):
 
 def figure_memory(name):
     """Megabytes that a figure needs: the map holds a topography."""
-    return 2000 + (16 * max(map(points_of, CAMPAIGN.surfaces)) // 10**6 if name in ("fig4_contact_map", "fig16_snap_map") else 0)
+    return 2000 + (
+        16 * max(map(points_of, CAMPAIGN.surfaces)) // 10**6 if name in ("fig4_contact_map", "fig16_snap_map") else 0
+    )
 
 
 def solution_of(wildcards):
