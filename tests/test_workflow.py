@@ -42,6 +42,7 @@ def test_everything_that_was_promised_is_there(smoke):
         "references/boundary_elements/adhesionless/challenge/seed2/slope1/cmc_adhesionless/p0.0316.nc",
         "references/boundary_elements/adhesive/challenge/seed1/slope1/cmc_300nm/p0.01.nc",
         "references/error_sources/adhesionless/challenge/seed1/slope1/cmc_adhesionless.nc",
+        "references/loops/adhesive/challenge/seed1/slope1/cmc_300nm.nc",
         "references/one_asperity/hertz.nc",
         "references/one_asperity/mu1.5.nc",
         "aggregated/model_error.nc",
@@ -56,7 +57,7 @@ def test_everything_that_was_promised_is_there(smoke):
     ):
         assert name in files
     figures = sorted(file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py"))
-    assert len(figures) == 12
+    assert len(figures) == 16
     for figure in figures:
         assert f"figures/{figure}.png" in files and f"figures/{figure}.pdf" in files
     jobs = [file for file in files if file.startswith(("surfaces", "runs"))]
@@ -81,7 +82,7 @@ def test_boundary_elements_say_whether_the_grid_resolves_the_attraction_before_t
 def test_the_dataset_tells_where_it_comes_from(smoke):
     campaign = load_configuration(smoke / "results/smoke/config.used.yaml").campaign
     with xr.open_datatree(smoke / "results/smoke/dataset/smoke.nc") as tree:
-        assert set(tree.children) == {"challenge", "multi_slope"}
+        assert set(tree.children) == {"challenge", "multi_slope", "pull", "pull_far"}
         assert tree.attrs["config_sha256"] == campaign_sha256(campaign)
         assert tree.attrs["license"] == "CC-BY-4.0"
         assert tree["multi_slope"]["rms_slope"].values.tolist() == [0.2, 0.5, 1.0]
