@@ -20,6 +20,7 @@ ALL_RULES = {
     "surface",
     "reference",
     "boundary_elements",
+    "boundary_element_loop",
     "error_sources",
     "one_asperity",
     "run",
@@ -31,7 +32,7 @@ ALL_RULES = {
     "figure",
     "report_page",
 }
-BESIDE_RUNS = {"reference", "boundary_elements", "error_sources", "one_asperity"}
+BESIDE_RUNS = {"reference", "boundary_elements", "boundary_element_loop", "error_sources", "one_asperity"}
 WHAT_FOLLOWS_RUNS = ALL_RULES - {"configuration", "surface"} - BESIDE_RUNS
 
 
@@ -99,12 +100,13 @@ def test_a_fresh_clone_with_unpacked_results_runs_nothing(smoke, tmp_path):
         "elasticity": {"error_sources", "one_asperity"},
         "simulation": set(),
         "path": {"error_sources"},
+        "dissipation": {"error_sources"},
     }.items(),
 )
 def test_the_physics_runs_sweeps_and_what_follows(module, beside, project):
     add_statement(project / f"icha/{module}.py")
     jobs, _ = planned(project)
-    assert jobs["run"] == 9
+    assert jobs["run"] == 12
     # Boundary elements know nothing of the model: they are not solved again.
     assert set(jobs) == WHAT_FOLLOWS_RUNS | beside
 
@@ -126,7 +128,7 @@ def test_a_figure_runs_itself_and_the_report(project):
 def test_the_style_runs_all_figures(project):
     add_statement(project / "icha/figures/style.py")
     jobs, _ = planned(project)
-    assert jobs == {"figure": 12, "report_page": 1}
+    assert jobs == {"figure": 16, "report_page": 1}
 
 
 def test_boundary_elements_run_without_the_sweeps(project):
@@ -134,7 +136,7 @@ def test_boundary_elements_run_without_the_sweeps(project):
     jobs, _ = planned(project)
     assert jobs["boundary_elements"] == 6
     what_follows = {"model_error", "checks", "verdict", "figure", "report_page"}
-    assert set(jobs) == {"boundary_elements", "error_sources", "one_asperity"} | what_follows
+    assert set(jobs) == {"boundary_elements", "boundary_element_loop", "error_sources", "one_asperity"} | what_follows
 
 
 def test_a_finer_grid_costs_its_own_solutions(project):
