@@ -17,7 +17,7 @@ unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
 	@echo "make validation  run campaign validation (an hour) and write docs/validation.md and docs/error_sources.md from it"
-	@echo "make hysteresis  run campaign hysteresis (half an hour) and write docs/hysteresis.md from it"
+	@echo "make hysteresis  run campaign hysteresis (twenty minutes) and write docs/hysteresis.md from it"
 	@echo "make test    run the tests"
 	@echo "make lint    check style of Python code and workflow"
 	@echo "make format  put Python code and workflow into that style"
