@@ -29,8 +29,9 @@ Two rules are there (`united_until` of a study):
   when they just touched: the mirror image of the union.
 
 The equivalent spot is one asperity that is taller, and rounder, than either of the two; down to small areas it carries
-more load than the two apart would. So under `detachment` the way back lies above the way in at the same separation: the
-surfaces give back more work than was put in, and the loss may even come out negative, which no passive contact can do.
+more load than the two apart would. So under `detachment` the way back does not lie on the way in. The surfaces may give
+back more work than was put in, as two equal asperities do, and the loss come out negative, which no passive contact can
+do; or, where asperities are unequal, the united spot may let go early, and work is lost for nothing.
 Without adhesion nothing should be lost at all; what the loop of the bare surface loses or gains is the error of the
 rule, and the table has it in per cent of the largest work done on the way in. With adhesion, the two rules' pull-off
 and loss are side by side.
