@@ -615,11 +615,6 @@ class PullOffFigure(StudyFigure):
         "asperities could pull at once.",
     )
 
-    @property
-    def studies(self) -> list[str]:
-        """All studies that are drawn."""
-        return list(dict.fromkeys([self.study, *(self.load_studies or [])]))
-
 
 class LossFigure(Section):
     """A figure of the energy lost in the runs of some studies."""

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from icha.figures.curves import SEPARATION_LABEL
 from icha.figures.fig4_contact_map import _means, _show_whole
 from icha.figures.hysteresis import BRANCH_DASHES, legend_below, slope_label, unloaded_runs
-from icha.figures.select import pick, ways_back
+from icha.figures.select import check_topography, pick_run, ways_back
 from icha.figures.style import (
     BLACK,
     BLUE,
@@ -84,12 +84,10 @@ def figure(
     ValueError
         If there is no such run, it was not unloaded, or the surface is another one's.
     """
-    labels, run = _run(unloaded_runs(campaign, study), study, surface_name, seed, rms_slope, material)
+    asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
+    labels, run = pick_run(unloaded_runs(campaign, study), f"study {study}: no unloaded run", **asked)
     period = float(run["period"])
-    if not np.isclose(float(surface["period"]), period, rtol=1e-9) or int(surface["grid"]) != int(run["grid"]):
-        raise ValueError(f"{labels}: the surface given has another period or grid")
-    if "seed" in surface and int(surface["seed"]) != labels.seed:
-        raise ValueError(f"{labels}: the surface given has seed {int(surface['seed'])}")
+    check_topography(labels, run, surface)
     adhesive = float(run["surface_energy"]) > 0
     events = _events(run)
 
@@ -147,18 +145,6 @@ def figure(
     handles |= {name: Line2D([], [], color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
     legend_below(fig, handles, columns=3)
     return fig
-
-
-def _run(runs, study, surface, seed, slope, material):
-    """The first of the runs asked for, with adhesion if there is one and nothing else is asked."""
-    runs = [(labels, run) for labels, run in runs if surface in (None, labels.surface)]
-    runs = [(labels, run) for labels, run in runs if seed in (None, labels.seed)]
-    runs = [(labels, run) for labels, run in runs if slope is None or np.isclose(slope, labels.rms_slope)]
-    if not runs:
-        raise ValueError(f"study {study}: no unloaded run of surface {surface}, seed {seed}, rms slope {slope}")
-    adhesive = [labels.material for labels, run in runs if float(run["surface_energy"]) > 0]
-    material = pick("material", material, adhesive + [labels.material for labels, _ in runs])
-    return next((labels, run) for labels, run in runs if labels.material == material)
 
 
 def _events(run):

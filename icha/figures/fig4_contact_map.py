@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from icha.campaign import find_snapshot, spots_of
-from icha.figures.select import pick, study_runs
+from icha.figures.select import check_topography, pick_run, study_runs
 from icha.figures.spots import draw_spots, periodic_circles
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, new_figure, number, panel_label, styled, unit_for
 from icha.model_error import check_same_contact, contact_of_spots, jaccard, state_of
@@ -76,22 +76,11 @@ def figure(
     ValueError
         If there is no such run or snapshot, or the surface or the solution is another one's.
     """
-    runs = study_runs(campaign, study)
-    runs = [(labels, run) for labels, run in runs if surface_name in (None, labels.surface)]
-    runs = [(labels, run) for labels, run in runs if seed in (None, labels.seed)]
-    runs = [(labels, run) for labels, run in runs if rms_slope is None or np.isclose(rms_slope, labels.rms_slope)]
-    if not runs:
-        raise ValueError(f"study {study}: no run of surface {surface_name}, seed {seed}, rms slope {rms_slope}")
-    adhesive = [labels.material for labels, run in runs if float(run["surface_energy"]) > 0]
-    materials = adhesive + [labels.material for labels, _ in runs]
-    material = pick("material", material, materials)
-    labels, run = next((labels, run) for labels, run in runs if labels.material == material)
+    asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
+    labels, run = pick_run(study_runs(campaign, study), f"study {study}: no run", **asked)
     at = find_snapshot(run, kind, target)
     period = float(run["period"])
-    if not np.isclose(float(surface["period"]), period, rtol=1e-9) or int(surface["grid"]) != int(run["grid"]):
-        raise ValueError(f"{labels}: the surface given has another period or grid")
-    if "seed" in surface and int(surface["seed"]) != labels.seed:
-        raise ValueError(f"{labels}: the surface given has seed {int(surface['seed'])}")
+    check_topography(labels, run, surface)
 
     if solution is not None:
         try:

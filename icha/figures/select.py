@@ -42,6 +42,42 @@ def pick(labels: str, wanted, there: list):
     return wanted
 
 
+def pick_run(
+    runs: list[tuple[RunLabels, xr.Dataset]],
+    called: str,
+    *,
+    surface: str | None = None,
+    seed: int | None = None,
+    rms_slope: float | None = None,
+    material: str | None = None,
+) -> tuple[RunLabels, xr.Dataset]:
+    """The first of `runs` asked for, with adhesion if there is one and no material is asked for.
+
+    Raises
+    ------
+    ValueError
+        If there is none: of what is `called`, such as "study load: no run".
+    """
+    runs = [(labels, run) for labels, run in runs if surface in (None, labels.surface)]
+    runs = [(labels, run) for labels, run in runs if seed in (None, labels.seed)]
+    runs = [(labels, run) for labels, run in runs if rms_slope is None or np.isclose(rms_slope, labels.rms_slope)]
+    if not runs:
+        raise ValueError(f"{called} of surface {surface}, seed {seed}, rms slope {rms_slope}")
+    adhesive = [labels.material for labels, run in runs if float(run["surface_energy"]) > 0]
+    material = pick("material", material, adhesive + [labels.material for labels, _ in runs])
+    return next((labels, run) for labels, run in runs if labels.material == material)
+
+
+def check_topography(labels: RunLabels, run: xr.Dataset, surface: xr.Dataset) -> None:
+    """Raise ValueError unless a surface file's dataset is the topography of a run."""
+    if not np.isclose(float(surface["period"]), float(run["period"]), rtol=1e-9) or int(surface["grid"]) != int(
+        run["grid"]
+    ):
+        raise ValueError(f"{labels}: the surface given has another period or grid")
+    if "seed" in surface and int(surface["seed"]) != labels.seed:
+        raise ValueError(f"{labels}: the surface given has seed {int(surface['seed'])}")
+
+
 def path_steps(run: xr.Dataset) -> xr.Dataset:
     """The first loading's stops in the study's list of targets, without those added for snapshots of another kind."""
     run = run.isel(step=loading_stops(run).values)
