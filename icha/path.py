@@ -549,7 +549,7 @@ class _Journey:
                 waiting.remove(jump.stop)
                 if not apart:
                     self.missed.append(jump)
-                    if direction > 0 or leg:
+                    if leg:
                         raise self._end() from None
                 continue
             except NotConverged as failure:

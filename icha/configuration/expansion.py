@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 
-from icha.configuration.model import BesideStudy, Campaign, MapFigure, SelfAffineSurface, SnapMapFigure
+from icha.configuration.model import BesideStudy, Campaign, RunFigure, SelfAffineSurface
 from icha.labels import ContactLabels, RunLabels, SolutionLabels, number_label
 
 
@@ -94,7 +94,7 @@ def map_solution(campaign: Campaign) -> SolutionLabels | None:
     return max(found, key=lambda case: campaign.boundary_elements[case.entry].refinement, default=None)
 
 
-def map_case(campaign: Campaign, figure: MapFigure | SnapMapFigure) -> RunLabels:
+def map_case(campaign: Campaign, figure: RunFigure) -> RunLabels:
     """The run that a map (figures 4 and 16) shows: of its study's first, with adhesion if it does not say."""
     cases = [
         case

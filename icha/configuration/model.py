@@ -569,8 +569,8 @@ class SnapshotFigure(StudyFigure):
     )
 
 
-class MapFigure(SnapshotFigure):
-    """A figure of one snapshot of one run; what is left out is the study's first."""
+class RunFigure(StudyFigure):
+    """A figure of one run; what is left out is the study's first."""
 
     surface: Name | None = Field(default=None, description="Surface that is shown.")
     seed: _integer(0) | None = Field(default=None, description="Seed that is shown.")
@@ -578,6 +578,10 @@ class MapFigure(SnapshotFigure):
     material: Name | None = Field(
         default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
     )
+
+
+class MapFigure(SnapshotFigure, RunFigure):
+    """A figure of one snapshot of one run; what is left out is the study's first."""
 
 
 class SlopesFigure(StudyFigure):
@@ -625,15 +629,8 @@ class LossFigure(Section):
     )
 
 
-class SnapMapFigure(StudyFigure):
+class SnapMapFigure(RunFigure):
     """A figure of the events of one run; what is left out is the study's first."""
-
-    surface: Name | None = Field(default=None, description="Surface that is shown.")
-    seed: _integer(0) | None = Field(default=None, description="Seed that is shown.")
-    rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
-    material: Name | None = Field(
-        default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
-    )
 
 
 class SourcesFigure(Section):
