@@ -15,7 +15,8 @@ from pydantic import BaseModel, ValidationError
 
 from icha.configuration.height_map import read_height_map
 from icha.configuration.measurement import read_columns
-from icha.configuration.model import BESIDE_STUDIES, NAME_PATTERN, Campaign, FileSurface
+from icha.configuration.model import BESIDE_STUDIES, Campaign, FileSurface
+from icha.configuration.values import NAME_PATTERN
 
 
 class ConfigurationError(ValueError):

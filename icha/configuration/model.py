@@ -8,136 +8,46 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
     Field,
-    WithJsonSchema,
     field_validator,
     model_validator,
 )
 
 from icha.cohesive_zone import resolution_problem
-from icha.configuration.units import PATTERN, PHYSICAL_NAMES, conversion_factor, to_number, to_si
+from icha.configuration.units import conversion_factor
+from icha.configuration.values import (
+    MAX_GRID,
+    AreaFraction,
+    Flag,
+    Length,
+    Modulus,
+    Name,
+    Positive,
+    ReducedPressure,
+    Section,
+    SurfaceEnergy,
+    Text,
+    decreasing,
+    distinct,
+    exactly_one,
+    increasing,
+    integer,
+    list_of_names,
+    number,
+    stops,
+)
 from icha.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
 from icha.material import Material as Interface
 
-NAME_PATTERN = r"^[a-z0-9_-]+$"
-# Nodes along a side of a surface or of boundary elements.
-MAX_GRID = 32768
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
 # Rounding of the quotient of two lengths must not decide whether a wave has its cells.
 _ROUNDING = 1e-9
-
-
-def _quantity(si_unit, example, minimum=None):
-    """Type of a value that is written with its unit and kept as a float in `si_unit`."""
-    allowed = f"{PHYSICAL_NAMES[si_unit]} with its unit"
-    allowed += {None: ", greater than 0", 0: ", 0 or greater"}[minimum] + f", such as {example!r}"
-
-    def read(value: Any) -> float:
-        try:
-            result = to_si(value, si_unit)
-        except ValueError as error:
-            raise ValueError(f"{error}; allowed: {allowed}") from None
-        if result < 0 or (result == 0 and minimum is None):
-            raise ValueError(f"is too small; allowed: {allowed}")
-        return result
-
-    schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
-
-
-def _number(allowed, *, above=None, least=None, most=None):
-    """Type of a pure number within bounds; `1e-3`, which YAML takes for text, is one."""
-
-    def read(value: Any) -> float:
-        try:
-            result = to_number(value)
-        except ValueError as error:
-            raise ValueError(f"{error}; allowed: {allowed}") from None
-        if (
-            (above is not None and result <= above)
-            or (least is not None and result < least)
-            or (most is not None and result > most)
-        ):
-            raise ValueError(f"is out of range; allowed: {allowed}")
-        return result
-
-    bounds = {"exclusiveMinimum": above, "minimum": least, "maximum": most}
-    schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
-
-
-def _integer(least, most=2**31 - 1):
-    def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise ValueError(f"is not an integer from {least} to {most}; allowed: {least}, {least + 1}, … {most}")
-        return value
-
-    schema = {"type": "integer", "minimum": least, "maximum": most}
-    return Annotated[int, BeforeValidator(read), WithJsonSchema(schema)]
-
-
-def _flag(value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise ValueError("is neither true nor false; allowed: true, false")
-    return value
-
-
-def _distinct(values):
-    for index, value in enumerate(values):
-        if value in values[:index]:
-            raise ValueError(f"{value!r} is given twice; allowed: every entry once")
-    return values
-
-
-def _increasing(values):
-    for before, after in pairwise(values):
-        if not after > before:
-            raise ValueError(f"{after:g} comes after {before:g}; allowed: values in increasing order")
-    return values
-
-
-def _decreasing(values):
-    for before, after in pairwise(values):
-        if not after < before:
-            raise ValueError(f"{after:g} m comes after {before:g} m; allowed: values in decreasing order")
-    return values
-
-
-def _exactly_one(section):
-    given = sorted(name for name in section.model_fields_set if getattr(section, name) is not None)
-    if len(given) != 1:
-        names = ", ".join(type(section).model_fields)
-        raise ValueError(f"{' and '.join(given) or 'nothing'} is given; allowed: exactly one of {names}")
-    return section
-
-
-Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=80)]
-Text = Annotated[str, Field(strict=True, min_length=1)]
-Length = _quantity("m", "100 um")
-Modulus = _quantity("Pa", "25 MPa")
-SurfaceEnergy = _quantity("J/m^2", "50 mJ/m^2", minimum=0)
-ReducedPressure = _number(
-    f"a number in (0, {MAX_REDUCED_PRESSURE}], which the model covers", above=0, most=MAX_REDUCED_PRESSURE
-)
-AreaFraction = _number(f"a number in (0, {MAX_AREA_FRACTION}], which the model covers", above=0, most=MAX_AREA_FRACTION)
-Positive = _number("a number greater than 0", above=0)
-Flag = Annotated[bool, BeforeValidator(_flag)]
-
-
-class Section(BaseModel):
-    """A part of the configuration: immutable, and without room for keys that nobody reads."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class SelfAffineSurface(Section):
@@ -152,8 +62,8 @@ class SelfAffineSurface(Section):
         description="Short cut-off 2π/q1: there are no shorter waves. Less than the roll-off wavelength; at least 2 "
         "grid cells (an error below), better 4 (a warning below) or 8."
     )
-    hurst: _number("a number in (0, 1]", above=0, most=1) = Field(description="Hurst exponent H, in (0, 1].")
-    grid: _integer(8, MAX_GRID) = Field(description="Grid points along a side.")
+    hurst: number("a number in (0, 1]", above=0, most=1) = Field(description="Hurst exponent H, in (0, 1].")
+    grid: integer(8, MAX_GRID) = Field(description="Grid points along a side.")
     amplitudes: Literal["fixed", "gaussian"] = Field(
         default="fixed",
         description="Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and "
@@ -240,24 +150,20 @@ class Material(Section):
     )
 
 
-def _stops(kind, in_order):
-    return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
-
-
 class Targets(Section):
     """The stops of the loading path: exactly one of the three lists."""
 
-    reduced_pressures: _stops(ReducedPressure, _increasing) | None = Field(
+    reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None, description=f"Reduced pressures p/(E* h'rms), increasing, up to {MAX_REDUCED_PRESSURE}."
     )
-    area_fractions: _stops(AreaFraction, _increasing) | None = Field(
+    area_fractions: stops(AreaFraction, increasing) | None = Field(
         default=None, description=f"Contact area fractions A/A0, increasing, up to {MAX_AREA_FRACTION}."
     )
-    mean_separations: _stops(Length, _decreasing) | None = Field(
+    mean_separations: stops(Length, decreasing) | None = Field(
         default=None, description="Mean separations with their unit, decreasing."
     )
 
-    _check = model_validator(mode="after")(_exactly_one)
+    _check = model_validator(mode="after")(exactly_one)
 
     @property
     def last(self) -> tuple[str, float]:
@@ -276,7 +182,7 @@ class Snapshot(Section):
     area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
     mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
 
-    _check = model_validator(mode="after")(_exactly_one)
+    _check = model_validator(mode="after")(exactly_one)
 
     @property
     def target(self) -> tuple[str, float]:
@@ -285,21 +191,17 @@ class Snapshot(Section):
         return kind, value
 
 
-def _names(description):
-    return Annotated[list[Name], Field(min_length=1, description=description), AfterValidator(_distinct)]
-
-
 class TurningPoint(Section):
     """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
 
     reduced_pressure: (
-        _number(f"a number of at most {MAX_REDUCED_PRESSURE}, which the model covers", most=MAX_REDUCED_PRESSURE) | None
+        number(f"a number of at most {MAX_REDUCED_PRESSURE}, which the model covers", most=MAX_REDUCED_PRESSURE) | None
     ) = Field(default=None, description="At this p/(E* h'rms).")
-    relative_load: _number("a number") | None = Field(default=None, description="At this p/E* = F/(E* A0).")
+    relative_load: number("a number") | None = Field(default=None, description="At this p/E* = F/(E* A0).")
     area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
     mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
 
-    _check = model_validator(mode="after")(_exactly_one)
+    _check = model_validator(mode="after")(exactly_one)
 
     @property
     def target(self) -> tuple[str, float]:
@@ -311,16 +213,16 @@ class TurningPoint(Section):
 class Study(Section):
     """Every surface, seed, slope and material of the lists, each with each, along one path."""
 
-    surfaces: _names("Names of surfaces.")
-    seeds: Annotated[list[_integer(0)], Field(min_length=1), AfterValidator(_distinct)] = Field(
+    surfaces: list_of_names("Names of surfaces.")
+    seeds: Annotated[list[integer(0)], Field(min_length=1), AfterValidator(distinct)] = Field(
         default=[1], description="Seeds of the random phases. Surfaces read from a file have none and are used once."
     )
-    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(_distinct)] = Field(
+    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] = Field(
         description="Rms slopes h'rms to which each topography's heights are scaled."
     )
-    materials: _names("Names of materials.")
+    materials: list_of_names("Names of materials.")
     targets: Targets = Field(description="Stops of the loading path.")
-    snapshots: Annotated[list[Snapshot], AfterValidator(_distinct)] | None = Field(
+    snapshots: Annotated[list[Snapshot], AfterValidator(distinct)] | None = Field(
         default=None,
         description="States of which spots and distributions are kept; each is hit exactly. Left out: the last target.",
     )
@@ -342,7 +244,7 @@ class Study(Section):
         description="Until when coalesced spots stay one on the way back: until they detach as a whole and fall back "
         "into their asperities, or until the two spots that they were made of would no longer overlap.",
     )
-    max_step: _number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
+    max_step: number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
     )
 
@@ -460,33 +362,33 @@ class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
     study: Name = Field(description="Name of the study on whose topographies they are solved.")
-    surfaces: _names("Surfaces, of the study's. Left out: all.") | None = Field(
+    surfaces: list_of_names("Surfaces, of the study's. Left out: all.") | None = Field(
         default=None, description="Surfaces, of the study's. Left out: all."
     )
-    seeds: Annotated[list[_integer(0)], Field(min_length=1), AfterValidator(_distinct)] | None = Field(
+    seeds: Annotated[list[integer(0)], Field(min_length=1), AfterValidator(distinct)] | None = Field(
         default=None, description="Seeds, of the study's. Left out: all."
     )
-    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(_distinct)] | None = Field(
+    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
         default=None, description="Rms slopes, of the study's. Left out: all."
     )
-    materials: _names("Materials, of the study's. Left out: all.") | None = Field(
+    materials: list_of_names("Materials, of the study's. Left out: all.") | None = Field(
         default=None,
         description="Materials, of the study's. Left out: all. With adhesion the grid must resolve their "
         "`interaction_range`.",
     )
-    tolerance: _number("a number in [1e-12, 1e-4]", least=1e-12, most=1e-4) = Field(
+    tolerance: number("a number in [1e-12, 1e-4]", least=1e-12, most=1e-4) = Field(
         default=1e-8, description="Relative error at which the solver may stop."
     )
 
 
 Loads = Annotated[
-    _stops(ReducedPressure, _increasing),
+    stops(ReducedPressure, increasing),
     Field(
         description="Loads p/(E* h'rms), increasing. Those of `boundary_elements` become snapshots of the study's runs."
     ),
 ]
 Refinement = Annotated[
-    _integer(1, 16),
+    integer(1, 16),
     Field(description="Cells per cell of the surface's own grid, along a side; heights are interpolated."),
 ]
 
@@ -507,7 +409,7 @@ class BoundaryElementLoops(BesideStudy):
     """Boundary elements from separation to the largest load of a study's runs and back."""
 
     refinement: Refinement = 1
-    separation_step: _number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
+    separation_step: number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
         default=0.05, description="Change of the mean gap from one solution to the next, in units of h_rms."
     )
 
@@ -521,7 +423,7 @@ class ErrorSources(BesideStudy):
     """Variants between the model and boundary elements, each of which changes one thing."""
 
     reduced_pressures: Loads
-    refinement: _integer(1, 16) = Field(
+    refinement: integer(1, 16) = Field(
         default=2, description="Cells per cell of the surface's own grid, along a side: even, since half is tried too."
     )
 
@@ -542,7 +444,7 @@ class OneAsperity(Section):
     """One asperity by the model and by boundary elements, where the answer is known."""
 
     tabor_parameters: Annotated[
-        list[_number("a number in [1.5, 6]", least=1.5, most=6)], Field(min_length=1), AfterValidator(_increasing)
+        list[number("a number in [1.5, 6]", least=1.5, most=6)], Field(min_length=1), AfterValidator(increasing)
     ] = Field(
         description="Tabor parameters, increasing; boundary elements take a grid that grows with their square, 800 "
         "nodes a side and some minutes at 4. Hertz's contact is always computed."
@@ -573,7 +475,7 @@ class RunFigure(StudyFigure):
     """A figure of one run; what is left out is the study's first."""
 
     surface: Name | None = Field(default=None, description="Surface that is shown.")
-    seed: _integer(0) | None = Field(default=None, description="Seed that is shown.")
+    seed: integer(0) | None = Field(default=None, description="Seed that is shown.")
     rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
     material: Name | None = Field(
         default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
@@ -588,7 +490,7 @@ class SlopesFigure(StudyFigure):
     """A figure of the spots of all slopes, at the same load and at the same area."""
 
     surface: Name | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: _integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+    seed: integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
     material: Name | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
 
 
@@ -604,13 +506,13 @@ class LoopsFigure(StudyFigure):
     """A figure of the runs of a study both ways, for one topography."""
 
     surface: Name | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: _integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+    seed: integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
 
 
 class PullOffFigure(StudyFigure):
     """A figure of the pull-off of all runs of some studies."""
 
-    load_studies: _names("Studies that differ in their largest load.") | None = Field(
+    load_studies: list_of_names("Studies that differ in their largest load.") | None = Field(
         default=None, description="Names of studies that differ in their largest load, for a second panel."
     )
     quantity: Literal["pull_off_pressure", "pull_off_over_strength", "pull_off_over_summits"] = Field(
@@ -623,7 +525,7 @@ class PullOffFigure(StudyFigure):
 class LossFigure(Section):
     """A figure of the energy lost in the runs of some studies."""
 
-    studies: _names("Studies that are drawn; those that differ in their largest load only make up the lines.")
+    studies: list_of_names("Studies that are drawn; those that differ in their largest load only make up the lines.")
     over_surface_energy: Flag = Field(
         default=True, description="Whether the loss is drawn over the surface energy, or in J/m²."
     )
