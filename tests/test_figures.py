@@ -24,7 +24,7 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
-from icha.figures.select import branches, path_steps, snapshot_label
+from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
 from icha.figures.spots import periodic_circles
 from icha.figures.style import BLUE, VERMILLION, material_label, number, quantity, save, unit_for
 from icha.model_error import jaccard
@@ -554,6 +554,15 @@ def test_incomplete_campaigns_are_drawn_with_what_they_have():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
     tree = campaign_tree(runs[:-1], allow_missing=True)
     assert len(lines(fig5_multi_slope.figure(tree, study="slopes").axes[0])) == 3
+
+
+def test_only_complete_runs_are_drawn():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    ended = [(labels, run.assign_attrs(incomplete="no equilibrium at the third stop")) for labels, run in runs]
+    tree = campaign_tree([ended[0], *runs[1:]], allow_missing=True)
+    assert {labels for labels, _ in study_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
+    with pytest.raises(NothingToDraw, match="study slopes: no run is complete"):
+        fig5_multi_slope.figure(campaign_tree(ended, allow_missing=True), study="slopes")
 
 
 @pytest.mark.parametrize("module", FIGURES + COMPARED, ids=lambda module: module.__name__)

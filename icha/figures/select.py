@@ -7,24 +7,34 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from icha.campaign import RunLabels, find_snapshot, loading_stops, run_labels, select_run
+from icha.campaign import LABELS, RunLabels, find_snapshot, loading_stops, select_run
 from icha.figures.style import number
+from icha.records import COMPLETE
+
+
+class NothingToDraw(ValueError):
+    """A study has no complete run of the kind that a figure shows; the message says what is lacking."""
 
 
 def study_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All runs of a study that are there, at least one.
+    """All complete runs of a study, at least one.
 
     Raises
     ------
+    NothingToDraw
+        If no run of the study is complete.
     ValueError
-        If the campaign has no such study, or no run of it.
+        If the campaign has no such study.
     """
     if study not in campaign.children:
         raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
-    runs = [(labels, select_run(campaign, labels)) for labels in run_labels(campaign) if labels.study == study]
-    if not runs:
-        raise ValueError(f"study {study}: there is no run to draw")
-    return runs
+    dataset = campaign[study].to_dataset()
+    axes = [dataset[label].values.tolist() for label in LABELS]
+    complete = np.argwhere(dataset["status"].transpose(*LABELS).values == COMPLETE)
+    if not len(complete):
+        raise NothingToDraw(f"study {study}: no run is complete, so there is nothing to draw")
+    found = (RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True))) for index in complete.tolist())
+    return [(labels, select_run(campaign, labels)) for labels in found]
 
 
 def pick(labels: str, wanted, there: list):
