@@ -1,0 +1,162 @@
+"""Section of the configuration for a measured topography: the file, what its numbers mean, how it is prepared."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+
+from icha.configuration.units import PATTERN, conversion_factor, to_si
+from icha.configuration.values import MAX_GRID, Length, Section, Text, integer, number, quantity
+
+
+def _unit_of_length(value: Any) -> float:
+    """Metres of a unit such as `um`, or of a multiple of one such as `0.1 mm`."""
+    allowed = "allowed: a unit of length, such as 'um', or a multiple of one, such as '0.1 mm'"
+    if not isinstance(value, str):
+        raise ValueError(f"is not a unit; {allowed}")
+    try:
+        metres = (
+            to_si(value, "m") if value.strip()[:1] in tuple("+-.0123456789") else float(conversion_factor(value, "m"))
+        )
+    except ValueError as error:
+        raise ValueError(f"{error}; {allowed}") from None
+    if metres <= 0:
+        raise ValueError(f"is not greater than 0; {allowed}")
+    return metres
+
+
+UnitOfLength = Annotated[
+    float, BeforeValidator(_unit_of_length), WithJsonSchema({"type": "string", "examples": ["um", "0.1 mm"]})
+]
+Position = quantity("m", "20 um", minimum=0)
+
+
+def _sides(value: Any) -> tuple[float, float]:
+    """The sides of a scan along x and y, m: one length, or a list of two."""
+    sides = value if isinstance(value, list | tuple) else [value, value]
+    if len(sides) != 2:
+        raise ValueError(f"has {len(sides)} entries; allowed: one length, such as '90 um', or two: along x and y")
+    metres = []
+    for side in sides:
+        try:
+            metres.append(to_si(side, "m"))
+        except ValueError as error:
+            raise ValueError(
+                f"{error}; allowed: one length, such as '90 um', or a list of two: along x and y"
+            ) from None
+        if metres[-1] <= 0:
+            raise ValueError("is not greater than 0; allowed: one length, such as '90 um', or two: along x and y")
+    return tuple(metres)
+
+
+_LENGTH_SCHEMA = {"type": "string", "pattern": PATTERN, "examples": ["90 um"]}
+Sides = Annotated[
+    tuple[float, float],
+    BeforeValidator(_sides),
+    WithJsonSchema(
+        {"anyOf": [_LENGTH_SCHEMA, {"type": "array", "items": _LENGTH_SCHEMA, "minItems": 2, "maxItems": 2}]}
+    ),
+]
+
+
+class Crop(Section):
+    """The square that is cut out of a scan."""
+
+    x: Position = Field(description="Distance of its left edge from that of the scan.")
+    y: Position = Field(description="Distance of its first row from that of the scan.")
+    side: Length = Field(description="Its side.")
+
+
+class MeasuredSurface(Section):
+    """A measured topography, prepared as the keys say. The mean height is always removed."""
+
+    kind: Literal["measured"] = Field(description="Topography from a measurement.")
+    path: Text = Field(description="File of the topography. Relative to the configuration file.")
+    format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = Field(
+        default="auto",
+        description="What the file is: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y z "
+        "per line in any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a microscope's own "
+        "format, of those that SurfaceTopography reads). `auto` tells by the name's ending and, for text, by the "
+        "number of columns.",
+    )
+    data: Text | None = Field(
+        default=None,
+        description="Which of several: name of the variable (netcdf), path of the dataset (hdf5), name of the channel "
+        "(instrument). Left out: the only one, or the file's own default.",
+    )
+    first_axis: Literal["y", "x"] = Field(
+        default="y",
+        description="Which way the rows of npy, netcdf, hdf5 and matrix files go: `y`, a row is a line along x, or "
+        "`x`. Dimensions that are named x and y speak for themselves.",
+    )
+    height_unit: UnitOfLength | None = Field(
+        default=None,
+        description="Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file says it; goes before what "
+        "the file says.",
+    )
+    lateral_unit: UnitOfLength | None = Field(
+        default=None,
+        description="Unit of the coordinates x and y, for fourier of 1/q. Left out: what the file says, or the "
+        "height's.",
+    )
+    size: Sides | None = Field(
+        default=None,
+        description="Size of the whole scan: one length, or two, along x and y. A pixel is this over the number of "
+        "pixels. Needed unless the file says it; goes before what the file says.",
+    )
+    touches_first: Literal["high", "low"] = Field(
+        default="high",
+        description="Which points touch first: those of the largest numbers in the file, or of the smallest.",
+    )
+    missing: Literal["refuse", "fill"] = Field(
+        default="refuse",
+        description="What to do about points without a height: `refuse` the file, or `fill` them by the solution of "
+        "Laplace's equation.",
+    )
+    crop: Crop | None = Field(
+        default=None, description="The square that is used. Left out: the largest, in the middle."
+    )
+    detrend: Literal["none", "tilt", "curvature"] | None = Field(
+        default=None,
+        description="What is removed beside the mean height: `none`, the mean plane (`tilt`), or the best paraboloid "
+        "(`curvature`). Left out: `tilt`; of a periodic topography `none`.",
+    )
+    boundary: Literal["periodic", "window", "mirror", "free"] = Field(
+        description="What lies beyond the edges: `periodic`, the topography repeats by itself; `window`, its heights "
+        "fall smoothly to their mean towards the edges, and it is repeated; `mirror`, it and its mirror images make a "
+        "periodic cell of twice the side; `free`, nothing: one square on a half-space that goes on beyond it."
+    )
+    taper: number("a number in (0, 0.5]", above=0, most=0.5) | None = Field(
+        default=None,
+        description="With `window`: the part of the side on which heights fall, at either edge. Left out: 0.1.",
+    )
+    grid: integer(8, MAX_GRID) | None = Field(
+        default=None,
+        description="Nodes along a side of the prepared surface, to which it is resampled by Fourier interpolation; a "
+        "coarser one loses the shorter waves. Left out: those of the scan (`mirror`: twice).",
+    )
+
+    @model_validator(mode="after")
+    def _keys_fit_the_boundary(self):
+        if self.boundary == "periodic" and self.detrend not in (None, "none"):
+            raise ValueError(
+                f"detrend: {self.detrend!r} would break the periodicity; allowed: detrend none, or another boundary"
+            )
+        if self.boundary == "periodic" and self.crop is not None:
+            raise ValueError("crop: a part of a periodic topography is not periodic; allowed: another boundary")
+        if self.taper is not None and self.boundary != "window":
+            raise ValueError(f"taper: is for boundary window, this one is {self.boundary}; allowed: leave it out")
+        if self.format == "fourier" and self.boundary != "periodic":
+            raise ValueError(f"boundary: {self.boundary!r} for a Fourier series, which is periodic; allowed: periodic")
+        if self.format == "fourier" and self.missing == "fill":
+            raise ValueError("missing: a Fourier series has no missing points; allowed: leave it out")
+        return self
+
+    @property
+    def preparation(self) -> dict:
+        """What `icha.topography.Preparation` takes: everything but kind and path, in SI units."""
+        settings = self.model_dump(exclude={"kind", "path"})
+        settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
+        settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
+        return settings
