@@ -3,23 +3,38 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
 from icha.campaign import LABELS, loading_stops
+from icha.ensemble import Ensemble, ensemble
 from icha.records import COMPLETE
 
 # Loads at which curves are compared, per decade.
 _POINTS_PER_DECADE = 8
+# Points of a mean loop on every way.
+_WAY_POINTS = 200
+# Stops whose loads differ by less than this part, from seed to seed, are stops at the same load.
+_SAME_LOAD = 1e-6
 # The round reduced pressures at which tables quote the results.
 ROUND_PRESSURES = (1e-4, 3.16e-4, 1e-3, 3.16e-3, 1e-2, 3.16e-2, 1e-1)
 
 _AXES = {
     "reduced_pressure": "nominal pressure over contact modulus and rms slope, p/(E* h'rms)",
     "relative_load": "nominal pressure over contact modulus, F/(E* A0)",
+}
+_WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
+_AVERAGED = (
+    ("contact_area_fraction", "area", "A/A0"),
+    ("reduced_separation", "separation", "the mean separation over the rms height"),
+)
+_STATISTICS = {
+    "mean": "mean of {} over the seeds",
+    "deviation": "standard deviation of {} over the seeds",
+    "confidence": "half the width of the 95 % band of confidence of the mean of {} over the seeds (Student's t)",
 }
 
 
@@ -64,9 +79,11 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     Dataset on two grids of loads, `reduced_pressure` and `relative_load`, each over the range that all complete runs
     cover (of length zero where there is no such range) between stops of their first loading. On each, with the suffix
     `_at_load` on the second: `contact_area_fraction` and `reduced_separation` along surface, seed, rms_slope and
-    material, mean and standard deviation of the area over seeds, `material_spread` and `slope_spread`, the largest over
-    the smallest area of all materials (slopes), less one. Runs that are not complete lack values, as `status` says, and
-    do not count.
+    material; over the seeds mean, standard deviation and half the width of the 95 % band of confidence of both
+    (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.ensemble`); `material_spread` and
+    `slope_spread`, the largest over the smallest area of all materials (slopes), less one. Runs that are not complete
+    lack values, as `status` says, and do not count; `seed_count` says how many seeds there are of every surface, slope
+    and material. A single one has no deviation and no band: they are missing.
     """
     complete = study["status"].transpose(*LABELS).values == COMPLETE
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
@@ -78,7 +95,10 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
         name: study[name].transpose(*LABELS, "step").values for name in ("contact_area_fraction", "reduced_separation")
     }
 
-    variables, coords = {"status": study["status"]}, {label: study[label] for label in LABELS}
+    variables, coords = (
+        {"status": study["status"], "seed_count": _seed_count(complete)},
+        {label: study[label] for label in LABELS},
+    )
     for axis, load in loads.items():
         suffix = "" if axis == "reduced_pressure" else "_at_load"
         at = _common_grid([load[index][shown[index]] for index in map(tuple, np.argwhere(complete))])
@@ -107,8 +127,15 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
             dims = (*(each for each in LABELS if each != label), axis)
             return xr.Variable(dims, values, {"units": "1", "long_name": f"{long_name}, at {_AXES[axis]}"})
 
-        variables["area_mean" + suffix] = derived(np.nanmean, "seed", "mean of A/A0 over the seeds")
-        variables["area_deviation" + suffix] = derived(np.nanstd, "seed", "standard deviation of A/A0 over the seeds")
+        for name, short, symbol in _AVERAGED:
+            over_seeds = ensemble(on_grid[name], LABELS.index("seed"))
+            for part, words in _STATISTICS.items():
+                attributes = {"units": "1", "long_name": f"{words.format(symbol)}, at {_AXES[axis]}"}
+                if part != "mean":
+                    attributes["missing"] = "where there is a single seed"
+                variables[f"{short}_{part}{suffix}"] = xr.Variable(
+                    (*_WITHOUT_SEED, axis), getattr(over_seeds, part), attributes
+                )
         for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
             variables[f"{label.removeprefix('rms_')}_spread{suffix}"] = derived(
                 _spread, label, f"largest over smallest A/A0 of all {many}, less 1"
@@ -120,6 +147,66 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     }
     kept = {name: study.attrs[name] for name in ("study", "source", "license") if study.attrs.get(name)}
     return xr.Dataset(variables, coords, title | kept | dict(attrs))
+
+
+def _seed_count(complete):
+    count = complete.sum(axis=LABELS.index("seed")).astype(np.int32)
+    return xr.Variable(_WITHOUT_SEED, count, {"units": "1", "long_name": "number of seeds whose runs are complete"})
+
+
+def mean_curve(curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: bool) -> tuple[np.ndarray, Ensemble]:
+    """Mean of the curves of an ensemble, one for each seed, at common positive loads, with its band of confidence.
+
+    Parameters
+    ----------
+    curves : load and values of every member.
+    logarithmic : whether to interpolate the logarithm of the values, which are then positive.
+
+    Returns
+    -------
+    The loads, those of the members where they are the same and else evenly spaced by their logarithm over the range
+    that all cover (none if there is no such range), and the statistics at them.
+    """
+    curves = [(load[load > 0], values[load > 0]) for load, values in curves]
+    loads = [np.sort(load) for load, _ in curves]
+    if all(load.shape == loads[0].shape and np.allclose(load, loads[0], rtol=_SAME_LOAD, atol=0) for load in loads):
+        return loads[0], ensemble([values[np.argsort(load, kind="stable")] for load, values in curves])
+    at = _common_grid(loads)
+    if not len(at):
+        return at, ensemble(np.empty((len(curves), 0)))
+    return at, ensemble([interpolated(load, values, at, logarithmic=logarithmic) for load, values in curves])
+
+
+def mean_way(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, Ensemble]]:
+    """Mean over seeds of reduced pressure and contact area on one leg of a path, at common mean separations.
+
+    Where a member is separated, pressure and area are zero; the way ends at the smallest separation that all reach.
+
+    Parameters
+    ----------
+    ways : the same leg of every member (`icha.figures.select.branches`).
+
+    Returns
+    -------
+    Mean separations over the rms height, in the order of the leg, and the statistics of `reduced_pressure` and
+    `contact_area_fraction` at them.
+    """
+    separations = [way["reduced_separation"].values for way in ways]
+    falling = separations[0][-1] < separations[0][0]
+    apart = all(float(way["contact_area_fraction"].values[0 if falling else -1]) == 0 for way in ways)
+    reach = max if apart else min
+    at = np.linspace(max(map(np.min, separations)), reach(map(np.max, separations)), _WAY_POINTS)
+    found = {}
+    for name in ("reduced_pressure", "contact_area_fraction"):
+        members = []
+        for way, separation in zip(ways, separations, strict=True):
+            order = np.argsort(separation, kind="stable")
+            beyond = 0.0 if apart else None
+            members.append(np.interp(at, separation[order], way[name].values[order], right=beyond))
+        found[name] = ensemble(members)
+    if not falling:
+        return at, found
+    return at[::-1], {name: Ensemble(*(each[::-1] for each in own)) for name, own in found.items()}
 
 
 def _spread(area, axis):

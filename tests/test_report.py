@@ -266,7 +266,7 @@ def test_comparison_can_be_kept(tmp_path):
     single = read_campaign(tmp_path / "a.nc")["single"]
     areas = single["contact_area_fraction"].values
     np.testing.assert_allclose(single["area_mean"].values, areas.mean(axis=1))
-    np.testing.assert_allclose(single["area_deviation"].values, areas.std(axis=1))
+    np.testing.assert_allclose(single["area_deviation"].values, areas.std(axis=1, ddof=1))
     assert float(single["material_spread"].max()) == 0
 
 
