@@ -6,6 +6,7 @@ Lubr. Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -81,3 +82,34 @@ def stickiness(moments: SpectralMoments, material: Material) -> float:
     slope, reach = moments.rms_slope, material.interaction_range
     attractive_area = np.pi * np.cbrt(3 * moments.rms_laplacian * reach / (16 * slope**2)) ** 2
     return float(REPULSIVE_AREA_SLOPE * material.adhesion_length / (slope * reach) * attractive_area)
+
+
+def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Wave numbers (rad/m) and isotropic power spectrum C(q) (m^4): the mean over the wave vectors of a ring.
+
+    The integral of C over the plane of wave vectors is the mean square height. Rings are one wave number 2 pi/L wide,
+    from the tenth on a tenth of their wave number; they end where the grid does not hold all their directions. A free
+    square is multiplied by Hann's window first, and C divided by the mean square of that, so that the step from one
+    edge to the other does not show.
+    """
+    shown, scale = surface, 1.0
+    if surface.free:
+        hann = np.sin(np.pi * (np.arange(surface.grid) + 0.5) / surface.grid) ** 2
+        shown = Surface(surface.heights * (hann[:, None] * hann), surface.period)
+        scale = 1 / np.mean(hann**2) ** 2
+    last = (surface.grid - 1) // 2
+    edges = [0.5]
+    while edges[-1] < last:
+        edges.append(min(max(edges[-1] + 1, math.floor(1.1 * edges[-1]) + 0.5), last + 0.5))
+    edges = np.array(edges)
+
+    def rings(k2, count, power):
+        k = np.sqrt(k2)
+        ring = np.searchsorted(edges, k.ravel(), side="right")
+        count = np.broadcast_to(count, k.shape)
+        sums = (count, count * k, power)
+        return [np.bincount(ring, weights=each.ravel(), minlength=len(edges) + 1) for each in sums]
+
+    count, wave_number, power = np.sum(shown.by_wave_vector(rings), axis=0)[:, 1:-1]
+    unit = 2 * np.pi / surface.period
+    return unit * wave_number / count, scale * power / count / unit**2

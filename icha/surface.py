@@ -80,12 +80,32 @@ class Surface:
         return self.boundary == FREE
 
     def by_wave_vector(self, function) -> list:
-        """Results of `function(k2, power)` for all wave vectors 2 pi/L (kx, ky) but zero, in blocks; k2 = kx^2 + ky^2.
+        """Results of `function(k2, count, power)` for all wave vectors 2 pi/L (kx, ky) but zero, in blocks.
 
-        power is |h_q|^2, m^2, of the vector and, where the block does not hold it, its opposite together. The heights
-        are taken as one period, whatever the boundary.
+        k2 = kx^2 + ky^2; power: |h_q|^2, m^2, both (n, m); count (m,): 2 where the power is that of two opposite wave
+        vectors together, else 1. The heights are taken as one period, whatever the boundary.
         """
-        return _by_wave_vector(self.heights, function)
+        n = self.grid
+        half = np.empty((n, n // 2 + 1), dtype=complex)
+
+        def along_x(rows):
+            half[rows] = scipy.fft.rfft(self.heights[rows], axis=1, norm="forward", workers=1)
+
+        ky2 = scipy.fft.fftfreq(n, 1 / n) ** 2
+
+        def along_y(columns):
+            modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
+            power = modes.real**2 + modes.imag**2
+            # The half spectrum holds every column but the first (and, on even grids, the last) only once.
+            kx = np.arange(columns.start, columns.stop)
+            count = np.where((kx > 0) & (2 * kx < n), 2.0, 1.0)
+            power *= count
+            if columns.start == 0:
+                power[0, 0] = 0.0
+            return function(ky2[:, None] + kx**2, count, power)
+
+        on_cores(along_x, blocks(n, _LINES))
+        return on_cores(along_y, blocks(n // 2 + 1, _LINES))
 
     @cached_property
     def spectral_moments(self) -> tuple[float, float, float]:
@@ -97,8 +117,8 @@ class Surface:
         if self.free:
             return _mean_squares(self.heights, self.spacing)
 
-        def sums(k2, power):
-            return [np.sum(power * k2**order) for order in (0, 1, 2)]
+        def sums(k2, _, power):
+            return [np.sum(power), np.sum(power * k2), np.sum(power * k2**2)]
 
         moments = np.sum(self.by_wave_vector(sums), axis=0)
         q2 = (2 * np.pi / self.period) ** 2
@@ -145,29 +165,6 @@ class Surface:
         for axis in (0, 1):
             heights = resample(heights, factor * self.grid, axis=axis)
         return Surface(heights, self.period)
-
-
-def _by_wave_vector(heights, function):
-    n = len(heights)
-    half = np.empty((n, n // 2 + 1), dtype=complex)
-
-    def along_x(rows):
-        half[rows] = scipy.fft.rfft(heights[rows], axis=1, norm="forward", workers=1)
-
-    ky2 = scipy.fft.fftfreq(n, 1 / n) ** 2
-
-    def along_y(columns):
-        modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
-        power = modes.real**2 + modes.imag**2
-        # The half spectrum holds every column but the first (and, on even grids, the last) only once.
-        kx = np.arange(columns.start, columns.stop)
-        power[:, (kx > 0) & (2 * kx < n)] *= 2
-        if columns.start == 0:
-            power[0, 0] = 0.0
-        return function(ky2[:, None] + kx**2, power)
-
-    on_cores(along_x, blocks(n, _LINES))
-    return on_cores(along_y, blocks(n // 2 + 1, _LINES))
 
 
 def _mean_squares(heights, spacing):

@@ -187,7 +187,7 @@ def read_scan(path: Path, how: Preparation) -> Scan:
     except UnfitTopography:
         raise
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = " ".join(str(error).replace(str(path), path.name).split()) or type(error).__name__
         raise UnfitTopography(
             "path", f"cannot be read as {name} ({reason}); allowed: a file that is, or another `format`"
         ) from None

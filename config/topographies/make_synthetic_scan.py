@@ -1,0 +1,46 @@
+"""Make `synthetic_scan.txt`, a made-up measurement for examples and tests: nobody has measured it.
+
+It has what measurements have: it is not periodic and not square, lies askew, is bent, bears a scratch, and lacks some
+points. Run as `python config/topographies/make_synthetic_scan.py`; the same bytes come out every time.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from icha.files import whole_file
+from icha.spectrum import SelfAffineSpectrum
+
+ROWS, COLUMNS, PIXEL = 128, 144, 0.5e-6
+HEADING = """\
+# Synthetic scan, made by make_synthetic_scan.py; not a measurement.
+# Heights in nm, one row of 144 points along x per line, 128 rows along y; 72 um x 64 um; nan: no height.
+"""
+
+
+def scan() -> np.ndarray:
+    """Heights (ROWS, COLUMNS) in m, nan where there is none."""
+    spectrum = SelfAffineSpectrum(
+        period=256 * PIXEL, rolloff_wavelength=32e-6, short_wavelength=4e-6, hurst=0.8, rms_slope=0.15
+    )
+    heights = spectrum.realise(256, seed=6, amplitudes="gaussian").heights[40 : 40 + ROWS, 90 : 90 + COLUMNS]
+    y, x = np.mgrid[:ROWS, :COLUMNS] * PIXEL
+    tilt = 0.02 * x - 0.012 * y
+    bow = -200.0 * ((x - 30e-6) ** 2 + (y - 36e-6) ** 2)
+    across = (x * np.sin(0.4) + y * np.cos(0.4) - 50e-6) / 1.5e-6
+    heights = heights + tilt + bow - 0.4e-6 * np.exp(-0.5 * across**2)
+    missing = np.random.Generator(np.random.PCG64(60)).random((12, 2)) * (ROWS, COLUMNS)
+    for row, column in missing:
+        heights[np.hypot(y / PIXEL - row, x / PIXEL - column) < 2.2] = np.nan
+    return heights
+
+
+def write(path: Path) -> None:
+    """Write the scan as text, to 0.1 nm."""
+    lines = (" ".join("nan" if np.isnan(h) else f"{h * 1e9:.1f}" for h in row) for row in scan())
+    with whole_file(path) as temporary:
+        temporary.write_text(HEADING + "\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write(Path(__file__).with_name("synthetic_scan.txt"))
