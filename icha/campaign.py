@@ -10,7 +10,7 @@ import xarray as xr
 
 from icha.labels import RunLabels
 from icha.path import BETWEEN
-from icha.records import COMPLETE, INCOMPLETE, MISSING, STATUS_MEANINGS
+from icha.records import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, status_variable
 
 LABELS = ("surface", "seed", "rms_slope", "material")
 
@@ -41,6 +41,7 @@ RAGGED = ("spot", "event")
 def campaign_tree(
     runs: Iterable[tuple[RunLabels | tuple, xr.Dataset]],
     *,
+    design: Iterable[RunLabels | tuple] | None = None,
     attrs: Mapping[str, str] = {},
     allow_missing: bool = False,
 ) -> xr.DataTree:
@@ -49,11 +50,13 @@ def campaign_tree(
     Parameters
     ----------
     runs : pairs of labels (study, surface, seed, rms_slope, material) and run dataset. Studies, surfaces and
-        materials keep the order in which they first come, seeds and slopes are sorted.
+        materials keep the order in which they first come, seeds and slopes are sorted. A run that failed has the
+        reason in its attribute `incomplete`; one that did not converge or lacks snapshots that others of its study
+        have is incomplete, too.
+    design : labels of the runs that were asked for; those given, if left out. Other combinations of their labels are
+        not in the design.
     attrs : global attributes of the file (title, summary, campaign, license, …).
-    allow_missing : whether a study may lack combinations of its labels, or have runs that are incomplete: marked so
-        by their attribute `incomplete`, not converged, or without some of the study's snapshots. If so,
-        `status(surface, seed, rms_slope, material)` says which, and their values are missing.
+    allow_missing : whether all combinations of the labels were asked for.
 
     Returns
     -------
@@ -61,35 +64,52 @@ def campaign_tree(
     dataset. A run has `step_count` steps; beyond them, along `step`, numbers are missing and texts empty. Spots and
     events of all runs stand one after the other along `spot` and `event`; `spot_surface`, `spot_seed`,
     `spot_rms_slope` and `spot_material`, `event_surface` and so on, and `spot_snapshot`, are positions along these
-    dimensions, from 0.
+    dimensions, from 0. `status(surface, seed, rms_slope, material)` says of every combination whether its run is
+    complete, incomplete, missing or not in the design; `failure` says why a run is incomplete. What is not known of an
+    incomplete run, and everything of those that are not there, is missing.
 
     Raises
     ------
     ValueError
-        If two runs have the same labels, runs of a study do not fit together, or one is missing and may not be.
+        If two runs have the same labels, runs of a study do not fit together, a study has no run, or a run is not in
+        the design.
     """
     studies: dict[str, dict[RunLabels, xr.Dataset]] = {}
     for labels, run in runs:
-        labels = RunLabels(*labels)
-        labels = labels._replace(seed=int(labels.seed), rms_slope=float(labels.rms_slope))
+        labels = _plain(labels)
         members = studies.setdefault(labels.study, {})
         if labels in members:
             raise ValueError(f"{labels}: this run is given twice")
         members[labels] = run
     if not studies:
         raise ValueError("a campaign dataset needs at least one run")
-    groups = {study: _study_dataset(members, allow_missing) for study, members in studies.items()}
+    asked = None if design is None else dict.fromkeys(map(_plain, design))
+    groups = {}
+    for study, members in studies.items():
+        own = list(members) if asked is None else [labels for labels in asked if labels.study == study]
+        if odd := [labels for labels in members if labels not in set(own)]:
+            raise ValueError(f"{odd[0]}: this run is not in the design")
+        groups[study] = _study_dataset(members, own, allow_missing)
+    for labels in asked or ():
+        if labels.study not in studies:
+            raise ValueError(f"study {labels.study}: there is no run of it")
     root = {"Conventions": "CF-1.11"} | dict(attrs)
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root)} | {f"/{name}": g for name, g in groups.items()})
 
 
-def _study_dataset(members: dict[RunLabels, xr.Dataset], allow_missing: bool) -> xr.Dataset:
-    axes = {label: list(dict.fromkeys(getattr(key, label) for key in members)) for label in ("surface", "material")} | {
-        label: sorted({getattr(key, label) for key in members}) for label in ("seed", "rms_slope")
+def _plain(labels):
+    """Labels with numbers of Python's own types."""
+    labels = RunLabels(*labels)
+    return labels._replace(seed=int(labels.seed), rms_slope=float(labels.rms_slope))
+
+
+def _study_dataset(members: dict[RunLabels, xr.Dataset], design: list[RunLabels], allow_missing: bool) -> xr.Dataset:
+    axes = {label: list(dict.fromkeys(getattr(key, label) for key in design)) for label in ("surface", "material")} | {
+        label: sorted({getattr(key, label) for key in design}) for label in ("seed", "rms_slope")
     }
     shape = tuple(len(axes[label]) for label in LABELS)
-    position = {key: tuple(axes[label].index(getattr(key, label)) for label in LABELS) for key in members}
-    study = next(iter(members)).study
+    position = {key: tuple(axes[label].index(getattr(key, label)) for label in LABELS) for key in design}
+    study = design[0].study
 
     # Of runs that ended early some variables may be unknown: what they would have reached at the end.
     template = max(members.values(), key=lambda run: ("incomplete" not in run.attrs, run.sizes.get("step", 0)))
@@ -102,22 +122,18 @@ def _study_dataset(members: dict[RunLabels, xr.Dataset], allow_missing: bool) ->
         sizes["snapshot"] = len(snapshots)
     if "step" in sizes:
         sizes["step"] = max(run.sizes["step"] for run in members.values())
-    status, step_count = np.full(shape, MISSING, np.int8), np.zeros(shape, np.int32)
+    status, step_count = np.full(shape, NOT_IN_DESIGN, np.int8), np.zeros(shape, np.int32)
+    failure = np.full(shape, "", object)
+    status[... if allow_missing else tuple(np.transpose([position[key] for key in design]))] = MISSING
     for key, run in members.items():
         _check_labels(key, run)
-        whole = all(run.sizes.get(dim, 0) == size for dim, size in sizes.items() if dim != "step")
-        ended = "incomplete" not in run.attrs and _converged(run)
-        status[position[key]] = COMPLETE if whole and ended else INCOMPLETE
+        failure[position[key]] = _why_incomplete(run, sizes)
+        status[position[key]] = INCOMPLETE if failure[position[key]] else COMPLETE
         step_count[position[key]] = run.sizes.get("step", 0)
         odd = set(run.variables) ^ set(template.variables)
+        ended = "incomplete" not in run.attrs and _converged(run)
         if odd - (set() if ended else set(template.variables)):
             raise ValueError(f"{key}: variables differ from those of the study's other runs: {', '.join(sorted(odd))}")
-    if not allow_missing and (status != COMPLETE).any():
-        bad = []
-        for index in np.argwhere(status != COMPLETE):
-            values = [axes[label][i] for label, i in zip(LABELS, index, strict=True)]
-            bad.append(f"{RunLabels(study, *values)} ({STATUS_MEANINGS[status[tuple(index)]]})")
-        raise ValueError(f"study {study}: not all runs are there and complete: {', '.join(bad)}")
 
     variables: dict[str, xr.Variable] = {}
     for name, model in template.variables.items():
@@ -127,16 +143,9 @@ def _study_dataset(members: dict[RunLabels, xr.Dataset], allow_missing: bool) ->
             variables[name] = xr.Variable(name, np.arange(sizes[name], dtype=np.int32), model.attrs)
             continue
         variables[name] = _stack(name, model, axes, position, members, sizes, snapshot_at)
-    variables["status"] = xr.Variable(
-        LABELS,
-        status,
-        {
-            "units": "1",
-            "long_name": "status of the run",
-            "flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8),
-            "flag_meanings": " ".join(STATUS_MEANINGS),
-            "comment": "values of a run that is incomplete or missing are filled with _FillValue",
-        },
+    variables["status"] = status_variable(LABELS, status)
+    variables["failure"] = xr.Variable(
+        LABELS, failure, {"units": "1", "long_name": "why the run is incomplete; empty where it is not"}
     )
     variables["step_count"] = xr.Variable(
         LABELS,
@@ -167,6 +176,18 @@ def _study_dataset(members: dict[RunLabels, xr.Dataset], allow_missing: bool) ->
 
 def _converged(run):
     return bool(np.all(run["converged"].values == 1)) if "converged" in run else True
+
+
+def _why_incomplete(run, sizes):
+    """Why a run does not hold all of what it was asked for; an empty text if it does."""
+    if "incomplete" in run.attrs:
+        return str(run.attrs["incomplete"])
+    if not _converged(run):
+        return f"{int(np.sum(run['converged'].values != 1))} of its steps did not converge"
+    lacking = [dim for dim, size in sizes.items() if dim != "step" and run.sizes.get(dim, 0) != size]
+    if lacking:
+        return "; ".join(f"{run.sizes.get(dim, 0)} of {sizes[dim]} along {dim}" for dim in lacking)
+    return ""
 
 
 def _check_labels(key, run):
@@ -263,18 +284,22 @@ def _one_after_the_other(dim, template, position, members, snapshot_at):
 
 
 def run_labels(tree: xr.DataTree) -> list[RunLabels]:
-    """Labels of all runs in a campaign dataset that are not missing, in its order."""
+    """Labels of all runs in a campaign dataset, complete or not, in its order."""
     found = []
     for study, node in tree.children.items():
         axes = [node[label].values.tolist() for label in LABELS]
-        for index in itertools.product(*(range(len(axis)) for axis in axes)):
-            if node["status"].values[index] != MISSING:
-                found.append(RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True))))
+        there = np.isin(node["status"].transpose(*LABELS).values, (COMPLETE, INCOMPLETE))
+        found += [
+            RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True)))
+            for index in np.argwhere(there).tolist()
+        ]
     return found
 
 
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     """Take one run out of a campaign dataset, with the steps that it has and its own spots.
+
+    One that is incomplete has the reason in its attribute `incomplete`, as its file has.
 
     Raises
     ------
@@ -294,16 +319,18 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
             there = ", ".join(f"{value:g}" if label == "rms_slope" else str(value) for value in values)
             raise ValueError(f"study {labels.study}: no {label} {wanted!r}; there are {there}")
         index[label] = int(at[0])
-    if dataset["status"].isel(index) == MISSING:
-        raise ValueError(f"{labels}: this run is missing")
-    run = dataset.isel(index).drop_vars(["status", "step_count"])
+    status = int(dataset["status"].isel(index))
+    if status in (MISSING, NOT_IN_DESIGN):
+        raise ValueError(f"{labels}: this run is {'missing' if status == MISSING else 'not in the design'}")
+    failure = dataset["failure"].isel(index).item()
+    run = dataset.isel(index).drop_vars(["status", "failure", "step_count"])
     if "step" in run.dims:
         run = run.isel(step=slice(0, int(dataset["step_count"].isel(index))))
     for dim in (dim for dim in RAGGED if dim in dataset.dims):
         own = np.all([dataset[f"{dim}_{label}"].values == i for label, i in index.items()], axis=0)
         run = run.isel({dim: np.flatnonzero(own)}).drop_vars([f"{dim}_{label}" for label in LABELS])
-    if dataset["status"].isel(index) == INCOMPLETE:
-        run = run.isel(snapshot=np.isfinite(run["overlap_fraction"].values))
+    if status == INCOMPLETE:
+        run = run.assign_attrs(incomplete=failure).isel(snapshot=np.isfinite(run["overlap_fraction"].values))
         run = run.drop_vars([name for name, variable in run.data_vars.items() if _unknown(variable)])
     integers = [name for name, variable in run.variables.items() if _filled_integer(variable)]
     return run.assign({name: run[name].astype(np.int32) for name in integers}).reset_coords(list(LABELS))

@@ -19,7 +19,7 @@ from icha.campaign import RunLabels, loading_stops, run_labels, select_run
 from icha.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.files import whole_file
 from icha.path import BETWEEN
-from icha.records import INCOMPLETE, MISSING
+from icha.records import MISSING
 
 RESIDUAL_LIMIT = 1e-8
 IDENTITY_LIMIT = 1e-8
@@ -28,6 +28,8 @@ TARGET_LIMIT = 1e-8
 LOAD_LIMIT = 1e-3
 # Under load control an event (jump-in, coalescence) may push the surfaces apart by a little, in units of h_rms.
 SEPARATION_RISE_LIMIT = 1e-2
+# The check of every run of a campaign that it reached its end.
+COMPLETED = "completed"
 
 
 @dataclass(frozen=True)
@@ -259,10 +261,12 @@ def _cycle(run):
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
     """Check a campaign dataset: every run there and complete, every variable described, and `check_run` for each.
 
+    A run that failed has one check, which fails and has the reason as its description.
+
     Parameters
     ----------
     tree : the campaign dataset.
-    expected : labels of the runs that the campaign asks for; every combination of its labels, if left out.
+    expected : labels of the runs that the campaign asks for; those of the dataset's own design, if left out.
     """
     checks = []
 
@@ -277,15 +281,19 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
             "all runs", len(lacking), "number of runs that the campaign asks for and lacks", ", ".join(sorted(lacking))
         )
     for study, node in tree.children.items():
-        status = node["status"].values
-        incomplete = status == INCOMPLETE
-        bad = incomplete if wanted is not None else incomplete | (status == MISSING)
-        none_of("complete", np.count_nonzero(bad), "number of runs that end early or are missing", study)
+        missing = np.count_nonzero(node["status"].values == MISSING)
+        none_of("no run missing", missing, "number of runs of the design that are missing", study)
         variables = node.to_dataset().variables.values()
         bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in variables)
         none_of("described", bare, "number of variables without units or long name", study)
     for labels in present:
-        checks.extend(check_run(select_run(tree, labels), str(labels)))
+        run = select_run(tree, labels)
+        # What a failed run has is not used; of it there is nothing to say but why it failed.
+        if "incomplete" in run.attrs:
+            checks.append(Check(COMPLETED, 1.0, 0.0, False, run.attrs["incomplete"], str(labels)))
+            continue
+        checks.append(Check(COMPLETED, 0.0, 0.0, True, "the run reached the end of its path", str(labels)))
+        checks.extend(check_run(run, str(labels)))
     return tuple(checks)
 
 

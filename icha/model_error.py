@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Iterable, Mapping
 from functools import cache
 
@@ -15,7 +16,7 @@ from icha.campaign import LABELS, RAGGED, find_snapshot, select_run, spots_of
 from icha.labels import RunLabels, SolutionLabels
 from icha.observables import nodes_in_discs
 from icha.path import REDUCED_PRESSURE
-from icha.records import COMPLETE
+from icha.records import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, status_variable
 
 AXES = (*LABELS, "reduced_pressure")
 
@@ -83,6 +84,7 @@ VARIABLES = {
         "P(p) E* h'rms of boundary elements in contact, over the nominal area",
     ),
 }
+_INTEGERS = {"solution_grid"}
 # Of these, mean and deviation over the seeds.
 SUMMARISED = (
     "area_error",
@@ -114,14 +116,16 @@ def model_error(
     DataTree with a group for every entry, along surface, seed, rms_slope, material and reduced_pressure (the one
     asked for): the variables of `VARIABLES`; for those of `SUMMARISED` the mean over the seeds, `<name>_mean`, and from
     two seeds on their standard deviation, `<name>_deviation`; modulus, energy, range and Tabor parameter of the runs.
+    `status(surface, seed, rms_slope, material)` says which of these combinations have solutions beside a complete run;
+    elsewhere values are missing, and do not count.
 
     Raises
     ------
     ValueError
-        Naming entry, run and pressure: if a run is not there or not complete, has no snapshot at that pressure, or is
-        another contact than the solution's; if states of an entry are missing or given twice.
+        Naming entry, run and pressure: if a run is not there, has no snapshot at that pressure, or is another contact
+        than the solution's; if a contact lacks a state that others of its entry have, or has one twice.
     """
-    select = cache(lambda labels: _complete_run(campaign, labels))
+    select = cache(lambda labels: select_run(campaign, labels))
     entries: dict[str, dict[SolutionLabels, dict]] = {}
     origins: dict[str, dict[str, set[str]]] = {}
     for labels, solution in solutions:
@@ -131,6 +135,9 @@ def model_error(
             raise ValueError(f"{_name(labels)}: this solution is given twice")
         try:
             run = select(labels.run)
+            if "incomplete" in run.attrs:
+                states[labels] = None
+                continue
             at = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
             if not np.isclose(float(solution["target_reduced_pressure"]), labels.reduced_pressure, rtol=1e-9):
                 asked = float(solution["target_reduced_pressure"])
@@ -301,17 +308,11 @@ def _name(labels):
     return f"entry {labels.entry}, run {labels.run}, reduced pressure {labels.reduced_pressure:g}"
 
 
-def _complete_run(campaign, labels):
-    """A run of the campaign that reached the end of its path."""
-    run = select_run(campaign, labels)
-    status = campaign[labels.study]["status"].sel(surface=labels.surface, seed=labels.seed, material=labels.material)
-    if int(status.sel(rms_slope=labels.rms_slope, method="nearest")) != COMPLETE:
-        raise ValueError("this run is incomplete")
-    return run
-
-
 def _entry_dataset(campaign, entry, states):
-    """The states of one entry as full arrays along `AXES`, in the order of the campaign's own labels."""
+    """The states of one entry as full arrays along `AXES`, in the order of the campaign's labels.
+
+    Those of runs that failed are None.
+    """
     studies = sorted({labels.study for labels in states})
     if len(studies) > 1:
         raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")
@@ -321,7 +322,8 @@ def _entry_dataset(campaign, entry, states):
     axes["rms_slope"] = sorted(asked["rms_slope"])
     axes["reduced_pressure"] = sorted(asked["reduced_pressure"])
     grid = [SolutionLabels(entry, studies[0], *values) for values in itertools.product(*axes.values())]
-    if missing := [labels for labels in grid if labels not in states]:
+    contacts = {labels.run for labels in states}
+    if missing := [labels for labels in grid if labels.run in contacts and labels not in states]:
         raise ValueError(f"{_name(missing[0])}: no solution, nor of {len(missing) - 1} other states of this entry")
 
     shape = tuple(map(len, axes.values()))
@@ -332,19 +334,30 @@ def _entry_dataset(campaign, entry, states):
     coords["reduced_pressure"] = _variable(
         ("reduced_pressure",), axes["reduced_pressure"], "1", "reduced pressure asked for, p/(E* h'rms)"
     )
-    variables = {}
+    of_contact = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
+    status = np.array(of_contact, np.int8).reshape(shape)[..., 0]
+    variables = {"status": status_variable(LABELS, status)}
+    bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
     for name, (dims, units, long_name) in VARIABLES.items():
-        values = np.array([states[labels][name] for labels in grid])
+        unknown = np.full([bins[dim] for dim in dims], np.nan)
+        values = np.array([unknown if states.get(labels) is None else states[labels][name] for labels in grid])
         variables[name] = _variable(AXES + dims, values.reshape(shape + values.shape[1:]), units, long_name)
+        if name in _INTEGERS and values.dtype.kind == "f":
+            variables[name].encoding["dtype"] = np.dtype("int32")
     seeds = AXES.index("seed")
     others = tuple(axis for axis in AXES if axis != "seed")
     for name in SUMMARISED:
         values, long_name = variables[name].values, VARIABLES[name][2]
-        variables[f"{name}_mean"] = _variable(others, values.mean(axis=seeds), "1", f"mean over the seeds: {long_name}")
-        if len(axes["seed"]) > 1:
-            deviation = values.std(axis=seeds, ddof=1)
+        # Of no complete run there is no mean.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            mean = np.nanmean(values, axis=seeds)
+            deviation = np.nanstd(values, axis=seeds, ddof=1) if len(axes["seed"]) > 1 else None
+        variables[f"{name}_mean"] = _variable(others, mean, "1", f"mean over the seeds: {long_name}")
+        if deviation is not None:
             described = f"standard deviation over the seeds: {long_name}"
             variables[f"{name}_deviation"] = _variable(others, deviation, "1", described)
+            variables[f"{name}_deviation"].attrs["missing"] = "where fewer than two runs are complete"
     variables["gap_bin_edges"] = _variable(("gap_edge",), GAP_BINS, "1", "edges of the gap bins over rms height")
     variables["pressure_bin_edges"] = _variable(
         ("pressure_edge",), PRESSURE_BINS, "1", "edges of the pressure bins over contact modulus and rms slope"
@@ -355,6 +368,10 @@ def _entry_dataset(campaign, entry, states):
     for name in ("contact_modulus", "surface_energy", "interaction_range", "tabor_parameter"):
         result[name] = own[name]
     return result
+
+
+def _status(state):
+    return INCOMPLETE if state is None else COMPLETE
 
 
 def _variable(dims, values, units, long_name):

@@ -22,8 +22,17 @@ _COMPRESSED_SIZES = range(4096, 2**22)
 _FLOAT_FILL = 9.969209968386869e36
 _INTEGER_FILL = -(2**31) + 1
 
-COMPLETE, INCOMPLETE, MISSING = 0, 1, 2
-STATUS_MEANINGS = ("complete", "incomplete", "missing")
+COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN = range(4)
+STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design")
+
+
+def status_variable(dims: tuple[str, ...], values: np.ndarray) -> xr.Variable:
+    """What became of every run, as positions in `STATUS_MEANINGS`. Those that are not complete may lack values."""
+    flags = {"flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8), "flag_meanings": " ".join(STATUS_MEANINGS)}
+    attrs = {"units": "1", "long_name": "status of the run"} | flags
+    return xr.Variable(
+        dims, values.astype(np.int8), attrs | {"comment": "values that a run does not have are filled with _FillValue"}
+    )
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
@@ -32,9 +41,9 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
     Raises
     ------
     ValueError
-        If a variable lacks units or holds a value that is not finite. A run marked as incomplete or missing by
-        the dataset's `status` may lack values, and none has any beyond its `step_count` steps; those are written as the
-        variable's `_FillValue`.
+        If a variable lacks units or holds a value that is not finite. A run that is not complete by the dataset's
+        `status` may lack values, none has any beyond its `step_count` steps, and a variable whose attribute `missing`
+        says why may lack some, too; those are written as the variable's `_FillValue`.
     """
     tree = data if isinstance(data, xr.DataTree) else None
     nodes = {node.path: node.to_dataset() for node in tree.subtree} if tree is not None else {"/": data}
@@ -75,6 +84,8 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
         if variable.dtype.kind not in "fc":
             continue
         bad = ~np.isfinite(variable.values)
+        if "missing" in variable.attrs:
+            bad &= ~np.isnan(variable.values)
         if excused is not None and set(variable.dims) & set(excused.dims):
             # A value that several runs share is missing where all of them are.
             may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable

@@ -196,12 +196,33 @@ def test_campaign_passes_and_names_its_runs():
 
 def test_missing_runs_fail_unless_nobody_asked_for_them():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
-    tree = campaign_tree(runs[:-1], allow_missing=True)
-    assert {check.name for check in check_campaign(tree) if not check.passed} == {"complete"}
-    assert all(check.passed for check in check_campaign(tree, [labels for labels, _ in runs[:-1]]))
-    lacking = [check for check in check_campaign(tree, [labels for labels, _ in runs]) if not check.passed]
+    asked = [labels for labels, _ in runs]
+    tree = campaign_tree(runs[:-1], design=asked)
+    assert {check.name for check in check_campaign(tree) if not check.passed} == {"no run missing"}
+    sparse = campaign_tree(runs[:-1])
+    assert all(check.passed for check in check_campaign(sparse))
+    assert all(check.passed for check in check_campaign(sparse, asked[:-1]))
+    lacking = [check for check in check_campaign(sparse, asked) if not check.passed]
     assert [check.name for check in lacking] == ["all runs"]
     assert lacking[0].subject == str(RunLabels("slopes", "rough", 1, 0.2, "hertz"))
+
+
+def test_failed_runs_have_one_check_with_their_reason():
+    """Also one that has not reached a single stop; nothing of what is left of it is checked."""
+    runs = {labels: run for labels, run in small.runs() if labels.study == "slopes"}
+    one, other, *_ = runs
+    nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
+    runs[one] = runs[one].isel(nothing).assign_attrs(incomplete="the path ends before it begins")
+    runs[other] = runs[other].copy(deep=True)
+    runs[other]["converged"][2:4] = 0
+    checks = check_campaign(campaign_tree(runs.items()), list(runs))
+    failed = {check.subject: (check.name, check.description) for check in checks if not check.passed}
+    assert failed == {
+        str(one): ("completed", "the path ends before it begins"),
+        str(other): ("completed", "2 of its steps did not converge"),
+    }
+    assert sum(check.subject in failed for check in checks) == 2
+    assert sum(check.name == "completed" and check.passed for check in checks) == 2
 
 
 def test_worst_prefers_failures_and_then_large_values():

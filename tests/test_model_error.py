@@ -186,11 +186,28 @@ def test_what_cannot_be_compared_is_named():
         model_error(tree(), [])
 
 
-def test_runs_that_ended_early_are_not_compared():
-    labels = RunLabels("one", "rough", 1, 1.0, "soft")
-    short = runs()[labels].isel(step=slice(0, 1), snapshot=slice(0, 1))
-    short = short.isel(spot=np.flatnonzero(short["spot_snapshot"].values == 0))
-    members = [(labels, short), *((key, run) for key, run in runs().items() if key != labels)]
-    tree = campaign_tree(members, allow_missing=True)
-    with pytest.raises(ValueError, match=STATE + "this run is incomplete"):
-        model_error(tree, [(SolutionLabels("truth", *labels, 3e-3), own_solution(short, 3e-3))])
+def test_runs_that_ended_early_do_not_count(tmp_path):
+    """Of three seeds one run has failed; of the other material two have, and one has not been solved for."""
+    factor = {1: 1.1, 2: 1.2, 3: 1.6}
+    failed = [RunLabels("one", "rough", 3, 1.0, "soft"), *(RunLabels("one", "rough", k, 1.0, "hertz") for k in (1, 2))]
+    nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
+    members = {
+        labels: run.isel(nothing).assign_attrs(incomplete="sticky") if labels in failed else run
+        for labels, run in runs().items()
+    }
+    pairs = solutions(area=lambda labels: factor[labels.seed])
+    unsolved = RunLabels("one", "rough", 3, 1.0, "hertz")
+    pairs = [(labels, solution) for labels, solution in pairs if labels.run != unsolved]
+    errors = model_error(campaign_tree(members.items()), pairs)
+    write_dataset(errors, tmp_path / "e.nc")
+    for entry in (errors["truth"].to_dataset(), read_campaign(tmp_path / "e.nc")["truth"].to_dataset()):
+        soft, bare = (entry.isel(surface=0, rms_slope=0).sel(material=name) for name in ("soft", "hertz"))
+        assert soft["status"].values.tolist() == [0, 0, 1] and bare["status"].values.tolist() == [1, 1, 3]
+        known = np.array([1 / 1.1, 1 / 1.2]) - 1
+        np.testing.assert_allclose(soft["area_error"].values, [[known[0]] * 2, [known[1]] * 2, [np.nan] * 2])
+        np.testing.assert_allclose(soft["area_error_mean"].values, known.mean())
+        np.testing.assert_allclose(soft["area_error_deviation"].values, abs(known[0] - known[1]) / np.sqrt(2))
+        assert np.isnan(bare["area_error"]).all() and np.isnan(bare["area_error_mean"]).all()
+    one_left = campaign_tree({**runs(), failed[1]: members[failed[1]], failed[2]: members[failed[2]]}.items())
+    bare = model_error(one_left, solutions())["truth"].to_dataset().sel(material="hertz")
+    assert np.isfinite(bare["area_error_mean"]).all() and np.isnan(bare["area_error_deviation"]).all()

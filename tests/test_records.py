@@ -8,7 +8,7 @@ import small_campaign as small
 import xarray as xr
 
 from icha import Surface
-from icha.campaign import RunLabels, campaign_tree, run_labels, select_run
+from icha.campaign import campaign_tree, run_labels, select_run
 from icha.records import read_campaign, read_dataset, read_run, read_surface, write_dataset, write_surface
 
 
@@ -160,35 +160,46 @@ def test_snapshots_met_in_another_order_are_put_together():
     assert len(orders) == 2, "the small campaign must hold both orders for the test above to mean anything"
 
 
-def test_missing_runs_are_an_error_that_lists_them():
-    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
-    with pytest.raises(ValueError, match=r"slopes/rough/seed1/slope0\.2/hertz \(missing\)"):
-        campaign_tree(runs)
-
-
-def test_missing_runs_are_marked_where_they_are_allowed(tmp_path):
-    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
-    write_dataset(campaign_tree(runs, allow_missing=True), tmp_path / "c.nc")
+def test_combinations_that_nobody_asked_for_are_not_in_the_design(tmp_path):
+    """A design along its diagonal: two slopes and two materials, of which two runs are asked for and one is there."""
+    asked = {labels: run for labels, run in small.runs() if labels.study == "slopes"}
+    steep, other = (
+        labels for labels in asked if (labels.rms_slope, labels.material) in ((1.0, "soft"), (0.2, "hertz"))
+    )
+    write_dataset(campaign_tree([(steep, asked[steep])], design=[steep, other]), tmp_path / "c.nc")
     tree = read_campaign(tmp_path / "c.nc")
     status = tree["slopes"]["status"]
-    assert status.attrs["flag_meanings"] == "complete incomplete missing"
-    assert int(status.sel(surface="rough", seed=1, rms_slope=0.2, material="hertz")) == 2
-    assert int((status == 0).sum()) == 3
+    assert status.attrs["flag_meanings"] == "complete incomplete missing not_in_design"
+    table = np.array(status.attrs["flag_meanings"].split())[status.values]
+    assert status["rms_slope"].values.tolist() == [0.2, 1.0] and status["material"].values.tolist() == ["soft", "hertz"]
+    assert table.tolist() == [[[["not_in_design", "missing"], ["complete", "not_in_design"]]]]
     area = tree["slopes"]["contact_area_fraction"]
-    assert int(np.isnan(area).sum()) == area.sizes["step"]
-    with pytest.raises(ValueError, match="this run is missing"):
-        select_run(tree, RunLabels("slopes", "rough", 1, 0.2, "hertz"))
-    kept = select_run(tree, runs[0][0])
-    np.testing.assert_array_equal(kept["spot_count"].values, runs[0][1]["spot_count"].values)
+    assert int(np.isnan(area).sum()) == 3 * area.sizes["step"]
+    assert set(tree["slopes"]["failure"].values.flat) == {""}
+    assert run_labels(tree) == [steep]
+    with pytest.raises(ValueError, match=r"slopes/rough/seed1/slope0\.2/hertz: this run is missing"):
+        select_run(tree, other)
+    with pytest.raises(ValueError, match=r"slopes/rough/seed1/slope1/hertz: this run is not in the design"):
+        select_run(tree, steep._replace(material="hertz"))
+    kept = select_run(tree, steep)
+    np.testing.assert_array_equal(kept["spot_count"].values, asked[steep]["spot_count"].values)
+    np.testing.assert_array_equal(kept["spot_force"].values, asked[steep]["spot_force"].values)
+
+
+def test_what_does_not_fit_the_design_is_refused():
+    (labels, run), *_ = small.runs()
+    with pytest.raises(ValueError, match=r"slopes/.*/soft: this run is not in the design"):
+        campaign_tree([(labels, run)], design=[labels._replace(material="hertz")])
+    with pytest.raises(ValueError, match="study single: there is no run of it"):
+        campaign_tree([(labels, run)], design=[labels, labels._replace(study="single")])
 
 
 def test_runs_that_end_early_keep_what_they_have(tmp_path):
     (labels, run), *others = [(each, run) for each, run in small.runs() if each.study == "slopes"]
     short = run.isel(step=slice(0, 3), snapshot=slice(0, 1), spot=np.flatnonzero(run["spot_snapshot"] == 0))
-    with pytest.raises(ValueError, match="incomplete"):
-        campaign_tree([(labels, short), *others])
-    write_dataset(campaign_tree([(labels, short), *others], allow_missing=True), tmp_path / "c.nc")
+    write_dataset(campaign_tree([(labels, short), *others]), tmp_path / "c.nc")
     taken = select_run(read_campaign(tmp_path / "c.nc"), labels)
+    assert taken.attrs["incomplete"] == "1 of 2 along snapshot"
     assert taken.sizes["step"] == 3 and taken.sizes["snapshot"] == 1
     np.testing.assert_array_equal(taken["nominal_pressure"].values, short["nominal_pressure"].values)
 
@@ -197,7 +208,7 @@ def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing(tmp_
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
     holed = runs[0][1].copy(deep=True)
     holed["contact_area_fraction"][1] = np.nan
-    tree = campaign_tree([(runs[0][0], holed), *runs[1:]], allow_missing=True)
+    tree = campaign_tree([(runs[0][0], holed), *runs[1:]])
     with pytest.raises(ValueError, match="contact_area_fraction"):
         write_dataset(tree, tmp_path / "c.nc")
 
@@ -296,15 +307,14 @@ def test_a_run_that_broke_off_on_its_way_back_has_no_pull_off(tmp_path):
         if name.startswith(("loss_", "hysteresis_", "pull_off_"))
     ]
     short = runs[broken].isel(step=slice(0, 6)).drop_vars(lost).assign_attrs(incomplete="the path ends there")
-    with pytest.raises(ValueError, match="incomplete"):
-        campaign_tree((runs | {broken: short}).items())
     # Whichever comes first: what the others have is what the study has.
     for order in (runs | {broken: short}, {broken: short} | runs):
         order = order | {broken: short}
-        write_dataset(campaign_tree(order.items(), allow_missing=True), tmp_path / "c.nc")
+        write_dataset(campaign_tree(order.items()), tmp_path / "c.nc")
         tree = read_campaign(tmp_path / "c.nc")
         assert [int(n) for n in np.unique(tree["loops"]["status"], return_counts=True)[1]] == [3, 1]
         taken = select_run(tree, broken)
+        assert taken.attrs["incomplete"] == "the path ends there"
         assert set(lost).isdisjoint(taken.variables)
         np.testing.assert_array_equal(taken["work"].values, short["work"].values)
         whole = list(runs)[1]

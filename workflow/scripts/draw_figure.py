@@ -1,11 +1,13 @@
 """Draw one figure from the campaign dataset."""
 
 import importlib
+import textwrap
 
 from job import logged
 
 from icha.configuration.measurement import read_columns
-from icha.figures.style import save
+from icha.figures.select import NothingToDraw
+from icha.figures.style import GREY, new_figure, save, styled
 from icha.records import read_campaign, read_dataset
 
 READERS = {
@@ -27,13 +29,27 @@ def _several(paths):
 def draw_figure(name, png, pdf, *, data, options, measurements=()):
     """Draw the figure of the module `icha.figures.<name>` and write it to `png` and `pdf`.
 
-    `data` are the files of its arguments, `measurements` pairs of a file and what is to be known of it.
+    `data` are the files of its arguments, `measurements` pairs of a file and what is to be known of it. Where nothing
+    of what it shows is complete, the figure is an empty page that says so.
     """
     module = importlib.import_module(f"icha.figures.{name}")
     arguments = {argument: READERS[argument](path) for argument, path in data.items()}
     if measurements:
         options = options | {"measurements": [_measured(module.MeasuredAreas, *pair) for pair in measurements]}
-    save(module.figure(**arguments, **options), png, pdf)
+    try:
+        figure = module.figure(**arguments, **options)
+    except NothingToDraw as reason:
+        # The verdict says which runs failed; what can be drawn is drawn.
+        print(f"An empty page: {reason}")
+        figure = _empty_page(str(reason))
+    save(figure, png, pdf)
+
+
+@styled
+def _empty_page(reason):
+    figure = new_figure(5.0, 2.5)
+    figure.text(0.5, 0.5, textwrap.fill(reason, 60), ha="center", va="center", color=GREY, parse_math=False)
+    return figure
 
 
 def _measured(kind, file, settings):

@@ -9,7 +9,7 @@ from icha.records import read_run, write_dataset
 def make_dataset(runs, output, *, labels, attributes):
     """Write the campaign dataset of the files `runs`, which have the given labels, to `output`."""
     pairs = [(label, read_run(path)) for label, path in zip(labels, runs, strict=True)]
-    tree = campaign_tree(pairs, attrs=attributes)
+    tree = campaign_tree(pairs, design=labels, attrs=attributes)
     for study in tree.children.values():
         # Not that of one of its runs.
         study.attrs["config_sha256"] = attributes["config_sha256"]

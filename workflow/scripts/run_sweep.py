@@ -5,13 +5,21 @@ from job import logged
 from icha.material import Material
 from icha.path import Path
 from icha.records import read_surface, write_dataset
-from icha.simulation import simulate
+from icha.simulation import ConvergenceError, simulate
 
 
 def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, progress):
-    """Load the surface of the file `surface`, scaled to `rms_slope`, and write the run dataset to `output`."""
+    """Load the surface of the file `surface`, scaled to `rms_slope`, and write the run dataset to `output`.
+
+    Of a run that fails the file holds the stops that were reached, and says why there are no more: the campaign goes
+    on, and its verdict lists the run.
+    """
     scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
-    dataset = simulate(scaled, Material(**material), Path(**path), seed=seed, progress=progress)
+    try:
+        dataset = simulate(scaled, Material(**material), Path(**path), seed=seed, progress=progress)
+    except ConvergenceError as error:
+        dataset = error.dataset
+        progress(f"Failed: {dataset.attrs['incomplete']}")
     write_dataset(dataset.assign_attrs(attributes), output)
 
 
