@@ -12,7 +12,7 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help environment run validation hysteresis test lint format schema benchmarks benchmarks-page clean
+.PHONY: help environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -22,9 +22,11 @@ help:
 	@echo "make lint    check style of Python code and workflow"
 	@echo "make format  put Python code and workflow into that style"
 	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
+	@echo "make docs    build the documentation as a site in docs/_build/html; broken links within it are errors"
+	@echo "make linkcheck  check the documentation's links to other sites"
 	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
-	@echo "make clean   remove results and Snakemake's records (not the environment)"
+	@echo "make clean   remove results, Snakemake's records and the built documentation (not the environment)"
 
 environment: .venv/.installed
 
@@ -63,6 +65,13 @@ format: environment
 schema: environment
 	python -m icha.configuration.schema
 
+docs: environment
+	sphinx-build --quiet --fail-on-warning --keep-going -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+linkcheck: environment
+	sphinx-build --quiet --keep-going -b linkcheck docs docs/_build/linkcheck
+
 # The codes compared with have an environment of their own; where aspher cannot be built, the page says so.
 .venv-benchmarks/.installed: .venv-tools/bin/uv benchmarks/requirements.txt benchmarks/requirements-aspher.txt
 	.venv-tools/bin/uv venv --quiet --clear --python $(PYTHON) .venv-benchmarks
@@ -78,5 +87,5 @@ benchmarks-page: environment
 	python benchmarks/page.py
 
 clean:
-	rm -rf .snakemake
+	rm -rf .snakemake docs/_build
 	find results -mindepth 1 -not -name README.md -delete

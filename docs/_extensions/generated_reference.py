@@ -1,0 +1,218 @@
+"""Parts of the reference that are made from the package itself when the site is built.
+
+A page names them in a comment of its own line, `<!-- reference: NAME -->`; the text is put in its place.
+"""
+
+import re
+import tempfile
+from pathlib import Path
+
+MARK = re.compile(r"^<!-- reference: (\w+) -->$", flags=re.MULTILINE)
+
+
+def configuration() -> str:
+    """Every key of a configuration file, a table a section."""
+    from icha.configuration.schema import key_tables
+
+    return key_tables().replace("### ", "## ")
+
+
+def commands() -> str:
+    """Every command of `icha`, with its arguments and options."""
+    import typer
+
+    from icha.cli import app
+
+    group = typer.main.get_command(app)
+    return "\n".join(_command(f"icha {name}", command) for name, command in group.commands.items())
+
+
+def _command(name, command):
+    import click
+
+    context = click.Context(command, info_name=name)
+    # Typer marks the paragraphs that it must not fill.
+    text = re.sub(r"\s*\x08\s*", "\n\n", command.help or "")
+    usage = " ".join(command.get_usage(context).split()[1:])
+    lines = [f"## `{name}`", "", text.strip(), "", "```text", usage, "```", ""]
+    rows = []
+    for parameter in command.params:
+        names = ", ".join(f"`{option}`" for option in (*parameter.opts, *parameter.secondary_opts))
+        if isinstance(parameter, click.Argument):
+            names = f"`{parameter.human_readable_name}`"
+        default = parameter.default() if callable(parameter.default) else parameter.default
+        if parameter.required:
+            default = "needed"
+        elif default in (None, (), [], False, ""):
+            default = "none"
+        else:
+            default = f"`{default}`"
+        rows.append(f"| {names} | {default} | {_cell(getattr(parameter, 'help', None) or '')} |")
+    if rows:
+        lines += ["| argument or option | default | meaning |", "|---|---|---|", *rows, ""]
+    return "\n".join(lines)
+
+
+def run_variables() -> str:
+    """The variables of a run's file: of every run, of one that turns back, of one that ends in separation."""
+    from icha.simulation import CYCLE_VARIABLES, LOOP_VARIABLES, VARIABLES
+
+    sections = {
+        "Of every run": VARIABLES,
+        "Of a run that turns back": CYCLE_VARIABLES,
+        "Of a run that ends in separation": LOOP_VARIABLES,
+    }
+    return "\n".join(f"### {heading}\n\n{_table(_rows(variables))}" for heading, variables in sections.items())
+
+
+def campaign_variables() -> str:
+    """The variables that a campaign dataset has beside those of its runs, and what each depends on."""
+    from icha.simulation import CYCLE_VARIABLES, LOOP_VARIABLES, VARIABLES
+
+    study = _small_campaign()["study"].to_dataset()
+    of_runs = VARIABLES | CYCLE_VARIABLES | LOOP_VARIABLES
+    own = {name: variable for name, variable in study.variables.items() if name not in of_runs}
+    shared = {
+        name: ", ".join(dim for dim in study[name].dims if dim not in of_runs[name][0]) or "nothing"
+        for name in of_runs
+        if name in study and not {"spot", "event"} & set(study[name].dims)
+    }
+    everything = {"surface, seed, rms_slope, material"}
+    fewer = {}
+    for name, along in shared.items():
+        if along not in everything:
+            fewer.setdefault(along, []).append(f"`{name}`")
+    lines = [f"- along {along}: {', '.join(names)}" for along, names in fewer.items()]
+    return _table(_rows_of(own)) + "\nAlong fewer than the four labels:\n\n" + "\n".join(lines) + "\n"
+
+
+def comparison_variables() -> str:
+    """The variables of the comparison of a study's runs."""
+    from icha.aggregation import compare_runs
+
+    return _table(_rows_of(compare_runs(_small_campaign()["study"].to_dataset()).variables))
+
+
+def surface_variables() -> str:
+    """The variables of a surface's file."""
+    from icha.records import read_dataset, write_surface
+
+    spectrum = _small_spectrum()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "surface.nc")
+        write_surface(path, spectrum.realise(grid=32, seed=1), name="rough", seed=1, spectrum=spectrum)
+        return _table(_rows_of(read_dataset(path).variables))
+
+
+def model_error_variables() -> str:
+    """The variables of the comparison with boundary elements."""
+    from icha.model_error import AXES, VARIABLES
+
+    return _table((name, (*AXES, *dims), units, text) for name, (dims, units, text) in VARIABLES.items())
+
+
+def theory_variables() -> str:
+    """The variables of the theories of a surface."""
+    import icha
+    from icha.reference.dataset import reference_dataset
+    from icha.roughness import spectral_moments
+
+    spectrum = _small_spectrum()
+    material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2e-9)
+    theories = reference_dataset(spectrum, spectral_moments(spectrum.realise(32, 1)), {(1.0, "soft"): material})
+    return _table(_rows_of(theories.variables))
+
+
+def _small_spectrum():
+    import icha
+
+    return icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=40e-6, short_wavelength=100e-6 / 7, hurst=0.8)
+
+
+def _small_campaign():
+    """A campaign of one study with two seeds, in and back, on a surface of a few summits."""
+    import icha
+    from icha.campaign import campaign_tree
+
+    spectrum = _small_spectrum()
+    material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2.071e-9)
+    path = icha.Path(reduced_pressures=[3e-3, 1e-2], unload=True, max_step=0.3)
+    runs = [
+        (("study", "rough", seed, 1.0, "soft"), icha.simulate(spectrum.realise(32, seed), material, path, seed=seed))
+        for seed in (1, 2)
+    ]
+    return campaign_tree(runs)
+
+
+def _rows(variables):
+    return ((name, dims, units, text) for name, (dims, units, text) in variables.items())
+
+
+def _rows_of(variables):
+    return ((n, v.dims, v.attrs.get("units", ""), v.attrs.get("long_name", "")) for n, v in variables.items())
+
+
+def _table(rows):
+    lines = ["| variable | along | unit | meaning |", "|---|---|---|---|"]
+    for name, dims, units, text in rows:
+        lines.append(f"| `{name}` | {', '.join(dims)} | {units} | {_cell(text)} |")
+    return "\n".join([*lines, ""])
+
+
+def _cell(text):
+    """Text for a cell of a table, where bars and asterisks would mean something."""
+    return " ".join(text.split()).replace("|", "\\|").replace("*", "\\*")
+
+
+PARTS = {
+    part.__name__: part
+    for part in (
+        configuration,
+        commands,
+        run_variables,
+        campaign_variables,
+        comparison_variables,
+        surface_variables,
+        model_error_variables,
+        theory_variables,
+    )
+}
+
+
+def fill_in(app, docname, source):
+    """Put the parts that a page asks for in their places."""
+    source[0] = MARK.sub(lambda match: PARTS[match[1]](), source[0])
+
+
+def always_read(app, env, added, changed, removed):
+    """The pages that ask for parts: the package may have changed, though they have not."""
+    return [name for name in env.found_docs if MARK.search(Path(env.doc2path(name)).read_text(encoding="utf-8"))]
+
+
+ENTRY = re.compile(r"^(?P<indent>\s*)(?P<names>[*\w]+(?:, [*\w]+)*) : (?P<text>.+)$")
+
+
+def plain_docstring(app, what, name, obj, options, lines):
+    """Take `name : text` of a list of parameters for the description that it is, and bars and asterisks for signs."""
+    inside, new = False, []
+    for number, line in enumerate(lines):
+        if number + 1 < len(lines) and re.fullmatch(r"-{3,}", lines[number + 1].strip()):
+            inside = line.strip() == "Parameters"
+        match = ENTRY.match(line) if inside else None
+        new += [f"{match['indent']}{match['names']}", f"{match['indent']}    {match['text']}"] if match else [line]
+    lines[:] = [_literal(line) for line in new]
+
+
+def _literal(line):
+    """A line whose bars and asterisks outside of code mean nothing but themselves."""
+    parts = line.split("`")
+    return "`".join(re.sub(r"([|*])", r"\\\1", part) if n % 2 == 0 else part for n, part in enumerate(parts))
+
+
+def setup(app):
+    """Connect to Sphinx."""
+    app.connect("source-read", fill_in)
+    app.connect("env-get-outdated", always_read)
+    # Before napoleon, which turns sections into fields.
+    app.connect("autodoc-process-docstring", plain_docstring, priority=400)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
