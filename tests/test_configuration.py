@@ -8,6 +8,7 @@ import yaml
 
 import icha
 from icha.configuration import model
+from icha.configuration.design import value_label
 from icha.configuration.expansion import (
     asperity_cases,
     campaign_sha256,
@@ -26,6 +27,7 @@ from icha.configuration.expansion import (
     surface_settings,
 )
 from icha.configuration.load import ConfigurationError, load_configuration
+from icha.configuration.problems import warnings
 from icha.configuration.schema import json_schema, readme_with_tables
 from icha.configuration.units import to_number, to_si
 from icha.labels import number_label
@@ -108,7 +110,7 @@ def test_numbers_that_yaml_reads_as_text_are_numbers():
 def test_shipped_campaigns_are_valid(path):
     campaign = load_configuration(path).campaign
     assert run_cases(campaign)
-    assert not campaign.warnings()
+    assert not warnings(campaign)
     assert path.name == "config.yaml" or campaign.name == path.stem
 
 
@@ -473,6 +475,82 @@ BAD = {
         },
         "boundary_elements.truth.refinement: 16 gives 131072 nodes a side on 'rough'; allowed: 32768 at most",
     ),
+    "parameter that nobody has": ("studies.one.vary", {"hrust": [0.8]}, "studies.one.vary.hrust: unknown key (did you"),
+    "varied value out of range": (
+        "studies.one.vary",
+        {"hurst": [0.5, 1.5]},
+        "studies.one.vary.hurst[1]: 1.5 is out of range; allowed: a number in (0, 1]",
+    ),
+    "varied value without its unit": (
+        "studies.one.vary",
+        {"surface_energy": [5]},
+        "studies.one.vary.surface_energy[0]: 5 the unit is missing; allowed: energy per area",
+    ),
+    "varied grid too coarse for its surface": (
+        "studies.one.vary",
+        {"grid": [80, 16]},
+        "studies.one.vary.grid[1]: 16 gives 1.6 grid cells per shortest wavelength",
+    ),
+    "varied cut-off too short for the grid": (
+        "studies.one.vary",
+        {"short_wavelength": ["10 um", "1 um"]},
+        "studies.one.vary.short_wavelength[1]: '1 um' grid of 'rough': 80 gives 0.8 grid cells",
+    ),
+    "lists of different length together": (
+        "",
+        {"studies.one.vary": {"hurst": [0.5, 0.6, 0.7]}, "studies.one.zip": [["rms_slopes", "hurst"]]},
+        "rms_slopes has 2, hurst has 3 entries; allowed: lists of the same length",
+    ),
+    "list that is not there together": (
+        "studies.one.zip",
+        [["rms_slopes", "hurst"]],
+        "studies.one.zip[0][1]: 'hurst' is no list of this study; allowed: surfaces, seeds, rms_slopes, materials",
+    ),
+    "list together twice": (
+        "studies.one.zip",
+        [["rms_slopes", "seeds"], ["seeds", "materials"]],
+        "studies.one.zip[1][0]: 'seeds' goes along with two other lists",
+    ),
+    "case of an unknown surface": (
+        "studies.one.cases",
+        [{"surface": "rouhg"}],
+        "studies.one.cases[0].surface: 'rouhg' is not defined; allowed: rough",
+    ),
+    "case with an unknown key": (
+        "studies.one.cases",
+        [{"surfaces": ["rough"]}],
+        "studies.one.cases[0].surfaces: unknown key (did you mean 'surface'?)",
+    ),
+    "case with a wrong value": (
+        "studies.one.cases",
+        [{"hurst": 0.7}, {"hurst": 7}],
+        "studies.one.cases[1].hurst: 7 is out of range",
+    ),
+    "no slopes and cases without one": (
+        "",
+        {"studies.one.rms_slopes": None, "studies.one.cases": [{"rms_slope": 0.1}, {"seed": 2}]},
+        "studies.one.rms_slopes: the key is missing; needed: Rms slopes",
+    ),
+    "range of seeds backwards": ("studies.one.seeds", "5..1", "studies.one.seeds: '5..1' ends before it begins"),
+    "range that is none": ("studies.one.seeds", ["1-5"], "'1-5' is no range of seeds; allowed: integers from 0"),
+    "seed in a range twice": ("studies.one.seeds", ["1..5", 3], "3 is given twice"),
+    "measured slope of a random surface": (
+        "studies.one.rms_slopes",
+        "measured",
+        "studies.one.rms_slopes[0]: 'measured' surface 'rough' is made at random and has no slope of its own",
+    ),
+    "more runs than anybody waits for": (
+        "studies.one.seeds",
+        "1..100000",
+        "studies.one: asks for 200000 runs; allowed",
+    ),
+    "unknown default": (
+        "defaults",
+        {"materials": {"modulus": "1 MPa"}},
+        "defaults.materials.modulus: unknown key",
+    ),
+    "default of no kind of surface": ("defaults", {"surfaces": {"hrust": 0.8}}, "defaults.surfaces.hrust: unknown key"),
+    "unknown section of defaults": ("defaults", {"figures": {}}, "defaults.figures: unknown key; allowed: materials"),
     "ORCID": ("authors", [{"name": "A", "orcid": "1"}], "authors[0].orcid"),
 }
 
@@ -571,11 +649,114 @@ def test_one_asperity_is_hertzs_and_one_for_every_tabor_parameter(load):
     assert asperity_cases(campaign) == {"hertz": None, "mu2": 2.0, "mu2.8": 2.8}
 
 
-def test_random_surfaces_and_files_need_studies_of_their_own(load, tmp_path):
+def paths(campaign):
+    return [case.path.removeprefix("one/") for case in run_cases(campaign)]
+
+
+def test_random_surfaces_and_files_share_a_study(load, tmp_path):
     np.save(tmp_path / "own.npy", np.random.default_rng(1).random((16, 16)))
-    own = {"kind": "file", "path": "own.npy", "height_unit": "um", "period": "1 mm"}
-    with pytest.raises(ConfigurationError, match=r"studies\.one\.surfaces: 'rough, own' mixes"):
-        load({"surfaces.own": own, "studies.one.surfaces": ["rough", "own"]})
+    campaign = load({"surfaces.own": _file_surface("own.npy"), "studies.one.surfaces": ["rough", "own"]}).campaign
+    assert surface_cases(campaign) == [("rough", 1), ("rough", 2), ("own", 0)]
+    assert len(paths(campaign)) == 2 * 2 + 2
+
+
+def test_parameters_are_varied_each_with_each(load):
+    vary = {"hurst": [0.6, 0.8], "surface_energy": ["5 mJ/m^2", "0.00001 kJ/m^2"], "grid": 96}
+    campaign = load({"studies.one.vary": vary, "studies.one.rms_slopes": [0.2], "studies.one.seeds": [1]}).campaign
+    assert paths(campaign) == [
+        f"rough-hurst{hurst}-grid96/seed1/slope0.2/soft-surface_energy{energy}"
+        for hurst in ("0.6", "0.8")
+        for energy in ("5mJ", "10mJ")
+    ]
+    case = run_cases(campaign)[-1]
+    assert surface_settings(campaign, case.surface)["hurst"] == 0.8
+    assert surface_settings(campaign, case.surface)["grid"] == 96
+    assert run_settings(campaign, case)["material"]["surface_energy"] == 0.01
+    assert run_settings(campaign, case)["material"]["contact_modulus"] == 25e6
+
+
+def test_lists_that_go_along_together(load):
+    changes = {
+        "studies.one.vary": {"hurst": [0.5, 0.9]},
+        "studies.one.zip": [["rms_slopes", "hurst"]],
+        "studies.one.seeds": "3..5",
+    }
+    expected = {(f"rough-hurst{hurst}", seed, slope) for hurst, slope in ((0.5, 0.2), (0.9, 1.0)) for seed in (3, 4, 5)}
+    cases = run_cases(load(changes).campaign)
+    assert {(case.surface, case.seed, case.rms_slope) for case in cases} == expected
+    assert len(cases) == len(expected)
+
+
+def test_an_explicit_list_of_runs(load):
+    cases = [{"seed": 7, "rms_slope": 0.5, "interaction_range": "40 nm"}, {"rms_slope": 1.5}]
+    assert paths(load({"studies.one.cases": cases}).campaign) == [
+        "rough/seed7/slope0.5/soft-interaction_range40nm",
+        "rough/seed1/slope1.5/soft",
+        "rough/seed2/slope1.5/soft",
+    ]
+    whole = {"surface": "rough", "seed": 1, "rms_slope": 0.1, "material": "soft"}
+    alone = {"surfaces": None, "seeds": None, "rms_slopes": None, "materials": None, "snapshots": None}
+    changes = {f"studies.one.{key}": value for key, value in alone.items()} | {"studies.one.cases": [whole]}
+    assert paths(load(changes).campaign) == ["rough/seed1/slope0.1/soft"]
+
+
+def test_defaults_serve_entries_that_do_not_give_their_own(load, tmp_path):
+    np.save(tmp_path / "own.npy", np.random.default_rng(1).random((16, 16)))
+    changes = {
+        "defaults": {
+            "surfaces": {"period": "100 um", "hurst": 0.3, "grid": 80},
+            "materials": {"surface_energy": "1 mJ/m^2", "interaction_range": "2 nm"},
+            "studies": {"seeds": "1..3", "materials": ["soft", "hard"]},
+        },
+        "surfaces.rough.period": None,
+        "surfaces.rough.grid": None,
+        # Of another kind, which has no Hurst exponent.
+        "surfaces.own": {"kind": "file", "path": "own.npy", "height_unit": "um"},
+        "materials.hard": {"contact_modulus": "1 GPa"},
+        "studies.one.seeds": None,
+        "studies.one.materials": None,
+    }
+    campaign = load(changes).campaign
+    assert campaign.surfaces["rough"].hurst == 0.8 and campaign.surfaces["rough"].grid == 80
+    assert campaign.surfaces["own"].period == 1e-4
+    assert campaign.materials["hard"].surface_energy == 1e-3
+    assert campaign.materials["soft"].surface_energy == 0.05
+    assert len(run_cases(campaign)) == 3 * 2 * 2
+    with pytest.raises(ConfigurationError, match=r"defaults\.materials\.interaction_range: '2 m\^2'"):
+        load({**changes, "defaults": {"materials": {"interaction_range": "2 m^2", "surface_energy": "1 mJ/m^2"}}})
+
+
+def test_the_slope_that_a_topography_has(load, tmp_path):
+    period, amplitude, size = 1e-3, 2e-6, 32
+    x = np.arange(size) / size * period
+    heights = amplitude * np.sin(2 * np.pi / period * x) * np.ones((size, 1))
+    np.save(tmp_path / "own.npy", heights * 1e6)
+    campaign = load({"surfaces.rough": _file_surface("own.npy"), "studies.one.rms_slopes": "measured"}).campaign
+    (case,) = run_cases(campaign)
+    assert case.rms_slope == pytest.approx(2 * np.pi / period * amplitude / np.sqrt(2), rel=1e-5)
+    assert case.path == f"one/rough/seed0/slope{number_label(case.rms_slope)}/soft"
+
+
+def test_what_names_a_varied_surface_means_its_variants(load):
+    changes = {
+        **LONG_RANGE,
+        "studies.one.vary": {"hurst": [0.5, 0.9]},
+        "boundary_elements": {"truth": TRUTH | {"surfaces": ["rough"], "rms_slopes": [1.0]}},
+        "figures": {"fig4_contact_map": {"study": "one", "surface": "rough", "seed": 2}},
+    }
+    campaign = load(changes).campaign
+    assert {case.surface for case in solution_cases(campaign)} == {"rough-hurst0.5", "rough-hurst0.9"}
+    assert len(solution_cases(campaign)) == 2 * 2 * 2
+    assert campaign.figures.fig4_contact_map.surface == "rough-hurst0.5"
+    used = load({**changes, "boundary_elements": {"truth": TRUTH | {"surfaces": ["rough-hurst0.9"]}}}).campaign
+    assert {case.surface for case in solution_cases(used)} == {"rough-hurst0.9"}
+
+
+@pytest.mark.parametrize(
+    ("value", "label"), [(4e-8, "40nm"), (1.5625e-6, "1.5625um"), (0.1, "100mm"), (1e-4, "100um"), (12.0, "12m")]
+)
+def test_names_of_variants_are_read_by_people(value, label, load):
+    assert value_label(load().campaign.surfaces["rough"].model_copy(update={"period": value}), "period") == label
 
 
 @pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
@@ -637,10 +818,10 @@ def test_missing_file(tmp_path):
 
 
 def test_few_cells_are_a_warning(load):
-    assert not load().campaign.warnings()
-    (warning,) = load({"surfaces.rough.grid": 30}).campaign.warnings()
+    assert not warnings(load().campaign)
+    (warning,) = warnings(load({"surfaces.rough.grid": 30}).campaign)
     assert "surfaces.rough.grid: 30 gives 3 grid cells" in warning
-    assert load({"surfaces.rough.grid": 20}).campaign.warnings()
+    assert warnings(load({"surfaces.rough.grid": 20}).campaign)
 
 
 def _file_surface(path):

@@ -5,6 +5,7 @@ from pathlib import Path
 from snakemake.logging import logger
 
 from icha.configuration.load import Configuration, ConfigurationError, load_configuration
+from icha.configuration.problems import warnings
 
 DEFAULT = "config/config.yaml"
 
@@ -26,7 +27,7 @@ def campaign_configuration(workflow) -> Configuration:
         )
     except ConfigurationError as error:
         raise SystemExit(f"The configuration cannot be run:\n{error}") from None
-    for warning in configuration.campaign.warnings():
+    for warning in warnings(configuration.campaign):
         logger.warning(f"Warning: {warning}")
     return configuration
 

@@ -4,6 +4,7 @@ import sys
 
 from icha.configuration.expansion import run_cases
 from icha.configuration.load import ConfigurationError, load_configuration
+from icha.configuration.problems import warnings
 
 
 def check(path: str) -> None:
@@ -12,7 +13,7 @@ def check(path: str) -> None:
         campaign = load_configuration(path).campaign
     except ConfigurationError as error:
         raise SystemExit(f"The configuration cannot be run:\n{error}") from None
-    for warning in campaign.warnings():
+    for warning in warnings(campaign):
         print(f"Warning: {warning}", file=sys.stderr)
     print(f"{path}: campaign {campaign.name}, {len(run_cases(campaign))} runs")
 

@@ -12,14 +12,7 @@ from icha.labels import ContactLabels, RunLabels, SolutionLabels, number_label
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
     """All runs of a campaign, study by study, in the order of the configuration's lists."""
-    return [
-        RunLabels(label, surface, seed, slope, material)
-        for label, study in campaign.studies.items()
-        for surface in study.surfaces
-        for seed, slope, material in itertools.product(
-            campaign.surface_seeds(label, surface), study.rms_slopes, study.materials
-        )
-    ]
+    return [RunLabels(label, *contact) for label in campaign.studies for contact in campaign.contacts(label)]
 
 
 def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
@@ -27,7 +20,7 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
     return [
         SolutionLabels(label, entry.study, *contact, pressure)
         for label, entry in campaign.boundary_elements.items()
-        for contact, pressure in itertools.product(_contacts(campaign, entry), entry.reduced_pressures)
+        for contact, pressure in itertools.product(campaign.solved(entry), entry.reduced_pressures)
     ]
 
 
@@ -42,19 +35,7 @@ def loop_cases(campaign: Campaign) -> list[ContactLabels]:
 
 
 def _cases(campaign: Campaign, entries: dict[str, BesideStudy]) -> list[ContactLabels]:
-    return [
-        ContactLabels(label, *contact) for label, entry in entries.items() for contact in _contacts(campaign, entry)
-    ]
-
-
-def _contacts(campaign: Campaign, entry: BesideStudy) -> list[tuple[str, int, float, str]]:
-    """Surface, seed, rms slope and material of every contact for which an entry asks, in the order of its lists."""
-    asked = campaign.solved(entry)
-    return [
-        (surface, *rest)
-        for surface in asked["surfaces"]
-        for rest in itertools.product(campaign.solved_seeds(entry, surface), asked["rms_slopes"], asked["materials"])
-    ]
+    return [ContactLabels(label, *contact) for label, entry in entries.items() for contact in campaign.solved(entry)]
 
 
 def source_settings(campaign: Campaign, case: ContactLabels) -> dict:

@@ -13,10 +13,13 @@ from typing import Any, get_args
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from icha.configuration.design import designed, with_measured_slopes
 from icha.configuration.height_map import read_height_map
 from icha.configuration.measurement import read_columns
-from icha.configuration.model import BESIDE_STUDIES, Campaign, FileSurface
-from icha.configuration.values import NAME_PATTERN
+from icha.configuration.model import BESIDE_STUDIES, SURFACE_KINDS, Campaign, Defaults
+from icha.configuration.problems import Problem, problems, unresolved
+from icha.configuration.values import MEASURED, NAME_PATTERN, NOTHING
+from icha.surface import Surface
 
 
 class ConfigurationError(ValueError):
@@ -50,21 +53,27 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     """
     path = Path(path)
     from_file = read_yaml(path)
-    content = merged(from_file, overrides or {})
+    written = merged(from_file, overrides or {})
+    content = with_defaults(written)
 
-    def fail(problems: Iterable[tuple[tuple, Any, str]]):
-        lines = [_line(_origin(path, from_file, overrides or {}, problem[0]), *problem) for problem in problems]
+    def fail(found: Iterable[Problem]):
+        found = [(_in_defaults(location, written), value, reason) for location, value, reason in found]
+        lines = [_line(_origin(path, from_file, overrides or {}, problem[0]), *problem) for problem in found]
         if lines:
-            raise ConfigurationError("\n".join(lines))
+            raise ConfigurationError("\n".join(dict.fromkeys(lines)))
 
     try:
         campaign = Campaign.model_validate(content)
     except ValidationError as error:
         fail(_problem(details, content) for details in error.errors())
-    fail(campaign.problems())
-    campaign = campaign.with_files_beside(path.parent)
-    fail(_problems_of_files(campaign))
-    return Configuration(campaign, yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110))
+    campaign, design_problems = designed(campaign.with_files_beside(path.parent), content)
+    fail(design_problems)
+    topographies, unread = _topographies(campaign)
+    fail(unread)
+    campaign = with_measured_slopes(campaign, {name: slope for name, (_, slope) in topographies.items()})
+    fail(problems(campaign))
+    fail(_problems_of_files(campaign, topographies))
+    return Configuration(campaign, yaml.safe_dump(written, sort_keys=False, allow_unicode=True, width=110))
 
 
 def read_yaml(path: Path) -> dict:
@@ -116,6 +125,46 @@ def merged(content: Mapping, overrides: Mapping) -> dict:
     return result
 
 
+def with_defaults(content: Mapping) -> dict:
+    """`content` with the values of its section `defaults` in the entries that do not give their own.
+
+    Of the defaults of surfaces an entry takes those that its kind has.
+    """
+    result = deepcopy(dict(content))
+    defaults = result.get("defaults")
+    for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
+        given, entries = defaults.get(section), result.get(section)
+        if not isinstance(given, Mapping) or not isinstance(entries, Mapping):
+            continue  # an error, which the model words
+        for name, entry in entries.items():
+            if not isinstance(entry, Mapping | None):
+                continue
+            entry = dict(entry or {})
+            kind = SURFACE_KINDS.get(entry.get("kind", given.get("kind")))
+            foreign = _of_other_kinds(kind) if section == "surfaces" and kind else ()
+            entries[name] = {key: deepcopy(value) for key, value in given.items() if key not in foreign} | entry
+    return result
+
+
+def _of_other_kinds(kind: type[BaseModel]) -> set[str]:
+    """Keys that only surfaces of other kinds have."""
+    return {key for other in SURFACE_KINDS.values() for key in other.model_fields} - set(kind.model_fields)
+
+
+def _in_defaults(location: tuple, written: Mapping) -> tuple:
+    """Where the value at `location` was written: in its entry, or in the defaults of its section."""
+    if len(location) < 3 or location[0] not in Defaults.model_fields:
+        return location
+    section, name, key = location[:3]
+    given = written.get("defaults")
+    given = given.get(section) if isinstance(given, Mapping) else None
+    entries = written.get(section)
+    own = (entries.get(name) or {}) if isinstance(entries, Mapping) else {}
+    if isinstance(given, Mapping) and key in given and isinstance(own, Mapping) and key not in own:
+        return ("defaults", section, *location[2:])
+    return location
+
+
 def _origin(path: Path, from_file: Mapping, overrides: Mapping, location: tuple) -> str:
     """Who gave the value at `location`, or failed to give it: the file, or the command line's overrides."""
 
@@ -134,11 +183,8 @@ def _origin(path: Path, from_file: Mapping, overrides: Mapping, location: tuple)
 
 def _line(origin: str, location: tuple, value: Any, reason: str) -> str:
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
-    shown = "" if value is _NOTHING else f" {_short(value)}"
+    shown = "" if value is NOTHING else f" {_short(value)}"
     return f"{origin}: {key or 'top level'}:{shown} {reason}"
-
-
-_NOTHING = object()
 
 
 def _short(value: Any) -> str:
@@ -155,19 +201,19 @@ def _problem(details: Mapping, content: Mapping) -> tuple[tuple, Any, str]:
     if kind == "value_error":
         reason = str(context["error"])
         # A model's own error concerns all its keys; the reason names them.
-        return location, _NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
+        return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
     if kind == "extra_forbidden":
         allowed = sorted(set(_keys(location[:-1], content)))
         near = difflib.get_close_matches(str(location[-1]), allowed, 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
-        return location, _NOTHING, f"unknown key{hint}; allowed: {', '.join(allowed)}"
+        return location, NOTHING, f"unknown key{hint}; allowed: {', '.join(allowed)}"
     if kind == "missing":
         section = _model(location[:-1], content)
         field = section.model_fields.get(location[-1]) if section else None
-        return location, _NOTHING, f"the key is missing; needed: {field.description if field else 'a value'}"
+        return location, NOTHING, f"the key is missing; needed: {field.description if field else 'a value'}"
     if kind in ("union_tag_not_found", "union_tag_invalid"):
-        given = value.get("kind", _NOTHING) if isinstance(value, Mapping) else value
-        return (*location, "kind"), given, "is no kind of surface; allowed: self_affine, file"
+        given = value.get("kind", NOTHING) if isinstance(value, Mapping) else value
+        return (*location, "kind"), given, f"is no kind of surface; allowed: {', '.join(SURFACE_KINDS)}"
     if kind == "string_pattern_mismatch" and context.get("pattern") == NAME_PATTERN:
         return location, value, "is not a name; allowed: lower-case letters, digits, '_' and '-'"
     if kind in ("too_short", "string_too_short"):
@@ -186,7 +232,7 @@ def _problem(details: Mapping, content: Mapping) -> tuple[tuple, Any, str]:
 
 def _without_tags(location: tuple, content: Any) -> tuple:
     """The location without what pydantic adds to it: the kind of a surface (its section holds no such key)."""
-    if len(location) > 2 and location[0] == "surfaces" and location[2] in ("self_affine", "file"):
+    if len(location) > 2 and location[0] == "surfaces" and location[2] in SURFACE_KINDS:
         location = (*location[:2], *location[3:])
     return location
 
@@ -206,9 +252,10 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
     }
     if not location:
         return Campaign
+    if location[0] == "defaults":
+        return Defaults
     if location[0] == "surfaces" and len(location) == 2:
-        kind = content["surfaces"][location[1]].get("kind")
-        return FileSurface if kind == "file" else model.SelfAffineSurface
+        return SURFACE_KINDS.get(content["surfaces"][location[1]].get("kind"), model.SelfAffineSurface)
     if location == ("figures",):
         return model.Figures
     if location == ("one_asperity",):
@@ -218,7 +265,13 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
     if len(location) == 2:
         return sections.get(location[0])
     if location[0] == "studies":
-        return {"targets": model.Targets, "turning_points": model.TurningPoint}.get(location[2], model.Snapshot)
+        parts = {
+            "targets": model.Targets,
+            "turning_points": model.TurningPoint,
+            "vary": model.Vary,
+            "cases": model.Case,
+        }
+        return parts.get(location[2], model.Snapshot)
     if location[0] == "figures":
         return model.Snapshot
     return model.Column if location[0] == "measurements" else None
@@ -229,18 +282,32 @@ def _keys(location: tuple, content: Any) -> list[str]:
     return list(section.model_fields) if section else []
 
 
-def _problems_of_files(campaign: Campaign) -> Iterable[tuple[tuple, Any, str]]:
-    for name, surface in campaign.surfaces.items():
-        if isinstance(surface, FileSurface):
-            try:
-                heights = read_height_map(surface.path, surface.metres_per_unit)
-            except ValueError as error:
-                yield ("surfaces", name, "path"), surface.path, str(error)
-                continue
-            for section in BESIDE_STUDIES:
-                for label, entry in getattr(campaign, section).items():
-                    if name in campaign.solved(entry)["surfaces"]:
-                        yield from campaign.unresolved(section, label, name, len(heights))
+def _topographies(campaign: Campaign) -> tuple[dict[str, tuple[int, float | None]], list[Problem]]:
+    """Nodes along a side, and the slope where a study asks for it, of every topography that is pressed and comes from
+    a file; and what is wrong with the files."""
+    contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
+    asking = {each.surface for each in contacts if each.rms_slope == MEASURED}
+    found, wrong = {}, []
+    for name in dict.fromkeys(each.surface for each in contacts):
+        surface = campaign.surfaces[name]
+        if surface.random:
+            continue
+        try:
+            heights = read_height_map(surface.path, surface.metres_per_unit)
+        except ValueError as error:
+            wrong.append((("surfaces", name, "path"), surface.path, str(error)))
+            continue
+        slope = Surface(heights, surface.period).rms_slope if name in asking else None
+        # Six digits name the files, and are more than any instrument has.
+        found[name] = len(heights), None if slope is None else float(f"{slope:.6g}")
+    return found, wrong
+
+
+def _problems_of_files(campaign: Campaign, topographies: Mapping[str, tuple[int, float | None]]) -> Iterable[Problem]:
+    for name, (grid, _) in topographies.items():
+        for section in BESIDE_STUDIES:
+            for label in getattr(campaign, section):
+                yield from unresolved(campaign, section, label, name, grid)
     for name, measurement in campaign.measurements.items():
         try:
             read_columns(measurement.path, measurement.columns)

@@ -7,31 +7,39 @@ Values are kept in SI units. The text of a configuration file becomes these obje
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Mapping
 from pathlib import Path as FilePath
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import (
     AfterValidator,
     Field,
+    PrivateAttr,
+    WithJsonSchema,
+    create_model,
     field_validator,
     model_validator,
 )
 
-from icha.cohesive_zone import resolution_problem
 from icha.configuration.units import conversion_factor
 from icha.configuration.values import (
     MAX_GRID,
+    ROUNDING,
     AreaFraction,
     Flag,
+    Label,
     Length,
     Modulus,
     Name,
     Positive,
     ReducedPressure,
     Section,
+    Seeds,
+    Slope,
+    Slopes,
     SurfaceEnergy,
     Text,
+    Values,
     decreasing,
     distinct,
     exactly_one,
@@ -42,16 +50,15 @@ from icha.configuration.values import (
     stops,
 )
 from icha.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
-from icha.material import Material as Interface
 
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
-# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
-_ROUNDING = 1e-9
 
 
 class SelfAffineSurface(Section):
     """A random periodic surface, self-affine with roll-off, made by spectral synthesis."""
+
+    random: ClassVar[bool] = True
 
     kind: Literal["self_affine"] = Field(description="Surface made from a self-affine spectrum.")
     period: Length = Field(description="Side L of the periodic cell.")
@@ -79,7 +86,7 @@ class SelfAffineSurface(Section):
     @classmethod
     def _q0_not_below_ql(cls, value, info):
         period = info.data.get("period")
-        if period is not None and value > period * (1 + _ROUNDING):
+        if period is not None and value > period * (1 + ROUNDING):
             raise ValueError(f"is longer than the period (q0 < qL); allowed: at most {period:g} m")
         return value
 
@@ -87,7 +94,7 @@ class SelfAffineSurface(Section):
     @classmethod
     def _q1_above_q0(cls, value, info):
         rolloff = info.data.get("rolloff_wavelength")
-        if rolloff is not None and value >= rolloff * (1 - _ROUNDING):
+        if rolloff is not None and value >= rolloff * (1 - ROUNDING):
             raise ValueError(
                 f"is not shorter than the roll-off wavelength (q1 <= q0); allowed: less than {rolloff:g} m"
             )
@@ -99,8 +106,8 @@ class SelfAffineSurface(Section):
         period, short = info.data.get("period"), info.data.get("short_wavelength")
         if period is None or short is None:
             return value
-        if value * short / period < 2 * (1 - _ROUNDING):
-            least = math.ceil(2 * period / short * (1 - _ROUNDING))
+        if value * short / period < 2 * (1 - ROUNDING):
+            least = math.ceil(2 * period / short * (1 - ROUNDING))
             raise ValueError(
                 f"gives {value * short / period:.3g} grid cells per shortest wavelength, 2 are the least; "
                 f"allowed: at least {least}, advisable: {2 * least} or more"
@@ -110,6 +117,8 @@ class SelfAffineSurface(Section):
 
 class FileSurface(Section):
     """A periodic height map from a file, for example a surface that others have published."""
+
+    random: ClassVar[bool] = False
 
     kind: Literal["file"] = Field(description="Surface read from a file.")
     path: Text = Field(
@@ -136,6 +145,8 @@ class FileSurface(Section):
         return float(conversion_factor(self.height_unit, "m"))
 
 
+# By the value of their key `kind`.
+SURFACE_KINDS = {"self_affine": SelfAffineSurface, "file": FileSurface}
 AnySurface = Annotated[SelfAffineSurface | FileSurface, Field(discriminator="kind")]
 
 
@@ -210,17 +221,72 @@ class TurningPoint(Section):
         return kind, value
 
 
+def _scalars(*sections: type[Section]) -> dict[str, str]:
+    """Names of the parameters of some kinds of sections that a study may vary, and what they mean."""
+    found: dict[str, str] = {}
+    for section in sections:
+        for name, field in section.model_fields.items():
+            inner = get_args(field.annotation) or (field.annotation,)
+            if name not in ("kind", "path") and not any(isinstance(t, type) and issubclass(t, Section) for t in inner):
+                found.setdefault(name, field.description)
+    return found
+
+
+SCALARS = _scalars(*SURFACE_KINDS.values(), Material)
+
+
+def _of_scalars(name, kind, doc, fields=None):
+    """A section with a key, of type `kind`, for every parameter that can be varied."""
+    scalars = {key: (kind | None, Field(default=None, description=text)) for key, text in SCALARS.items()}
+    return create_model(name, __base__=Section, __doc__=doc, __module__=__name__, **(fields or {}), **scalars)
+
+
+Vary = _of_scalars(
+    "Vary", Values, "Parameters of a study's surfaces and materials that it varies: a value each, or a list of them."
+)
+Scalar = Annotated[Any, WithJsonSchema({"type": ["string", "number", "boolean"]})]
+Case = _of_scalars(
+    "Case",
+    Scalar,
+    "One entry of an explicit list of runs; what it does not name is taken from the lists of its study.",
+    {
+        "surface": (Name | None, Field(default=None, description="Name of a surface.")),
+        "seed": (integer(0) | None, Field(default=None, description="Seed.")),
+        "rms_slope": (Slope | None, Field(default=None, description="Rms slope, or `measured`.")),
+        "material": (Name | None, Field(default=None, description="Name of a material.")),
+    },
+)
+
+
 class Study(Section):
     """Every surface, seed, slope and material of the lists, each with each, along one path."""
 
-    surfaces: list_of_names("Names of surfaces.")
-    seeds: Annotated[list[integer(0)], Field(min_length=1), AfterValidator(distinct)] = Field(
-        default=[1], description="Seeds of the random phases. Surfaces read from a file have none and are used once."
+    surfaces: list_of_names("Names of surfaces.") = Field(default=[], description="Names of surfaces.")
+    seeds: Seeds = Field(
+        default=[1],
+        description="Seeds of the random phases: a list, or a range such as `1..50`. Surfaces read from a file have "
+        "none and are used once.",
     )
-    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] = Field(
-        description="Rms slopes h'rms to which each topography's heights are scaled."
+    rms_slopes: Slopes = Field(
+        default=[],
+        description="Rms slopes h'rms to which each topography's heights are scaled; `measured` is the slope that a "
+        "topography read from a file has.",
     )
-    materials: list_of_names("Names of materials.")
+    materials: list_of_names("Names of materials.") = Field(default=[], description="Names of materials.")
+    vary: Vary | None = Field(
+        default=None,
+        description="Parameters of the surfaces and materials that take other values in this study, each with each.",
+    )
+    zip: list[Annotated[list[Text], Field(min_length=2)]] = Field(
+        default=[],
+        description="Groups of lists that go along together, first with first and second with second, instead of each "
+        "with each: `[[rms_slopes, surface_energy]]`.",
+    )
+    cases: Annotated[list[Case], Field(min_length=1)] | None = Field(
+        default=None,
+        description="An explicit list of runs instead of the lists of the study, which serve for what a case does not "
+        "name.",
+    )
     targets: Targets = Field(description="Stops of the loading path.")
     snapshots: Annotated[list[Snapshot], AfterValidator(distinct)] | None = Field(
         default=None,
@@ -247,19 +313,6 @@ class Study(Section):
     max_step: number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
     )
-
-    @field_validator("snapshots")
-    @classmethod
-    def _loads_are_covered(cls, snapshots, info):
-        for index, snapshot in enumerate(snapshots or []):
-            for slope in info.data.get("rms_slopes") or []:
-                if (snapshot.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
-                    most = MAX_REDUCED_PRESSURE * min(info.data["rms_slopes"])
-                    raise ValueError(
-                        f"entry {index}: relative load {snapshot.relative_load:g} at rms slope {slope:g} is a reduced "
-                        f"pressure of {snapshot.relative_load / slope:g}; allowed: relative loads up to {most:g}"
-                    )
-        return snapshots
 
     def check_path(self, snapshots: list[tuple[str, float]] | None) -> None:
         """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
@@ -362,16 +415,14 @@ class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
     study: Name = Field(description="Name of the study on whose topographies they are solved.")
-    surfaces: list_of_names("Surfaces, of the study's. Left out: all.") | None = Field(
+    surfaces: list_of_names("Surfaces, of the study's. Left out: all.", Label) | None = Field(
         default=None, description="Surfaces, of the study's. Left out: all."
     )
-    seeds: Annotated[list[integer(0)], Field(min_length=1), AfterValidator(distinct)] | None = Field(
-        default=None, description="Seeds, of the study's. Left out: all."
-    )
+    seeds: Seeds | None = Field(default=None, description="Seeds, of the study's. Left out: all.")
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
         default=None, description="Rms slopes, of the study's. Left out: all."
     )
-    materials: list_of_names("Materials, of the study's. Left out: all.") | None = Field(
+    materials: list_of_names("Materials, of the study's. Left out: all.", Label) | None = Field(
         default=None,
         description="Materials, of the study's. Left out: all. With adhesion the grid must resolve their "
         "`interaction_range`.",
@@ -474,10 +525,10 @@ class SnapshotFigure(StudyFigure):
 class RunFigure(StudyFigure):
     """A figure of one run; what is left out is the study's first."""
 
-    surface: Name | None = Field(default=None, description="Surface that is shown.")
+    surface: Label | None = Field(default=None, description="Surface that is shown.")
     seed: integer(0) | None = Field(default=None, description="Seed that is shown.")
     rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
-    material: Name | None = Field(
+    material: Label | None = Field(
         default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
     )
 
@@ -489,9 +540,9 @@ class MapFigure(SnapshotFigure, RunFigure):
 class SlopesFigure(StudyFigure):
     """A figure of the spots of all slopes, at the same load and at the same area."""
 
-    surface: Name | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
+    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
     seed: integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
-    material: Name | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
+    material: Label | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
 
 
 class TaborFigure(SnapshotFigure):
@@ -505,7 +556,7 @@ class ComparedFigure(StudyFigure):
 class LoopsFigure(StudyFigure):
     """A figure of the runs of a study both ways, for one topography."""
 
-    surface: Name | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
+    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
     seed: integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
 
 
@@ -604,6 +655,15 @@ class Figures(Section):
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
 
 
+class Contact(NamedTuple):
+    """What is pressed against what in one run of a study; the slope is `measured` until that is known."""
+
+    surface: str
+    seed: int
+    rms_slope: float
+    material: str
+
+
 class Author(Section):
     """A person who answers for the campaign."""
 
@@ -614,6 +674,16 @@ class Author(Section):
     affiliation: Text | None = Field(default=None, description="Institution.")
 
 
+class Defaults(Section):
+    """Values for every entry of a section that does not give its own."""
+
+    surfaces: dict[str, Any] = Field(
+        default={}, description="Keys of surfaces; every surface takes those that its kind has."
+    )
+    materials: dict[str, Any] = Field(default={}, description="Keys of materials.")
+    studies: dict[str, Any] = Field(default={}, description="Keys of studies.")
+
+
 class Campaign(Section):
     """A campaign: everything that one configuration file asks for."""
 
@@ -622,6 +692,9 @@ class Campaign(Section):
     summary: Text = Field(description="A few sentences for readers of the datasets and of the report.")
     license: Text = Field(description="Licence of the data, as an SPDX identifier such as `CC-BY-4.0`.")
     authors: list[Author] = Field(default=[], description="Authors of the data, for the deposit.")
+    defaults: Defaults = Field(
+        default=Defaults(), description="Values for all surfaces, materials or studies that do not give their own."
+    )
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)] = Field(
         description="Surfaces by name: `kind: self_affine` or `kind: file`."
     )
@@ -644,113 +717,32 @@ class Campaign(Section):
     )
     figures: Figures = Field(default=Figures(), description="Figures and what they show.")
 
-    def problems(self) -> list[tuple[tuple, Any, str]]:
-        """Names that lead nowhere, as (location, value, what is allowed)."""
-        found = []
-
-        def known(location, name, names):
-            if name not in names:
-                found.append(
-                    (location, name, f"is not defined; allowed: {', '.join(names) or 'none, for there is none'}")
-                )
-
-        for label, study in self.studies.items():
-            for kind, names in (("surfaces", self.surfaces), ("materials", self.materials)):
-                for index, name in enumerate(getattr(study, kind)):
-                    known(("studies", label, kind, index), name, names)
-            kinds = {self.surfaces[name].kind for name in study.surfaces if name in self.surfaces}
-            if len(kinds) > 1:
-                reason = (
-                    "mixes random surfaces with surfaces read from a file, which have no seed; allowed: a study each"
-                )
-                found.append((("studies", label, "surfaces"), ", ".join(study.surfaces), reason))
-        for label, study in self.studies.items():
-            found += self._path_problems(("studies", label), study)
-        for label, entry in self.boundary_element_loops.items():
-            if entry.study in self.studies:
-                found += self._loop_problems(("boundary_element_loops", label), entry)
-        for section in BESIDE_STUDIES:
-            for label, entry in getattr(self, section).items():
-                known((section, label, "study"), entry.study, self.studies)
-                if entry.study in self.studies:
-                    found += self._solution_problems((section, label), entry)
-        for label, measurement in self.measurements.items():
-            known(("measurements", label, "study"), measurement.study, self.studies)
-            if measurement.material is not None:
-                known(("measurements", label, "material"), measurement.material, self.materials)
-        for label, figure in self.figures.drawn().items():
-            if isinstance(figure, SourcesFigure):
-                known(("figures", label, "entry"), figure.entry, self.error_sources)
-                if figure.entry in self.error_sources:
-                    found += self._sources_problems(("figures", label, "entry"), figure.entry)
-            for key in ("studies", "load_studies"):
-                names = figure.model_dump().get(key) or []
-                for index, name in enumerate(names):
-                    known(("figures", label, key, index), name, self.studies)
-                    found += self._apart_problems(("figures", label, key, index), figure, name)
-            if not hasattr(figure, "study"):
-                continue
-            known(("figures", label, "study"), figure.study, self.studies)
-            found += self._apart_problems(("figures", label, "study"), figure, figure.study)
-            if figure.study in self.studies:
-                found += self._figure_problems(("figures", label), figure, self.studies[figure.study])
-        return found
-
-    def _apart_problems(self, location, figure, name):
-        """Studies that do not come back, in figures of the way back."""
-        if name not in self.studies or not isinstance(figure, LoopsFigure | PullOffFigure | LossFigure | SnapMapFigure):
-            return
-        study = self.studies[name]
-        if not study.unload and (isinstance(figure, PullOffFigure | LossFigure) or not study.turning_points):
-            yield location, name, "is not unloaded; allowed: a study with `unload: true`"
-
-    def _path_problems(self, location, study):
-        """What keeps the way back of a study from being a path."""
-        for index, point in enumerate(study.turning_points):
-            for slope in study.rms_slopes:
-                if (point.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
-                    yield (
-                        (*location, "turning_points", index, "relative_load"),
-                        point.relative_load,
-                        f"at rms slope {slope:g} is a reduced pressure of {point.relative_load / slope:g}; allowed: "
-                        f"relative loads up to {MAX_REDUCED_PRESSURE * min(study.rms_slopes):g}",
-                    )
-        if not (study.unload or study.turning_points or study.control != "separation"):
-            return
-        try:
-            study.check_path(self.snapshots_of(location[1]))
-        except ValueError as error:
-            key, _, reason = str(error).partition(": ")
-            name, _, index = key.partition("[")
-            place, value = (name,), getattr(study, name)
-            if index:
-                kind, value = value[int(index.rstrip("]"))].target
-                place = (name, int(index.rstrip("]")), kind)
-            yield (*location, *place), value, reason.removeprefix(f"{value!r} ")
-
-    def _loop_problems(self, location, entry):
-        """What boundary elements both ways need of their study."""
-        study = self.studies[entry.study]
-        if not study.unload or study.turning_points:
-            yield (
-                (*location, "study"),
-                entry.study,
-                "does not come straight back; allowed: a study with `unload: true` and without turning points",
-            )
-        if study.targets.last[0] != "reduced_pressure":
-            yield (
-                (*location, "study"),
-                entry.study,
-                "has no reduced pressures for targets; allowed: a study with them, whose last one is where to turn",
-            )
+    _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
 
     def loop_load(self, entry: BoundaryElementLoops) -> float:
         """The reduced pressure at which boundary elements both ways turn: the last one of their study."""
         return self.studies[entry.study].targets.last[1]
 
+    def contacts(self, study: str) -> list[Contact]:
+        """What is pressed in a study, run by run."""
+        return list(self._contacts[study])
+
+    def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
+        """The same campaign with the runs of its studies written out, and the lists of the studies to match."""
+        contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
+
+        def lists(runs):
+            columns = (list(dict.fromkeys(column)) for column in zip(*runs, strict=True))
+            return dict(zip(("surfaces", "seeds", "rms_slopes", "materials"), columns, strict=True))
+
+        studies = {label: study.model_copy(update=lists(contacts[label])) for label, study in self.studies.items()}
+        campaign = self.model_copy(update={"studies": studies})
+        campaign._contacts = contacts
+        return campaign
+
     def surface_seeds(self, study: str, surface: str) -> list[int]:
         """Seeds of a surface in a study; a surface that is read from a file has one realisation, numbered 0."""
-        return self.studies[study].seeds if isinstance(self.surfaces[surface], SelfAffineSurface) else [0]
+        return list(dict.fromkeys(each.seed for each in self._contacts[study] if each.surface == surface))
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
         """Kind and value of all states that the runs of a study keep; None where they keep their last one.
@@ -764,122 +756,19 @@ class Campaign(Section):
         own = [self.studies[study].targets.last] if asked is None else [snapshot.target for snapshot in asked]
         return own + [("reduced_pressure", p) for p in loads if ("reduced_pressure", p) not in own]
 
-    def solved(self, entry: BesideStudy) -> dict[str, list]:
-        """The surfaces, rms slopes and materials for which an entry asks, written out."""
-        study = self.studies[entry.study]
-        return {key: getattr(entry, key) or getattr(study, key) for key in ("surfaces", "rms_slopes", "materials")}
+    def solved(self, entry: BesideStudy) -> list[Contact]:
+        """The contacts for which an entry beside a study asks."""
 
-    def solved_seeds(self, entry: BesideStudy, surface: str) -> list[int]:
-        """The seeds of a surface for which an entry asks; a surface that is read from a file has the one."""
-        there = self.surface_seeds(entry.study, surface)
-        return there if entry.seeds is None else [seed for seed in entry.seeds if seed in there]
+        def asked(wanted, value):
+            return wanted is None or value in wanted
 
-    def _solution_problems(self, location, entry):
-        study = self.studies[entry.study]
-        seeds = {
-            seed for name in study.surfaces if name in self.surfaces for seed in self.surface_seeds(entry.study, name)
-        }
-        for key, there in (
-            ("surfaces", study.surfaces),
-            ("seeds", sorted(seeds)),
-            ("rms_slopes", study.rms_slopes),
-            ("materials", study.materials),
-        ):
-            for index, value in enumerate(getattr(entry, key) or []):
-                if value not in there:
-                    allowed = ", ".join(map(str, there))
-                    yield (*location, key, index), value, f"is not in study {entry.study!r}; allowed: {allowed}"
-        for name in self.solved(entry)["surfaces"]:
-            surface = self.surfaces.get(name)
-            if not isinstance(surface, SelfAffineSurface):
-                continue  # only its file knows its grid
-            yield from self.unresolved(*location, name, surface.grid)
-            if surface.grid * entry.refinement > MAX_GRID:
-                reason = (
-                    f"gives {surface.grid * entry.refinement} nodes a side on {name!r}; allowed: {MAX_GRID} at most"
-                )
-                yield (*location, "refinement"), entry.refinement, reason
-
-    def unresolved(self, section: str, entry: str, surface: str, grid: int) -> Iterator[tuple[tuple, Any, str]]:
-        """Materials of an entry beside a study whose attraction the grid of a surface does not resolve."""
-        asked = getattr(self, section)[entry]
-        spacing = self.surfaces[surface].period / (grid * asked.coarsest)
-        for label in self.solved(asked)["materials"]:
-            if label not in self.materials:
-                continue
-            material = Interface(**self.materials[label].model_dump())
-            if problem := resolution_problem(material, spacing):
-                yield (section, entry, "materials"), label, f"on surface {surface!r}: {problem}"
-
-    def _sources_problems(self, location, name):
-        """What keeps the runs without adhesion of an entry of error sources from differing in their seeds only."""
-        entry = self.error_sources[name]
-        if entry.study not in self.studies:
-            return
-        asked = self.solved(entry)
-        bare = [n for n in asked["materials"] if n in self.materials and self.materials[n].surface_energy == 0]
-        for what, there in (
-            ("surface", asked["surfaces"]),
-            ("rms slope", asked["rms_slopes"]),
-            ("material without adhesion", bare),
-        ):
-            if len(there) != 1:
-                listed = f" ({', '.join(map(str, there))})" if there else ""
-                yield (
-                    location,
-                    name,
-                    f"has not one {what} but {len(there)}{listed}; allowed: an entry with one, and any seeds",
-                )
-
-    def _figure_problems(self, location, figure, study):
-        known = [name for name in study.surfaces if name in self.surfaces]
-        seeds = dict.fromkeys(seed for name in known for seed in self.surface_seeds(figure.study, name))
-        for key, there in (
-            ("surface", study.surfaces),
-            ("seed", seeds),
-            ("material", study.materials),
-            ("rms_slope", study.rms_slopes),
-        ):
-            value = getattr(figure, key, None)
-            if value is not None and value not in there:
-                allowed = ", ".join(map(str, there))
-                yield (*location, key), value, f"is not in study {figure.study!r}; allowed: {allowed}"
-        snapshots = self.snapshots_of(figure.study)
-        kinds = [kind for kind, _ in snapshots or []]
-        if isinstance(figure, SlopesFigure):
-            for kind in ("relative_load", "area_fraction"):
-                if kind not in kinds:
-                    reason = f"has no snapshot of kind {kind}; allowed: a study with one"
-                    yield (*location, "study"), figure.study, reason
-        if isinstance(figure, TaborFigure):
-            materials = [self.materials[name] for name in study.materials if name in self.materials]
-            if not any(material.surface_energy > 0 for material in materials):
-                reason = "has no material with adhesion, so no Tabor parameter; allowed: a study with one"
-                yield (*location, "study"), figure.study, reason
-        if isinstance(figure, ComparedFigure) and figure.study not in {
-            e.study for e in self.boundary_elements.values()
-        }:
-            reason = "has no boundary elements beside it; allowed: a study that an entry of boundary_elements names"
-            yield (*location, "study"), figure.study, reason
-        if isinstance(figure, SnapshotFigure) and snapshots == []:
-            yield (*location, "study"), figure.study, "keeps no snapshot to draw; allowed: a study with one"
-        snapshot = getattr(figure, "snapshot", None)
-        if snapshot is not None and snapshot.target not in (snapshots or []):
-            there = ", ".join(f"{kind} {value:g}" for kind, value in snapshots or [])
-            kind, value = snapshot.target
-            yield (
-                (*location, "snapshot"),
-                f"{kind} {value:g}",
-                f"is no snapshot of study {figure.study!r}; allowed: {there or 'none, for the study names none'}",
-            )
-
-    def warnings(self) -> list[str]:
-        """What is allowed but not advisable."""
         return [
-            f"surfaces.{name}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per shortest "
-            f"wavelength; 4 are the least advisable, 8 recommended"
-            for name, surface in self.surfaces.items()
-            if isinstance(surface, SelfAffineSurface) and surface.cells_per_short_wave < 4 * (1 - _ROUNDING)
+            each
+            for each in self._contacts[entry.study]
+            if asked(entry.surfaces, each.surface)
+            and (asked(entry.seeds, each.seed) or not self.surfaces[each.surface].random)
+            and asked(entry.rms_slopes, each.rms_slope)
+            and asked(entry.materials, each.material)
         ]
 
     def with_files_beside(self, folder: FilePath) -> Campaign:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from icha.configuration.model import Campaign
+from icha.configuration.model import SURFACE_KINDS, Campaign
 
 SCHEMA = Path("workflow/schemas/config.schema.json")
 README = Path("config/README.md")
@@ -18,6 +18,9 @@ MARK = "<!-- generated from the model: make schema -->\n"
 def json_schema() -> str:
     """The schema, as editors use it to check and complete a configuration."""
     schema = Campaign.model_json_schema()
+    for name in _WITH_DEFAULTS:
+        # What is needed may stand among the defaults.
+        schema["$defs"][name].pop("required", None)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
@@ -29,12 +32,16 @@ def key_tables() -> str:
     return "\n".join(_table(_HEADINGS[name], sections[name]) for name in _HEADINGS)
 
 
+_WITH_DEFAULTS = (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material", "Study")
 _HEADINGS = {
     "Campaign": "Top level",
+    "Defaults": "`defaults`",
     "SelfAffineSurface": "`surfaces.<name>` with `kind: self_affine`",
     "FileSurface": "`surfaces.<name>` with `kind: file`",
     "Material": "`materials.<name>`",
     "Study": "`studies.<name>`",
+    "Vary": "`studies.<name>.vary`",
+    "Case": "`studies.<name>.cases`, each",
     "Targets": "`studies.<name>.targets`",
     "Snapshot": "`studies.<name>.snapshots`, each",
     "TurningPoint": "`studies.<name>.turning_points`, each",

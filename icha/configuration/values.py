@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -13,6 +15,10 @@ from icha.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
 NAME_PATTERN = r"^[a-z0-9_-]+$"
 # Nodes along a side of a surface or of boundary elements.
 MAX_GRID = 32768
+# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
+ROUNDING = 1e-9
+# The slope of a topography as it was measured.
+MEASURED = "measured"
 
 
 def quantity(si_unit, example, minimum=None):
@@ -30,7 +36,14 @@ def quantity(si_unit, example, minimum=None):
         return result
 
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
+    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), Unit(si_unit)]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Unit in which a quantity is kept, to be found in the metadata of its type."""
+
+    si: str
 
 
 def number(allowed, *, above=None, least=None, most=None):
@@ -106,7 +119,12 @@ def exactly_one(section):
     return section
 
 
+# In the place of a value that is not there, in problems.
+NOTHING = object()
+
 Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=80)]
+# A name, or that of a variant made by a study's `vary`.
+Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_.+-]+$", max_length=200)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Length = quantity("m", "100 um")
 Modulus = quantity("Pa", "25 MPa")
@@ -124,12 +142,105 @@ def stops(kind, in_order):
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
-def list_of_names(description):
+def list_of_names(description, kind=Name):
     """Type of a list of names, at least one and each once."""
-    return Annotated[list[Name], Field(min_length=1, description=description), AfterValidator(distinct)]
+    return Annotated[list[kind], Field(min_length=1, description=description), AfterValidator(distinct)]
 
 
 class Section(BaseModel):
     """A part of the configuration: immutable, and without room for keys that nobody reads."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+_RANGE = re.compile(r"\s*(\d+)\s*\.\.\s*(\d+)\s*")
+_SEED = integer(0)
+# More are a slip of the pen.
+_MOST_SEEDS = 10**5
+
+
+def _seeds(value: Any) -> Any:
+    """Seeds with their ranges written out: `1..50`, or a list of integers and such ranges."""
+    allowed = "allowed: integers from 0 and ranges of them, such as 1..50 or [1..5, 9]"
+    if isinstance(value, list) and not value:
+        return value
+    found = []
+    for entry in value if isinstance(value, list) else [value]:
+        if not isinstance(entry, str):
+            found.append(entry)
+            continue
+        shown = f"{entry!r} " if isinstance(value, list) else ""
+        match = _RANGE.fullmatch(entry)
+        if not match:
+            raise ValueError(f"{shown}is no range of seeds; {allowed}")
+        first, last = map(int, match.groups())
+        if last < first or last - first >= _MOST_SEEDS:
+            raise ValueError(f"{shown}ends before it begins, or has more than {_MOST_SEEDS} seeds; {allowed}")
+        found += range(first, last + 1)
+    return found if isinstance(value, list | str) else value
+
+
+Seeds = Annotated[
+    list[_SEED],
+    Field(min_length=1),
+    BeforeValidator(_seeds),
+    AfterValidator(distinct),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string", "pattern": r"^\s*\d+\s*\.\.\s*\d+\s*$", "examples": ["1..50"]},
+                {"type": "array", "minItems": 1, "items": {"type": ["integer", "string"]}},
+            ]
+        }
+    ),
+]
+
+
+def _slope(value: Any) -> float | str:
+    try:
+        slope = to_number(value)
+    except ValueError as error:
+        if value == MEASURED:
+            return value
+        raise ValueError(f"{error}; allowed: numbers greater than 0, or {MEASURED}") from None
+    if slope <= 0:
+        raise ValueError(f"is out of range; allowed: a number greater than 0, or {MEASURED}")
+    return slope
+
+
+Slope = Annotated[
+    Any,
+    BeforeValidator(_slope),
+    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": MEASURED}]}),
+]
+Slopes = Annotated[
+    list[Slope],
+    BeforeValidator(lambda value: [value] if value == MEASURED else value),
+    Field(min_length=1),
+    AfterValidator(distinct),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"const": MEASURED},
+                {
+                    "type": "array",
+                    "minItems": 1,
+                    "items": {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": MEASURED}]},
+                },
+            ]
+        }
+    ),
+]
+Values = Annotated[
+    list[Any],
+    BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
+    Field(min_length=1),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": ["string", "number", "boolean"]},
+                {"type": "array", "minItems": 1, "items": {"type": ["string", "number", "boolean"]}},
+            ]
+        }
+    ),
+]

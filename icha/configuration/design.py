@@ -1,0 +1,294 @@
+"""The design of a campaign: which surface is pressed against which material in which study.
+
+A study's lists are multiplied with each other, but for those that go along together (`zip`), or an explicit list
+(`cases`) stands in their place. A surface or a material of which a parameter is varied becomes an entry of its own,
+named after it: `rough-hurst0.6`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from decimal import Decimal
+from typing import Any
+
+from pydantic import ValidationError
+
+from icha.configuration.model import BESIDE_STUDIES, SCALARS, SURFACE_KINDS, Campaign, Contact, Material, Study
+from icha.configuration.problems import Problem
+from icha.configuration.values import MEASURED, NOTHING, Unit
+from icha.labels import number_label
+
+MAX_RUNS = 100_000
+# Lists of a study, and what one of their entries is called in a case.
+_LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
+_SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+# Where a value of a point of the design stands in the configuration, and the value.
+_Placed = tuple[tuple, Any]
+
+
+def designed(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Problem]]:
+    """The campaign with the runs of every study written out, and what is wrong with its studies' lists.
+
+    Parameters
+    ----------
+    campaign : as written.
+    content : the text that it was read from, as nested mappings: varied parameters are read like those in it.
+
+    Returns
+    -------
+    The campaign and an empty list; or the campaign as it was and all problems. Slopes that are `measured` remain to be
+    replaced (`with_measured_slopes`).
+    """
+    found = [
+        problem for label, study in campaign.studies.items() for problem in _study_problems(campaign, label, study)
+    ]
+    if found:
+        return campaign, found
+    variants = _Variants(campaign, content)
+    contacts = {
+        label: [variants.contact(point) for point in _points(label, study)] for label, study in campaign.studies.items()
+    }
+    if variants.problems:
+        return campaign, list(variants.problems.values())
+    grown = campaign.model_copy(
+        update={
+            "surfaces": dict(campaign.surfaces) | variants.derived["surfaces"],
+            "materials": dict(campaign.materials) | variants.derived["materials"],
+        }
+    )
+    return _with_variants_for_their_origin(grown.with_contacts(contacts), variants.origin), []
+
+
+def with_measured_slopes(campaign: Campaign, slopes: Mapping[str, float]) -> Campaign:
+    """The campaign with the slopes of its topographies, by surface, in the place of `measured`."""
+    contacts = {
+        label: [
+            each._replace(rms_slope=slopes[each.surface]) if each.rms_slope == MEASURED else each
+            for each in campaign.contacts(label)
+        ]
+        for label in campaign.studies
+    }
+    return campaign.with_contacts(contacts)
+
+
+def _lists(label: str, study: Study) -> dict[str, list[_Placed]]:
+    """What is multiplied in a study: lists and varied parameters, surfaces first."""
+    at = ("studies", label)
+    lists = {
+        one: [((*at, many, index), value) for index, value in enumerate(getattr(study, many))]
+        for many, one in _LISTS.items()
+    }
+    varied = study.vary.model_dump(exclude_none=True) if study.vary else {}
+    for name, values in varied.items():
+        lists[name] = [((*at, "vary", name, index), value) for index, value in enumerate(values)]
+    order = [*(name for name in SCALARS if name not in Material.model_fields), *Material.model_fields]
+    names = ["surface", *order[: -len(Material.model_fields)], "seed", "rms_slope", "material", *Material.model_fields]
+    return {name: lists[name] for name in names if name in lists}
+
+
+def _points(label: str, study: Study) -> Iterator[dict[str, _Placed]]:
+    """Everything that is named for one run, run by run."""
+    lists = _lists(label, study)
+    groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
+    if study.cases is None:
+        yield from _product(lists, groups, {})
+        return
+    for index, case in enumerate(study.cases):
+        given = case.model_dump(exclude_none=True)
+        fixed = {name: (("studies", label, "cases", index, name), value) for name, value in given.items()}
+        yield from _product(lists, groups, fixed)
+
+
+def _product(lists, groups, fixed) -> Iterator[dict[str, _Placed]]:
+    axes, done = [], set(fixed)
+    for name in lists:
+        if name in done:
+            continue
+        group = next((group for group in groups if name in group), [name])
+        group = [each for each in group if each not in fixed]
+        done |= set(group)
+        axes.append([dict(zip(group, values, strict=True)) for values in zip(*(lists[n] for n in group), strict=True)])
+    for parts in itertools.product(*axes):
+        point = dict(fixed)
+        for part in parts:
+            point |= part
+        yield point
+
+
+def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Problem]:
+    at = ("studies", label)
+    lists = _lists(label, study)
+    cases = study.cases or []
+    for many, one in _LISTS.items():
+        if not lists[one] and (not cases or any(getattr(case, one) is None for case in cases)):
+            meaning = Study.model_fields[many].description
+            yield (*at, many), NOTHING, f"the key is missing; needed: {meaning}"
+    for one, names in (("surface", campaign.surfaces), ("material", campaign.materials)):
+        placed = [*lists[one], *((((*at, "cases", i, one), getattr(c, one))) for i, c in enumerate(cases))]
+        for location, name in placed:
+            if name is not None and name not in names:
+                yield location, name, f"is not defined; allowed: {', '.join(names)}"
+    yield from _zip_problems(at, study, lists)
+    slopes = [*lists["rms_slope"], *(((*at, "cases", i, "rms_slope"), c.rms_slope) for i, c in enumerate(cases))]
+    for location, slope in slopes:
+        if slope == MEASURED:
+            index = location[3] if location[2] == "cases" else None
+            named = [cases[index].surface] if index is not None and cases[index].surface else study.surfaces
+            for name in named:
+                if name in campaign.surfaces and campaign.surfaces[name].random:
+                    reason = f"surface {name!r} is made at random and has no slope of its own; allowed: numbers"
+                    yield location, slope, reason
+    size = 1
+    for name, values in lists.items():
+        together = next((g for g in study.zip if name in [_LISTS.get(n, n) for n in g]), None)
+        if together is None or _LISTS.get(together[0], together[0]) == name:
+            size *= len(values)
+    if not cases and size > MAX_RUNS:
+        yield at, NOTHING, f"asks for {size} runs; allowed: {MAX_RUNS} at most"
+
+
+def _zip_problems(at, study, lists) -> Iterator[Problem]:
+    seen = set()
+    names = {_LISTS.get(name, name): name for name in [*_LISTS, *lists]} | {one: many for many, one in _LISTS.items()}
+    for index, group in enumerate(study.zip):
+        lengths = {}
+        for position, name in enumerate(group):
+            one = _LISTS.get(name, name)
+            allowed = ", ".join(names[each] for each in lists)
+            if name in _LISTS.values() or one not in lists:
+                yield (*at, "zip", index, position), name, f"is no list of this study; allowed: {allowed}"
+                continue
+            if one in seen:
+                yield (*at, "zip", index, position), name, "goes along with two other lists; allowed: every list once"
+            seen.add(one)
+            lengths[name] = len(lists[one])
+        if len(set(lengths.values())) > 1:
+            listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+            yield (*at, "zip", index), group, f"{listed} entries; allowed: lists of the same length"
+
+
+class _Variants:
+    """Surfaces and materials of which a parameter is varied: made once each, whatever asks for them."""
+
+    def __init__(self, campaign: Campaign, content: Mapping):
+        self._campaign, self._content = campaign, content
+        self._names: dict[tuple, str] = {}
+        self.derived: dict[str, dict[str, Any]] = {"surfaces": {}, "materials": {}}
+        self.origin: dict[tuple[str, str], str] = {}
+        # By what was tried, so that a value that is wrong is named once.
+        self.problems: dict[tuple, Problem] = {}
+
+    def contact(self, point: Mapping[str, _Placed]) -> Contact:
+        """The contact of a point of the design, its surface and material made if need be."""
+        surface, material = point["surface"][1], point["material"][1]
+        kind = type(self._campaign.surfaces[surface])
+        varied = {name: point[name] for name in point if name in SCALARS}
+        of_surface = {name: varied[name] for name in kind.model_fields if name in varied}
+        of_material = {name: varied[name] for name in Material.model_fields if name in varied}
+        for name, (location, value) in varied.items():
+            if name not in of_surface and name not in of_material:
+                kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
+                self.problems[location[:4]] = (
+                    location[:4],
+                    value,
+                    f"surface {surface!r} is of another kind; allowed: surfaces of kind {kinds}, or a study each",
+                )
+        seed = point["seed"][1] if self._campaign.surfaces[surface].random else 0
+        return Contact(
+            self._variant("surfaces", surface, of_surface),
+            seed,
+            point["rms_slope"][1],
+            self._variant("materials", material, of_material),
+        )
+
+    def _variant(self, section: str, base: str, changes: Mapping[str, _Placed]) -> str:
+        if not changes:
+            return base
+        key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
+        if key not in self._names:
+            self._names[key] = self._made(section, base, changes)
+        return self._names[key]
+
+    def _made(self, section: str, base: str, changes: Mapping[str, _Placed]) -> str:
+        model = type(getattr(self._campaign, section)[base])
+        values = {name: value for name, (_, value) in changes.items()}
+        try:
+            made = model.model_validate(dict(self._content[section][base]) | values)
+        except ValidationError as error:
+            for details in error.errors():
+                self._add_problem(section, base, changes, details)
+            return base
+        if section == "surfaces" and not made.random and hasattr(made, "path"):
+            made = made.model_copy(update={"path": getattr(self._campaign, section)[base].path})
+        name = "-".join([base, *(f"{key}{value_label(made, key)}" for key in changes)])
+        if name in getattr(self._campaign, section):
+            location, value = next(iter(changes.values()))
+            reason = f"gives {base!r} a variant called {name!r}, which is there; allowed: another name for that"
+            self.problems[(section, name)] = (location, value, reason)
+        self.derived[section][name] = made
+        self.origin[section, name] = base
+        return name
+
+    def _add_problem(self, section, base, changes, details):
+        key = str(details["loc"][0]) if details["loc"] else ""
+        context = details.get("ctx", {})
+        reason = str(context.get("error") or f"{details['msg']}; allowed: {context.get('expected', 'see its key')}")
+        if key in changes:
+            location, value = changes[key]
+        else:  # a parameter of the surface that does not go with the one that is varied
+            location, value = next(iter(changes.values()))
+            reason = f"{key} of {base!r}: {details['input']!r} {reason}"
+        self.problems.setdefault(location, (location, value, reason))
+
+
+def value_label(section, name: str) -> str:
+    """How the value of a parameter is written in names of files: `hurst0.6`, `interaction_range40nm`."""
+    value = getattr(section, name)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if not isinstance(value, float):
+        return str(value)
+    unit = next((each.si for each in type(section).model_fields[name].metadata if isinstance(each, Unit)), None)
+    if unit is None:
+        return number_label(value)
+    exact = Decimal(repr(value))
+    power = 3 * (exact.adjusted() // 3) if exact else 0
+    power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
+    digits = format(exact.scaleb(-power).normalize(), "f")
+    return f"{digits}{_PREFIXES[power]}{_SYMBOLS[unit]}"
+
+
+def _with_variants_for_their_origin(campaign: Campaign, origin: Mapping[tuple[str, str], str]) -> Campaign:
+    """The campaign in which whatever names a surface or material that is varied means its variants."""
+
+    def variants(section, study, name):
+        there = getattr(campaign.studies[study], section) if study in campaign.studies else []
+        return [each for each in there if origin.get((section, each)) == name] if name not in there else []
+
+    def entry_with_variants(entry):
+        update = {}
+        for section in ("surfaces", "materials"):
+            names = getattr(entry, section)
+            if names is not None:
+                update[section] = [each for name in names for each in variants(section, entry.study, name) or [name]]
+        return entry.model_copy(update=update)
+
+    def figure_with_variant(figure):
+        update = {}
+        for section, key in (("surfaces", "surface"), ("materials", "material")):
+            name = getattr(figure, key, None)
+            if name is not None:
+                update[key] = next(iter(variants(section, figure.study, name)), name)
+        return figure.model_copy(update=update)
+
+    figures = {name: figure_with_variant(figure) for name, figure in campaign.figures.drawn().items()}
+    return campaign.model_copy(
+        update={
+            section: {label: entry_with_variants(entry) for label, entry in getattr(campaign, section).items()}
+            for section in BESIDE_STUDIES
+        }
+        | {"figures": campaign.figures.model_copy(update=figures)}
+    )
