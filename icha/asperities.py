@@ -10,6 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.spatial import cKDTree
 
 from icha.cores import blocks, on_cores
+from icha.elasticity import cell_of
 from icha.surface import Surface
 
 # A quintic spline reproduces a parabola exactly, depends on far nodes only weakly (0.43 per cell), and at eight
@@ -45,6 +46,8 @@ _FARTHEST = 1.5
 _SAME_SUMMIT = 1e-3
 # Less curvature than this part of the surface's mean is rounding on a plateau.
 _FLAT = 1e-6
+# Nodes beyond the edges of a free square, after which the spline has forgotten what follows: 0.43^32 = 2e-12.
+_BEYOND = 32
 # Rows or columns of the grid, and points between them, that are worked on at a time, which bounds the memory.
 _LINES = 16
 _POINTS = 4096
@@ -52,18 +55,25 @@ _POINTS = 4096
 
 @dataclass(frozen=True, eq=False)
 class Asperities:
-    """The summits of a periodic surface.
+    """The summits of a surface.
 
     position : (n, 2) array, (x, y) in [0, period), m.
     height : (n,) array, above the mean plane, m.
     radius : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
-    period : m.
+    period : side of the square, m.
+    free : whether it is single, on a free half-space, or repeats.
     """
 
     position: np.ndarray
     height: np.ndarray
     radius: np.ndarray
     period: float
+    free: bool = False
+
+    @property
+    def cell(self) -> float:
+        """Period of positions, m: of a single square twice the side, where all ways are the shortest."""
+        return cell_of(self.period, self.free)
 
     def __len__(self) -> int:
         """Number of asperities."""
@@ -79,6 +89,9 @@ def find_summits(surface: Surface) -> Asperities:
     next to it, and only a start that converges nearby counts, since near-degenerate curvatures throw the others far
     away.
 
+    The edges of a free square have no maxima: a crest that runs over an edge has its top outside. There the heights go
+    on by point reflection at the edge, and summits count that lie between the outermost nodes.
+
     Returns
     -------
     Asperities, ordered as the nodes from which they were found.
@@ -88,25 +101,32 @@ def find_summits(surface: Surface) -> Asperities:
     ValueError
         If the surface has no summit with negative-definite curvature.
     """
-    grid, spacing = surface.grid, surface.spacing
-    coefficients = _spline_coefficients(surface.heights)
+    spacing, beyond = surface.spacing, _BEYOND if surface.free else 0
+    heights = surface.heights
+    if surface.free:
+        heights = np.pad(heights, beyond, mode="reflect", reflect_type="odd")
+    grid = len(heights)
+    coefficients = _spline_coefficients(heights)
     node, flat = _nodes_near_summits(coefficients)
     searches = on_cores(lambda some: _climb(coefficients, node[some], flat), blocks(len(node), _POINTS))
     at = np.concatenate([np.empty((0, 2)), *searches])
     # Several nodes lead to one summit: the first stands for it.
     twice = np.sort(cKDTree(at, boxsize=grid).query_pairs(_SAME_SUMMIT, output_type="ndarray"), axis=1)
     at = np.delete(at, twice[:, 1], axis=0)
+    if surface.free:
+        at = at[np.all((at > beyond) & (at < beyond + surface.grid - 1), axis=1)]
     if not len(at):
         raise ValueError("heights: the surface has no summit with negative-definite curvature")
     there = on_cores(lambda some: _spline(coefficients, at[some]), blocks(len(at), _POINTS))
     height, _, _, hyy, hyx, hxx = np.concatenate(there, axis=1)
-    position = at[:, ::-1] * spacing
+    position = (at[:, ::-1] - beyond) * spacing
     position[position >= surface.period] = 0.0
     return Asperities(
         position=position,
         height=height,
         radius=spacing**2 / np.sqrt(hyy * hxx - hyx**2),
         period=surface.period,
+        free=surface.free,
     )
 
 

@@ -10,6 +10,10 @@ acts by its moments, integral of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4,
 and 1/r^5. The third is only needed where the field is summed pairwise. Images farther than half the cell act by the
 first two. What depends on the positions alone, nearly everything, is computed once; only the windows of exact
 displacement follow the radii.
+
+A square on a free half-space, which goes on beyond it and is pressed by nothing else, is put into a cell of twice its
+side, where all ways between its points are the shortest; what images and counter-pressure do there is taken off again
+(`icha.images`), and the plain sum of F/(pi E* r) is left.
 """
 
 from __future__ import annotations
@@ -23,6 +27,7 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 from scipy.special import erf, erfc
 
+from icha.images import basis, image_field, interpolated
 from icha.jkr import JKR
 
 # Cut of both halves of the Ewald sum: erfc(4.3) = 1.2e-9.
@@ -67,6 +72,11 @@ def _smooth_mode(q, alpha, contact_modulus, period):
 def _short_mean(alpha, contact_modulus, period):
     """Mean displacement by a unit point force and its images, the short-ranged half; the smooth half has none."""
     return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
+
+
+def cell_of(period, free):
+    """Side of the cell in which the points of a square repeat, m: twice the square's where it is single."""
+    return 2 * period if free else period
 
 
 def periodic_difference(first, second, period):
@@ -154,19 +164,41 @@ def _point_kernels(r, alpha, contact_modulus):
 
 @dataclass(frozen=True, eq=False)
 class Ewald:
-    """How the sum is split: reach of the near field and floor of the moments' fields (m), and the smooth sums."""
+    """How the sum is split: reach of the near field and floor of the moments' fields (m), and the smooth sums.
+
+    period: of the sum, m. free: whether only the quarter [0, period/2]^2 counts, and what its images do is taken off.
+    """
 
     period: float
     contact_modulus: float
     reach: float
     floor: float
+    free: bool = False
 
     @classmethod
-    def of(cls, period, contact_modulus, count, neighbours):
-        """A split that suits a number of points; the near field is never wider than half the cell."""
+    def of(cls, period, contact_modulus, count, neighbours, free=False):
+        """A split that suits a number of points; the near field is never wider than half the cell.
+
+        period: side of the square, m; free: whether it is single.
+        """
         spacing = period / np.sqrt(max(count, 1))
-        reach = min(0.5 * period, np.sqrt(neighbours / np.pi) * spacing)
-        return cls(period, contact_modulus, reach, _FLOOR * min(spacing, 0.1 * period))
+        cell = cell_of(period, free)
+        reach = min(0.5 * cell, np.sqrt(neighbours / np.pi) * spacing)
+        return cls(cell, contact_modulus, reach, _FLOOR * min(spacing, 0.1 * period), free)
+
+    @property
+    def side(self):
+        """Side of the square, m."""
+        return 0.5 * self.period if self.free else self.period
+
+    def bases(self, points):
+        """What the images' displacement at points (n, 2), or by spots there, is made of; None if images count."""
+        return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
+
+    def by_images(self, sources, targets, moments):
+        """Displacement (n,) at the targets by the images of the sources, both as `bases` gives them."""
+        field = image_field(*sources, moments, self.period, self.contact_modulus)
+        return interpolated(field, *targets)
 
     @cached_property
     def alpha(self):
@@ -236,6 +268,7 @@ class HalfSpace:
     near : three (n, n) lower triangular matrices, the short-ranged displacement by the moments k = 0, 1, 2.
     near_transposed : their transposes.
     near_loose : the displacement by forces, what matters to a thousandth, and its transpose.
+    bases : of the points, for their images on a free half-space.
     """
 
     ewald: Ewald
@@ -244,13 +277,14 @@ class HalfSpace:
     near: tuple
     near_transposed: tuple
     near_loose: tuple
+    bases: tuple | None = None
 
     @classmethod
-    def at(cls, points, period, contact_modulus) -> HalfSpace:
-        """The half-space with (n, 2) points in m."""
-        points = np.mod(points, period)
-        ewald = Ewald.of(period, contact_modulus, len(points), _NEIGHBOURS)
-        found = cKDTree(points, boxsize=period).query_pairs(ewald.reach, output_type="ndarray")
+    def at(cls, points, period, contact_modulus, free=False) -> HalfSpace:
+        """The half-space with (n, 2) points in m, in a square of side `period` (m) that repeats or is single (free)."""
+        ewald = Ewald.of(period, contact_modulus, len(points), _NEIGHBOURS, free)
+        points = np.mod(points, ewald.period)
+        found = cKDTree(points, boxsize=ewald.period).query_pairs(ewald.reach, output_type="ndarray")
         return cls._assembled(ewald, points, None, found.max(axis=1), found.min(axis=1))
 
     def extended(self, points) -> HalfSpace:
@@ -283,7 +317,9 @@ class HalfSpace:
         counts = r <= ewald.loose_reach
         ends = np.append(0, np.cumsum(counts))[start]
         loose = scipy.sparse.csr_matrix((kernels[0][counts], earlier[counts], ends), shape=(n, n))
-        return cls(ewald, points, (later, earlier, r), near, tuple(matrix.T for matrix in near), (loose, loose.T))
+        transposed = tuple(matrix.T for matrix in near)
+        bases = ewald.bases(points)
+        return cls(ewald, points, (later, earlier, r), near, transposed, (loose, loose.T), bases)
 
     def displacement(self, force, moment, fourth):
         """Displacement (n,) in m by forces (N), second (N m^2) and fourth moments (N m^4), each (n,)."""
@@ -294,6 +330,8 @@ class HalfSpace:
         own = self.ewald.own_smooth
         w -= own[0] * force + own[1] * moment
         w -= self.ewald.mean * np.sum(force)
+        if self.bases is not None:
+            w -= self.ewald.by_images(self.bases, self.bases, (force, moment))
         return w
 
     def nearly(self, force):
@@ -303,6 +341,8 @@ class HalfSpace:
             w += half @ force
         w -= self.ewald.own_smooth[0] * force
         w -= self.ewald.mean * np.sum(force)
+        if self.bases is not None:
+            w -= self.ewald.by_images(self.bases, self.bases, (force,))
         return w
 
 
@@ -433,17 +473,23 @@ class Tangent:
         return w + np.bincount(self.target, self.near_of_forces * da[self.source], len(da))
 
 
-def displacement_at(law: JKR, period: float, points, position, a, R, ewald: Ewald | None = None) -> np.ndarray:
-    """Displacement w (n,) in m at any points (n, 2) by spots, eq. (9)'s sum, periodic and of zero mean.
+def displacement_at(
+    law: JKR, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
+) -> np.ndarray:
+    """Displacement w (n,) in m at any points (n, 2) by spots, eq. (9)'s sum.
+
+    It is periodic and of zero mean; or, on a free half-space, the plain sum at points of the same square as the spots.
 
     position (m, 2), a and R (m,): centres, contact radii and radii of curvature of the spots, m. Inside a spot its own
-    part is the displacement under its contact. ewald: how to split the sum; None: as suits the number of spots.
+    part is the displacement under its contact. ewald: how to split the sum (then period and free are its own); None: as
+    suits the number of spots.
     """
     w = np.zeros(len(points))
     if not len(points) or not len(a):
         return w
+    ewald = ewald or Ewald.of(period, law.material.contact_modulus, len(a), _NEIGHBOURS_ONCE, free)
+    period = ewald.period
     points, position = np.mod(points, period), np.mod(position, period)
-    ewald = ewald or Ewald.of(period, law.material.contact_modulus, len(a), _NEIGHBOURS_ONCE)
     moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
     tree, spots = cKDTree(points, boxsize=period), cKDTree(position, boxsize=period)
     pairs = tree.sparse_distance_matrix(spots, ewald.reach, output_type="ndarray")
@@ -459,4 +505,7 @@ def displacement_at(law: JKR, period: float, points, position, a, R, ewald: Ewal
         exact -= moment[source] * replaced
     w += np.bincount(target, exact, len(points))
     w += ewald.smooth(position, points, *moments[:2])
-    return w - ewald.mean * np.sum(moments[0])
+    w -= ewald.mean * np.sum(moments[0])
+    if ewald.free:
+        w -= ewald.by_images(ewald.bases(position), ewald.bases(points), moments[:2])
+    return w

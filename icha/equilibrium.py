@@ -4,7 +4,9 @@ The unknowns are the local approaches delta_i of the spots in contact:
 
     delta_i + w_i(a(delta)) = h_i - u,        a_i = a_JKR(delta_i),
 
-with w_i the displacement by all other spots and all images (eq. 4) and u the mean separation. Below the jump-off
+with w_i the displacement by all other spots and all images (eq. 4) and u the mean separation. On a free half-space
+there are no images, and u is the separation of the surface's mean plane and the half-space far away from it, which
+falls below zero as the loaded part sinks in; the mean gap is u plus the mean of w over the square. Below the jump-off
 approach a spot keeps its jump-off radius while the equations are solved (zero for Hertz's law), so that they are
 defined everywhere and, without adhesion, smooth.
 
@@ -229,7 +231,7 @@ class _Sites:
 
     def _arranged(self, arrays):
         ewald = self.half_space.ewald
-        half_space = HalfSpace.at(arrays["position"], ewald.period, ewald.contact_modulus)
+        half_space = HalfSpace.at(arrays["position"], ewald.side, ewald.contact_modulus, ewald.free)
         return _Sites(**arrays, half_space=half_space, arranged=len(arrays["height"]))
 
 
@@ -322,7 +324,7 @@ def untouched(contact: Contact) -> ContactState:
     asperities, none = contact.asperities, np.empty(0)
     separation = float(np.max(asperities.height - contact.jump_in))
     nowhere, nobody = np.empty((0, 2)), np.empty(0, dtype=int)
-    half_space = HalfSpace.at(nowhere, asperities.period, contact.law.material.contact_modulus)
+    half_space = HalfSpace.at(nowhere, asperities.period, contact.law.material.contact_modulus, asperities.free)
     return ContactState(
         separation=separation,
         sites=_Sites(nowhere, none, none, none, nobody, nobody, np.empty(0, dtype=object), nobody, half_space, 0),
@@ -784,7 +786,7 @@ class _Search:
         locked = self.locked[ready]
         self.pending = int(np.count_nonzero(locked))
         ready = ready[~locked]
-        under = covering_spot(asperities.position[ready], there, a, asperities.period)
+        under = covering_spot(asperities.position[ready], there, a, asperities.cell)
         self.holder[ready[under >= 0]] = spots[under[under >= 0]]
         ready = self._first_of_each_group(ready[under < 0])
         source = self.fallen[ready]
@@ -809,7 +811,7 @@ class _Search:
             return joining
         position = asperities.position[joining]
         a = self.law.contact_radius(self.seen[joining], asperities.radius[joining])
-        under = covering_spot(position, position, a, asperities.period, larger_than=a)
+        under = covering_spot(position, position, a, asperities.cell, larger_than=a)
         return joining[under < 0]
 
     def _swallow(self, point):
@@ -843,7 +845,7 @@ class _Search:
         margin : error of the approaches in m, beyond whose effect they have to overlap.
         deep : only those of which one covers the other's centre.
         """
-        sites, period = self.sites, self.contact.asperities.period
+        sites, period = self.sites, self.contact.asperities.cell
         first, second = windows.source, windows.target
         depth = a[first] + a[second] - windows.r
         part = (a > 0) & (self.status[: len(a)] != _GONE)

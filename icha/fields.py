@@ -22,7 +22,8 @@ import scipy.fft
 from scipy.special import beta, erf
 
 from icha.cores import blocks, on_cores
-from icha.elasticity import _short_mean, _smooth_mode
+from icha.elasticity import _short_mean, _smooth_mode, cell_of
+from icha.images import basis, image_field
 from icha.jkr import JKR
 
 # Cut of both halves of the Ewald sum: erfc(4.6) = 8e-11.
@@ -41,13 +42,15 @@ _SERIES_BELOW = 0.25
 _SERIES_LENGTH = 15
 
 
-def displacement_field(law: JKR, period: float, grid: int, centres, a, R) -> np.ndarray:
-    """Displacement w (grid, grid) in m at the nodes of a regular grid, eq. (9)'s sum, periodic and of zero mean.
+def displacement_field(law: JKR, period: float, grid: int, centres, a, R, *, free: bool = False) -> np.ndarray:
+    """Displacement w (grid, grid) in m at the nodes of a regular grid, eq. (9)'s sum.
+
+    It is periodic and of zero mean; or, for a single square on a free half-space, the plain sum over the spots.
 
     centres: (m, 2), a and R: (m,), all m. Inside a spot its own part is the displacement under its contact. The grid
     need not be the surface's: a coarser one gives the values at every so-manieth node and costs accordingly less.
     """
-    return np.concatenate(DisplacementField(law, period, grid, centres, a, R).in_blocks(lambda _, w: w))
+    return np.concatenate(DisplacementField(law, period, grid, centres, a, R, free).in_blocks(lambda _, w: w))
 
 
 def row_blocks(grid: int) -> list[slice]:
@@ -65,12 +68,23 @@ class DisplacementField:
     centres: np.ndarray
     contact_radius: np.ndarray
     radius_of_curvature: np.ndarray
+    free: bool = False
+
+    @property
+    def _cell(self):
+        """Period of the sum, m; of a single square it is in a cell of twice its side, without what the images do."""
+        return cell_of(self.period, self.free)
+
+    @property
+    def _nodes(self):
+        """Nodes along a side of that cell."""
+        return cell_of(self.grid, self.free)
 
     def in_blocks(self, function) -> list:
         """Results of `function(rows, w)` for all rows in blocks, in order; several threads work on them."""
         if len(self.contact_radius):
             # Before all threads want it.
-            _ = self._smooth_half
+            _ = self._smooth_half, self.free and self._images
         return on_cores(lambda rows: function(rows, self.rows(rows)), row_blocks(self.grid))
 
     def rows(self, rows: slice) -> np.ndarray:
@@ -80,20 +94,35 @@ class DisplacementField:
         # Grids too coarse for the Fourier series are nodes of a finer one.
         finer, half = self._smooth_half
         nodes = np.arange(rows.start, rows.stop) * finer
-        w = scipy.fft.irfft(half[nodes], n=finer * self.grid, axis=1, norm="forward", workers=1)[:, ::finer]
+        w = scipy.fft.irfft(half[nodes], n=finer * self._nodes, axis=1, norm="forward", workers=1)[:, ::finer]
         w = np.ascontiguousarray(w) - self._short_mean
         for group in self._groups:
-            for window in windows(self.centres[group.spots], group.reach, self.grid, self.period, rows):
+            for window in windows(self.centres[group.spots], group.reach, self._nodes, self._cell, rows):
                 np.add.at(w.reshape(-1), window.node.ravel(), self._short_half(group, window).ravel())
+        if self.free:
+            w = w[:, : self.grid]
+            by, bx, field = self._images
+            w = w - (by[rows] @ field) @ bx.T
         return w
+
+    @cached_property
+    def _images(self):
+        """Bases of the nodes, and the field of the images between them."""
+        nodes = basis(np.arange(self.grid) * (self.period / self.grid), self._cell)
+        field = 0.0
+        for group in self._groups:
+            bases = (basis(self.centres[group.spots, axis], self._cell) for axis in (1, 0))
+            moments = group.moments.T / group.alpha ** (2 * np.arange(_MOMENTS)[:, None])
+            field = field + image_field(*bases, moments, self._cell, self.law.material.contact_modulus)
+        return nodes, nodes, field
 
     @cached_property
     def _groups(self):
         """Spots by the width of their windows: wide enough for their own radius and for few Fourier modes."""
-        count, widest = len(self.contact_radius), 0.5 * self.period
+        count, widest = len(self.contact_radius), 0.5 * self._cell
         # As many modes as make the Fourier series and the windows about equally costly.
-        modes = min((2.0 * count * self.grid**2) ** 0.25, (self.grid - 1) // 2)
-        narrowest = min(_CUT**2 / np.pi * self.period / modes, widest)
+        modes = min((2.0 * count * self._nodes**2) ** 0.25, (self._nodes - 1) // 2)
+        narrowest = min(_CUT**2 / np.pi * self._cell / modes, widest)
         needed = np.clip(_WINDOW * self.contact_radius, narrowest, widest)
         rung = np.ceil(np.log(needed / narrowest) / math.log(_LADDER) - 1e-9).astype(int)
         return [self._group(np.flatnonzero(rung == k), min(narrowest * _LADDER**k, widest)) for k in np.unique(rung)]
@@ -110,15 +139,15 @@ class DisplacementField:
     @cached_property
     def _short_mean(self):
         modulus = self.law.material.contact_modulus
-        return sum(np.sum(g.moments[:, 0]) * _short_mean(g.alpha, modulus, self.period) for g in self._groups)
+        return sum(np.sum(g.moments[:, 0]) * _short_mean(g.alpha, modulus, self._cell) for g in self._groups)
 
     @cached_property
     def _smooth_half(self):
         """How many times finer than the grid, and the Fourier series along x at the rows of that finer grid."""
         modes = on_cores(self._modes, self._groups)
         highest = [each.shape[1] - 1 for each in modes]
-        finer = -(-(2 * max(highest) + 1) // self.grid)
-        half = np.zeros((finer * self.grid, max(highest) + 1), dtype=complex)
+        finer = -(-(2 * max(highest) + 1) // self._nodes)
+        half = np.zeros((finer * self._nodes, max(highest) + 1), dtype=complex)
         for k, each in zip(highest, modes, strict=True):
             half[np.arange(-k, k + 1) % len(half), : k + 1] += each
 
@@ -130,9 +159,9 @@ class DisplacementField:
 
     def _modes(self, group):
         """Fourier coefficients (2k + 1, k + 1) of the smooth half by one group of spots."""
-        highest = math.ceil(_CUT * group.alpha * self.period / np.pi - 1e-9)
-        y, x = (np.ascontiguousarray(self.centres[group.spots, axis]) * (2 * np.pi / self.period) for axis in (1, 0))
-        k = np.arange(-highest, highest + 1) * (2 * np.pi / self.period)
+        highest = math.ceil(_CUT * group.alpha * self._cell / np.pi - 1e-9)
+        y, x = (np.ascontiguousarray(self.centres[group.spots, axis]) * (2 * np.pi / self._cell) for axis in (1, 0))
+        k = np.arange(-highest, highest + 1) * (2 * np.pi / self._cell)
         q2 = k[:, None] ** 2 + k[None, highest:] ** 2
         strength, factor = np.zeros(q2.shape, dtype=complex), np.ones(q2.shape)
         for even, odd in group.moments.T.reshape(-1, 2, len(group.spots)):
@@ -146,7 +175,7 @@ class DisplacementField:
             strength += factor * (-0.5j * (c - mirrored))
             factor *= -q2 / group.alpha**2
         q2[highest, 0] = 1.0
-        strength *= _smooth_mode(np.sqrt(q2), group.alpha, self.law.material.contact_modulus, self.period)
+        strength *= _smooth_mode(np.sqrt(q2), group.alpha, self.law.material.contact_modulus, self._cell)
         strength[highest, 0] = 0.0
         return strength
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from icha.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
 from icha.cores import on_cores
+from icha.elasticity import cell_of
 from icha.equilibrium import ContactState, Spots
 from icha.fields import DisplacementField, displacement_field, row_blocks, windows
 from icha.jkr import JKR
@@ -17,11 +18,15 @@ from icha.validation import integer
 
 @dataclass(frozen=True, eq=False)
 class GapDistribution:
-    """P(u) over the nominal area: bin edges in m, density in 1/m; overlap is the area fraction of negative gaps."""
+    """P(u) over the nominal area: bin edges in m, density in 1/m; overlap is the area fraction of negative gaps.
+
+    beyond_edges: part of the nominal area by which spots reach over the edges of a free square.
+    """
 
     edges: np.ndarray
     density: np.ndarray
     overlap_fraction: float
+    beyond_edges: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +39,7 @@ class PressureDistribution:
 
 
 def displacement(law: JKR, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
-    """Displacement w of the half-space at the surface's nodes, (n, n), m; zero mean (eq. 9, periodic).
+    """Displacement w of the half-space at the surface's nodes, (n, n), m: eq. 9, periodic and of zero mean, or free.
 
     `every` : only at every so-manieth node of both directions, a divisor of the grid. The values are the same; time
     and memory fall with the number of nodes.
@@ -42,7 +47,13 @@ def displacement(law: JKR, surface: Surface, state: ContactState, every: int = 1
     spots = state.spots
     grid = _coarse_grid(surface, every)
     return displacement_field(
-        law, surface.period, grid, spots.position, spots.contact_radius, spots.radius_of_curvature
+        law,
+        surface.period,
+        grid,
+        spots.position,
+        spots.contact_radius,
+        spots.radius_of_curvature,
+        free=surface.free,
     )
 
 
@@ -55,31 +66,36 @@ def gap(law: JKR, surface: Surface, state: ContactState, every: int = 1) -> np.n
 def contact_cover(surface: Surface, spots: Spots, every: int = 1) -> np.ndarray:
     """Fraction of every node's cell that lies in contact, (n, n), exact for discs.
 
-    Its mean is the contact area fraction to rounding, spots being disjoint. `every` : of cells so many times wider,
+    Its mean is the contact area fraction to rounding, spots being disjoint; of a free square without what lies beyond
+    its edges. `every` : of cells so many times wider,
     around every so-manieth node.
     """
     grid = _coarse_grid(surface, every)
     centres, radii = spots.position, spots.contact_radius
-    parts = on_cores(lambda rows: _cover(surface.period, grid, centres, radii, rows)[0], row_blocks(grid))
+    period, free = surface.period, surface.free
+    parts = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free)[0], row_blocks(grid))
     return np.concatenate(parts)
 
 
 def covered_nodes(surface: Surface, spots: Spots) -> np.ndarray:
     """Whether each node lies inside a spot, (n, n) of bool."""
-    return nodes_in_discs(surface.period, surface.grid, spots.position, spots.contact_radius)
+    return nodes_in_discs(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)
 
 
-def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Whether each node of a periodic grid, (n, n) of bool, lies inside a disc: centres (m, 2) and radii (m,) in m."""
-    parts = on_cores(lambda rows: _cover(period, grid, centres, radii, rows)[1], row_blocks(grid))
+def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndarray, free: bool = False) -> np.ndarray:
+    """Whether each node of a grid, (n, n) of bool, lies inside a disc: centres (m, 2) and radii (m,) in m.
+
+    free: whether the discs are single, or repeat with the period.
+    """
+    parts = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free)[1], row_blocks(grid))
     return np.concatenate(parts)
 
 
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDistribution:
     """P(u) from the gap field; cells on the edge of a spot count with the part that lies outside.
 
-    integral of P(u) + A/A0 + overlap = 1. The part outside of a cell whose node lies inside a spot has gap zero: it
-    is the spot's edge. The field is never held as a whole.
+    integral of P(u) + A/A0 + overlap = 1; of a free square 1 and what its spots have beyond the edges. The part outside
+    of a cell whose node lies inside a spot has gap zero: it is the spot's edge. The field is never held as a whole.
 
     Raises
     ------
@@ -89,24 +105,34 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDist
     edges = GAP_BINS * surface.rms_height
     spots = state.spots
     field = DisplacementField(
-        law, surface.period, surface.grid, spots.position, spots.contact_radius, spots.radius_of_curvature
+        law,
+        surface.period,
+        surface.grid,
+        spots.position,
+        spots.contact_radius,
+        spots.radius_of_curvature,
+        surface.free,
     )
 
     def nodes_per_bin(rows, w):
         u = w + (state.separation - surface.heights[rows])
-        cover, inside = _cover(surface.period, surface.grid, spots.position, spots.contact_radius, rows)
+        cover, inside = _cover(surface.period, surface.grid, spots.position, spots.contact_radius, rows, surface.free)
         u[inside] = 0.0
         # The first place is for the overlap.
         place = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
         cut = np.flatnonzero(cover)
         hidden = np.bincount(place[cut], weights=np.clip(cover.ravel()[cut], 0.0, 1.0), minlength=len(edges))
-        return np.bincount(place, minlength=len(edges)) - hidden, u.max()
+        return np.bincount(place, minlength=len(edges)) - hidden, u.max(), np.sum(cover)
 
-    content, largest = zip(*field.in_blocks(nodes_per_bin), strict=True)
+    content, largest, covered = zip(*field.in_blocks(nodes_per_bin), strict=True)
     if max(largest) > edges[-1]:
         raise ValueError(f"gap: {max(largest):.3e} m exceeds the largest bin, {edges[-1]:.3e} m")
     content = np.sum(content, axis=0) / surface.grid**2
-    return GapDistribution(edges, content[1:] / np.diff(edges), float(content[0]))
+    beyond = 0.0
+    if surface.free:
+        area = np.sum(np.pi * spots.contact_radius**2) / surface.period**2
+        beyond = max(float(area - sum(covered) / surface.grid**2), 0.0)
+    return GapDistribution(edges, content[1:] / np.diff(edges), float(content[0]), beyond)
 
 
 def _gap_bin(u, edges):
@@ -153,8 +179,12 @@ def _coarse_grid(surface, every):
     return surface.grid // every
 
 
-def _cover(period, grid, centres, radii, rows):
+def _cover(period, grid, centres, radii, rows, free=False):
     """Of a range of rows: the fraction of every cell in contact, and whether the node lies inside a spot."""
+    if free:
+        # In a grid of twice the side nothing comes back from beyond the edges.
+        parts = _cover(cell_of(period, free), cell_of(grid, free), centres, radii, rows)
+        return tuple(part[:, :grid] for part in parts)
     spacing = period / grid
     cover = np.zeros((rows.stop - rows.start) * grid)
     inside = np.zeros(len(cover), dtype=bool)

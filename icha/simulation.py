@@ -49,7 +49,11 @@ REFERENCES = (
 
 # name: (dimensions, units, long name)
 VARIABLES = {
-    "mean_separation": (("step",), "m", "mean separation of the surfaces"),
+    "mean_separation": (
+        ("step",),
+        "m",
+        "mean separation of the surfaces; of a free square that of its mean plane and the half-space far away",
+    ),
     "nominal_pressure": (("step",), "Pa", "force over nominal area"),
     "contact_area_fraction": (("step",), "1", "real over nominal contact area, A/A0"),
     "spot_count": (("step",), "1", "number of contact spots"),
@@ -87,6 +91,11 @@ VARIABLES = {
         "1",
         "area fraction outside the spots where the computed gap is negative",
     ),
+    "area_beyond_edges": (
+        ("snapshot",),
+        "1",
+        "part of the nominal area by which spots reach over the edges of a free square; 0 of a periodic surface",
+    ),
     "gap_density": (("snapshot", "gap_bin"), "m-1", "probability density of the gap over the nominal area"),
     "pressure_density": (
         ("snapshot", "pressure_bin"),
@@ -117,7 +126,8 @@ VARIABLES = {
     "spectral_moment_2": ((), "1", "spectral moment m2 of a profile: variance of its slope"),
     "spectral_moment_4": ((), "m-2", "spectral moment m4 of a profile: variance of its curvature"),
     "nayak_parameter": ((), "1", "Nayak's parameter m0 m4/m2^2: breadth of the spectrum"),
-    "period": ((), "m", "side of the periodic cell"),
+    "period": ((), "m", "side of the periodic cell, or of the free square"),
+    "boundary": ((), "1", "what lies beyond the cell: periodic or free"),
     "grid": ((), "1", "nodes along a side of the cell"),
     "seed": ((), "1", "seed of the surface; -1 where it has none"),
     "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
@@ -361,6 +371,7 @@ def _snapshot(law, surface, target, state, step):
         "snapshot_kind": target.kind,
         "snapshot_target": target.value,
         "overlap_fraction": gaps.overlap_fraction,
+        "area_beyond_edges": gaps.beyond_edges,
         "gap_density": gaps.density,
         "pressure_density": pressures.density,
         "pressure_bin_mean": pressures.mean,
@@ -437,6 +448,7 @@ def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
         "spectral_moment_4": moments.m4,
         "nayak_parameter": moments.nayak_parameter,
         "period": surface.period,
+        "boundary": surface.boundary,
         "grid": surface.grid,
         "seed": seed,
         "tabor_parameter": float(material.tabor_parameter(radius)),
@@ -483,7 +495,8 @@ def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
         attrs={
             "title": f"Rough contact {adhesion} adhesion, ICHA model",
             "summary": (
-                f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a periodic rough surface against an "
+                f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "
+                f"{'periodic rough surface' if not surface.free else 'single rough square'} against an "
                 "elastic half-space by interacting and coalescing asperities with JKR adhesion and jump into contact."
             ),
             "Conventions": "CF-1.11",
