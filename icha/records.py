@@ -9,18 +9,28 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
+import netCDF4
 import numpy as np
 import xarray as xr
 
 from icha.files import whole_file
+from icha.netcdf import (
+    COMPRESSION,
+    FLOAT_FILL,
+    INTEGER_FILL,
+    LEAST_COMPRESSED,
+    characters,
+    coordinates_of,
+    define_dimensions,
+    define_numbers,
+    define_text,
+    is_text,
+)
 from icha.roughness import SpectralMoments, spectral_moments
 from icha.surface import Surface
 
-# Smaller arrays gain nothing from compression. Larger ones are heights: a fifth less space would take half a minute
-# for 8192 nodes a side.
-_COMPRESSED_SIZES = range(4096, 2**22)
-_FLOAT_FILL = 9.969209968386869e36
-_INTEGER_FILL = -(2**31) + 1
+# Larger arrays are heights: a fifth less space would take half a minute for 8192 nodes a side.
+_COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN = range(4)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design")
@@ -45,35 +55,45 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
         `status` may lack values, none has any beyond its `step_count` steps, and a variable whose attribute `missing`
         says why may lack some, too; those are written as the variable's `_FillValue`.
     """
-    tree = data if isinstance(data, xr.DataTree) else None
-    nodes = {node.path: node.to_dataset() for node in tree.subtree} if tree is not None else {"/": data}
-    encodings = {}
-    plain = {}
+    nodes = {"/": data}
+    if isinstance(data, xr.DataTree):
+        nodes = {node.path: node.to_dataset(inherit=False) for node in data.subtree}
     for group, dataset in nodes.items():
-        where = f"{path}" if group == "/" else f"{path}, group {group}"
-        _refuse_values_not_finite(dataset, where)
-        plain[group] = dataset.drop_encoding()
-        encodings[group] = {name: _encoding(dataset, name) for name in dataset.variables}
-    with whole_file(path) as temporary:
-        if tree is None:
-            plain["/"].to_netcdf(temporary, engine="netcdf4", encoding=encodings["/"])
-        else:
-            xr.DataTree.from_dict(plain).to_netcdf(temporary, engine="netcdf4", encoding=encodings)
+        _refuse_values_not_finite(dataset, f"{path}" if group == "/" else f"{path}, group {group}")
+    with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
+        # All variables are written whole.
+        file.set_fill_off()
+        defined = [
+            variable
+            for group, dataset in nodes.items()
+            for variable in _define(file if group == "/" else file.createGroup(group), dataset)
+        ]
+        for variable, values in defined:
+            variable[...] = values
 
 
-def _encoding(dataset: xr.Dataset, name: str) -> dict:
-    variable = dataset[name].variable
-    if variable.dtype.kind in "OUT":
-        # Characters, not variable-length strings: every netCDF tool reads them and they compress.
-        return {"dtype": "S1"}
-    encoding: dict = {"_FillValue": None}
-    if variable.dtype.kind == "f" and np.isnan(variable.values).any():
-        encoding["_FillValue"] = _FLOAT_FILL
-        if variable.encoding.get("dtype") == np.dtype("int32"):
-            encoding.update(dtype="int32", _FillValue=_INTEGER_FILL)
-    if variable.size in _COMPRESSED_SIZES:
-        encoding.update(zlib=True, complevel=4, shuffle=True)
-    return encoding
+def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.Variable, np.ndarray]]:
+    """Make the dimensions and variables of a dataset in a group of a file; give them with what is to be written."""
+    define_dimensions(group, dataset.sizes)
+    group.setncatts(dataset.attrs)
+    coordinates = coordinates_of({name: v.dims for name, v in dataset.variables.items()}, dataset.coords)
+    defined = []
+    for name, variable in dataset.variables.items():
+        attrs = variable.attrs | ({"coordinates": coordinates[name]} if name in coordinates else {})
+        if is_text(variable.dtype):
+            values = characters(variable.values)
+            defined.append((define_text(group, name, variable.dims, values.shape[-1], attrs), values))
+            continue
+        values, storage = variable.values, {}
+        if variable.dtype.kind == "f" and np.isnan(values).any():
+            whole = variable.encoding.get("dtype") == np.dtype("int32")
+            storage["fill_value"] = INTEGER_FILL if whole else FLOAT_FILL
+            values = np.where(np.isnan(values), storage["fill_value"], values)
+            values = values.astype(np.int32) if whole else values
+        if variable.size in _COMPRESSED_SIZES:
+            storage |= COMPRESSION
+        defined.append((define_numbers(group, name, variable.dims, values.dtype, attrs, **storage), values))
+    return defined
 
 
 def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:

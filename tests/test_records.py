@@ -38,6 +38,53 @@ def test_a_dataset_read_and_written_keeps_its_bytes(tmp_path):
     assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
 
 
+def content(group):
+    """All that a netCDF group holds, value for value as it is kept, and how."""
+    variables = {}
+    for name, variable in group.variables.items():
+        variable.set_auto_maskandscale(False)
+        variable.set_auto_chartostring(False)
+        attrs = {key: np.asarray(variable.getncattr(key)).tolist() for key in variable.ncattrs()}
+        kept = variable[...].tobytes()
+        variables[name] = (variable.dtype, variable.dimensions, attrs, variable.chunking(), variable.filters(), kept)
+    return (
+        {name: len(dimension) for name, dimension in group.dimensions.items()},
+        {name: group.getncattr(name) for name in group.ncattrs()},
+        variables,
+        {name: content(each) for name, each in group.groups.items()},
+    )
+
+
+def as_xarray_would(dataset):
+    """What to tell xarray for files as the project keeps them."""
+    encodings = {}
+    for name, variable in dataset.variables.items():
+        encodings[name] = {"dtype": "S1"} if variable.dtype.kind in "OU" else {"_FillValue": None}
+        if variable.dtype.kind == "f" and np.isnan(variable.values).any():
+            encodings[name] = {"_FillValue": netCDF4.default_fillvals["f8"]}
+            if variable.encoding.get("dtype") == np.dtype("int32"):
+                encodings[name] = {"dtype": "int32", "_FillValue": 1 - 2**31}
+        if variable.dtype.kind in "iuf" and variable.size >= 4096:
+            encodings[name] |= {"zlib": True, "complevel": 4, "shuffle": True}
+    return encodings
+
+
+@pytest.mark.parametrize("what", ["run", "cycle", "campaign"])
+def test_files_are_those_that_xarray_writes(tmp_path, what):
+    if what == "campaign":
+        tree = cyclic.tree()
+        write_dataset(tree, tmp_path / "ours.nc")
+        plain = {node.path: node.to_dataset().drop_encoding() for node in tree.subtree}
+        encoding = {node.path: as_xarray_would(node.to_dataset()) for node in tree.subtree}
+        xr.DataTree.from_dict(plain).to_netcdf(tmp_path / "xarrays.nc", engine="netcdf4", encoding=encoding)
+    else:
+        run = small.run() if what == "run" else cyclic.run()
+        write_dataset(run, tmp_path / "ours.nc")
+        run.to_netcdf(tmp_path / "xarrays.nc", engine="netcdf4", encoding=as_xarray_would(run))
+    with netCDF4.Dataset(tmp_path / "ours.nc") as ours, netCDF4.Dataset(tmp_path / "xarrays.nc") as theirs:
+        assert content(ours) == content(theirs)
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_values_not_finite_are_refused_by_name_and_leave_no_file(tmp_path, bad):
     with pytest.raises(ValueError, match=r"x\.nc.*'length'.*1 of 2.*n=1"):
