@@ -1,0 +1,52 @@
+"""The command line: `icha`. Whatever takes time to import is imported by the commands that need it."""
+
+from typing import Annotated
+
+import typer
+
+from icha.cli.check import check
+from icha.cli.describe import describe
+from icha.cli.new import new
+from icha.cli.project import told
+from icha.cli.run import run
+from icha.cli.show import show
+from icha.cli.simulate import simulate
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"icha {version('icha')}")
+        raise typer.Exit
+
+
+@app.callback()
+def icha(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and exit.", callback=_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Adhesive rough contact: campaigns of runs from one YAML file.
+
+    Start with `icha new NAME`, look with `icha describe NAME`, compute with `icha run NAME`.
+
+    Exit status: 0 if all went well, 1 if something failed, 2 if what was asked for is wrong.
+    """
+
+
+for command in (new, describe, run, simulate, show, check):
+    app.command()(told(command))
+
+
+def main() -> None:
+    """Entry point."""
+    app()

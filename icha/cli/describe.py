@@ -1,0 +1,131 @@
+"""Tell what a campaign asks for, what of it is there, and what the rest will cost."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from icha.cli.options import Config, Cores, Folder
+from icha.cli.project import configuration_path, counted, find_project, read_configuration, shown
+
+
+def describe(
+    config: Config = None,
+    runs: Annotated[bool, typer.Option("--runs", help="List every file, not only sums.")] = False,
+    cores: Cores = None,
+    folder: Folder = None,
+) -> None:
+    """Show what a campaign computes: its runs, what is there already, and expected time, memory and disk of the rest.
+
+    Nothing is computed. Times are estimates, good to a factor of two or so; once some runs are done, theirs are used.
+    A run counts as done if its file was made with the present settings; `icha run -n` also knows of changed programs.
+    """
+    from rich.console import Console
+
+    from icha.cli.plan import plan
+
+    path = configuration_path(config)
+    campaign = read_configuration(path).campaign
+    home = (folder or find_project() or Path.cwd()).resolve()
+    items = plan(campaign, home / "results" / campaign.name)
+    count = _count(cores)
+    console = Console(width=None if sys.stdout.isatty() else 120)
+    console.print(f"[bold]{campaign.name}[/]: {campaign.title}", highlight=False)
+    console.print(f"configuration: {shown(path)}\n", highlight=False)
+    if runs:
+        _list(console, items)
+    _summary(console, items, count)
+
+
+def _count(cores: str | None) -> int:
+    if cores == "all":
+        return os.cpu_count() or 1
+    return int(cores) if cores else 2
+
+
+def _summary(console, items, cores) -> None:
+    from rich.table import Table
+
+    from icha.cli.live import duration
+    from icha.cli.plan import memory_on, time_on, total
+
+    table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
+    parts: dict[str, list] = {}
+    for item in items:
+        parts.setdefault(item.part, []).append(item)
+    every = total(items)
+    columns = {
+        "": "all",
+        "files": str(every.count),
+        "done": str(every.done),
+        "failed": str(every.failed or ""),
+        "to do": str(every.to_do),
+        "each": "",
+        "core time": duration(every.work),
+        "memory": size(every.memory),
+        "disk": size(every.disk),
+    }
+    for heading, footer in columns.items():
+        # In a narrow terminal it is the names that are broken, not the numbers.
+        table.add_column(
+            heading, footer=footer, justify="right" if heading else "left", no_wrap=bool(heading), overflow="fold"
+        )
+    for part, members in parts.items():
+        sums = total(members)
+        table.add_row(
+            part,
+            str(sums.count),
+            str(sums.done or ""),
+            str(sums.failed or ""),
+            str(sums.to_do or ""),
+            duration(sums.typical),
+            duration(sums.work) if sums.to_do else "",
+            size(sums.memory),
+            size(sums.disk),
+        )
+    console.print(table)
+    runs = [item for item in items if item.is_run]
+    changed = sum(item.state == "changed" for item in runs)
+    console.print()
+    if not every.to_do:
+        console.print(f"{counted(len(runs), 'run')}; everything is there.", highlight=False)
+    else:
+        console.print(
+            f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about "
+            f"[bold]{duration(time_on(items, cores))}[/] and {size(memory_on(items, cores))} of memory on "
+            f"{counted(cores, 'core')}; {size(every.disk)} of disk when all is there, and as much again for the "
+            f"dataset.",
+            highlight=False,
+        )
+    if changed:
+        console.print(f"{counted(changed, 'run')} there, but with other settings: to do again.", highlight=False)
+    for item in runs:
+        if item.reason:
+            console.print(f"[red]failed:[/] {item.path}: {item.reason}", highlight=False)
+
+
+def _list(console, items) -> None:
+    from rich.table import Table
+
+    from icha.cli.live import duration
+
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for heading in ("file", "state", "time", "memory", "disk"):
+        table.add_column(heading, justify="left" if heading in ("file", "state") else "right", overflow="fold")
+    for item in items:
+        cost = item.cost
+        table.add_row(item.path, item.state, duration(cost.seconds), size(cost.memory), size(cost.disk))
+    console.print(table)
+    console.print()
+
+
+def size(number: float) -> str:
+    """Bytes as people say them: `70 kB`, `1.5 GB`."""
+    for factor, unit in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")):
+        if number >= factor:
+            return f"{number / factor:.3g} {unit}"
+    return f"{number / 1e3:.0f} kB"

@@ -1,0 +1,126 @@
+"""Write a campaign to start from."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from string import Template
+from typing import Annotated
+
+import typer
+
+from icha.cli.project import CAMPAIGNS, Mistake, project, shown
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def new(
+    name: Annotated[str, typer.Argument(help="Name of the campaign: lower-case letters, digits, `_`, `-`.")],
+    measured: Annotated[
+        Path | None,
+        typer.Option(help="File of a measured topography; what it says of itself is filled in.", show_default=False),
+    ] = None,
+    pull_off: Annotated[bool, typer.Option("--pull-off", help="With a study of pull-off and hysteresis.")] = False,
+    boundary_elements: Annotated[
+        bool, typer.Option("--boundary-elements", help="With boundary elements beside the runs.")
+    ] = False,
+) -> None:
+    """Write a commented campaign, config/campaigns/NAME.yaml, that runs as it is, and say how to go on."""
+    from icha.configuration.values import NAME_PATTERN
+
+    folder = project()
+    if not re.fullmatch(NAME_PATTERN, name):
+        raise Mistake(f"{name!r} is not a name; allowed: lower-case letters, digits, '_' and '-'")
+    file = folder / CAMPAIGNS / f"{name}.yaml"
+    if file.exists():
+        raise Mistake(f"{shown(file)} is there already; choose another name, or remove it")
+    if measured is not None and boundary_elements:
+        raise Mistake("--boundary-elements with --measured: they are periodic, and the template's surface is free")
+    surface, section, to_fill_in = ("rough", _part("self_affine"), [])
+    if measured is not None:
+        surface, section, to_fill_in = _measured(measured, file.parent)
+    slopes = "[0.5]" if measured is None else "measured"
+    text = _part(
+        "campaign",
+        name=name,
+        title=name.replace("_", " ").replace("-", " ").capitalize(),
+        schema=_relative(folder / "workflow/schemas/config.schema.json", file.parent),
+        readme=_relative(folder / "config/README.md", folder),
+        surface=surface,
+        surfaces=section.rstrip("\n"),
+        seeds="    seeds: 1..3                  # or a list; the figures show means and their confidence\n"
+        if measured is None
+        else "",
+        slopes=slopes,
+        vary="hurst: [0.6, 0.8]" if measured is None else "contact_modulus: [1 MPa, 2 MPa]",
+        pull_off=_part("pull_off", surface=surface, slopes=slopes) if pull_off else "",
+        boundary_elements=_part("boundary_elements") if boundary_elements else "",
+        figures="".join(
+            f"  {figure}\n"
+            for figure, wanted in (
+                ("fig13_loops: {study: pull}", pull_off),
+                ("fig15_loss: {studies: [pull]}", pull_off),
+                ("fig10_model_error: {study: load}", boundary_elements),
+            )
+            if wanted
+        ),
+    )
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+    typer.echo(f"{shown(file)} written")
+    for line in to_fill_in:
+        typer.secho(f"to fill in: {line}", fg="yellow")
+    typer.echo(f"next:  icha describe {name}    what it asks for\n       icha run {name}         compute it")
+
+
+def _part(template: str, **values: str) -> str:
+    """A template with the values in their places."""
+    return Template((TEMPLATES / f"{template}.yaml").read_text(encoding="utf-8")).substitute(values)
+
+
+def _relative(path: Path, start: Path) -> str:
+    return Path(os.path.relpath(path, start)).as_posix()
+
+
+def _measured(path: Path, start: Path) -> tuple[str, str, list[str]]:
+    """Name and section of a measured surface, and what of it is left to fill in."""
+    import numpy as np
+
+    from icha.topography import Preparation, UnfitTopography, read_scan
+
+    if not path.is_file():
+        raise Mistake(f"--measured {path}: no such file")
+    assumed, missing = {}, {}
+    guesses = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
+    while True:
+        try:
+            scan = read_scan(path, Preparation("auto", "free", **assumed))
+            break
+        except UnfitTopography as error:
+            if error.key not in guesses or error.key in assumed:
+                raise Mistake(f"--measured {path}: {error.key} {error}") from None
+            assumed[error.key] = guesses[error.key]
+            missing[error.key] = str(error)
+    rows, columns = scan.heights.shape
+    lines = [f"# {columns} x {rows} points{_what_is_known(scan, missing)}"]
+    examples = {"height_unit": "nm", "size": "[90 um, 90 um]"}
+    for key in missing:
+        lines.append(f"{key}:        # to fill in, for the file does not say it: such as {examples[key]}")
+    if gaps := int(np.count_nonzero(~np.isfinite(scan.heights))):
+        lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
+    found = "".join(f"    {line}\n" for line in lines)
+    name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
+    section = _part("measured", surface=name, path=_relative(path.resolve(), start.resolve()), found=found)
+    return name, section, [f"surfaces.{name}.{key} ({why})" for key, why in missing.items()]
+
+
+def _what_is_known(scan, missing) -> str:
+    import numpy as np
+
+    known = ""
+    if "size" not in missing:
+        known += f" over {scan.size[0] * 1e6:.4g} um x {scan.size[1] * 1e6:.4g} um"
+    if "height_unit" not in missing:
+        known += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
+    return known

@@ -1,0 +1,30 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def _cores(value: str | None) -> str | None:
+    if value is not None and value != "all" and not (value.isdecimal() and int(value) > 0):
+        raise typer.BadParameter(f"{value!r} is neither a number of cores, 1 or more, nor `all`")
+    return value
+
+
+Config = Annotated[
+    str | None,
+    typer.Argument(help="Configuration file, or name of a campaign. Left out: config/config.yaml.", show_default=False),
+]
+Cores = Annotated[
+    str | None,
+    typer.Option("--cores", "-c", help="Cores to use, or `all`. Left out: 2.", callback=_cores, show_default=False),
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option(
+        "--directory", "-d", help="Folder in which results/ stands. Left out: the project's.", show_default=False
+    ),
+]

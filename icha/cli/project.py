@@ -1,0 +1,110 @@
+"""Where the project is, which configuration is meant, and how users are told of their mistakes."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+
+import typer
+
+CAMPAIGNS = Path("config/campaigns")
+DEFAULT = Path("config/config.yaml")
+# Exit statuses.
+FAILED, WRONG = 1, 2
+
+
+class Mistake(Exception):
+    """What was asked for cannot be done; the message says why and what can."""
+
+
+def told(command: Callable) -> Callable:
+    """Decorate a command: mistakes and failures end it with their message and an exit status, not with a traceback."""
+
+    @wraps(command)
+    def call(*args, **kwargs):
+        try:
+            return command(*args, **kwargs)
+        except Mistake as mistake:
+            typer.secho(f"Error: {mistake}", err=True, fg="red")
+            raise typer.Exit(WRONG) from None
+        except BrokenPipeError:
+            # Whoever read our output has seen enough (`icha describe --runs | head`).
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(FAILED) from None
+
+    return call
+
+
+def find_project(start: Path | None = None) -> Path | None:
+    """The folder with the Snakefile, at or above `start` (the working directory if left out)."""
+    start = (start or Path.cwd()).resolve()
+    for folder in (start, *start.parents):
+        if (folder / "Snakefile").is_file() and (folder / "workflow/rules/runs.smk").is_file():
+            return folder
+    return None
+
+
+def project() -> Path:
+    """As `find_project`; raises `Mistake` where there is none."""
+    found = find_project()
+    if found is None:
+        raise Mistake(
+            f"no ICHA project at {Path.cwd()} or above it; go to the folder that was cloned, the one with the Snakefile"
+        )
+    return found
+
+
+def configuration_path(asked: str | None) -> Path:
+    """The configuration file that is meant: by its path, by the name of a campaign, or the project's default one.
+
+    Raises
+    ------
+    Mistake
+        If there is no such file.
+    """
+    folder = find_project()
+    if asked is None:
+        return shown(project() / DEFAULT)
+    if Path(asked).is_file():
+        return Path(asked)
+    named = [folder / CAMPAIGNS / f"{asked}.yaml"] if folder and Path(asked).name == asked else []
+    for path in named:
+        if path.is_file():
+            return shown(path)
+    there = sorted(path.stem for path in (folder / CAMPAIGNS).glob("*.yaml")) if folder else []
+    also = f" and no campaign of that name; there are: {', '.join(there)}" if there else ""
+    raise Mistake(f"{asked}: no such file{also}. `icha new NAME` writes a campaign to start from")
+
+
+def read_configuration(path: Path):
+    """The configuration of a file, as `icha.configuration.load.load_configuration` gives it; warnings are printed.
+
+    Raises
+    ------
+    Mistake
+        With everything that is wrong with it.
+    """
+    from icha.configuration.load import ConfigurationError, load_configuration
+    from icha.configuration.problems import warnings
+
+    try:
+        configuration = load_configuration(path)
+    except ConfigurationError as error:
+        raise Mistake(f"the configuration cannot be run:\n{error}") from None
+    for warning in warnings(configuration.campaign):
+        typer.secho(f"Warning: {warning}", err=True, fg="yellow")
+    return configuration
+
+
+def shown(path: Path) -> Path:
+    """The path as people like to read it: relative to the working directory where it lies in it."""
+    path = Path(path)
+    return path.relative_to(Path.cwd()) if path.is_absolute() and path.is_relative_to(Path.cwd()) else path
+
+
+def counted(number: int, thing: str) -> str:
+    """`1 run`, `3 runs`."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"

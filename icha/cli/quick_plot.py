@@ -1,0 +1,87 @@
+"""A quick plot of a file, to look at and not to print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
+from icha.figures.style import COLOURS, ONE_COLUMN, TWO_COLUMNS, new_figure, styled
+from icha.files import whole_file
+from icha.format import RUN, SURFACE
+
+
+def draw(kind: str, data: xr.Dataset | xr.DataTree, path: Path) -> None:
+    """Draw what `icha.format.kind_of` gave into a file, whose ending says the format."""
+    drawing = _run if kind == RUN else _surface if kind == SURFACE else _campaign
+    with whole_file(path) as temporary:
+        drawing(data).savefig(temporary, format=path.suffix[1:], dpi=150)
+
+
+@styled
+def _run(run: xr.Dataset) -> Figure:
+    figure = new_figure(TWO_COLUMNS, 3.2)
+    axes = figure.subplots(1, 2)
+    _curves(axes, run, COLOURS[0])
+    _label(axes, loops="work" in run)
+    return figure
+
+
+@styled
+def _campaign(tree: xr.DataTree) -> Figure:
+    names = list(tree.children)
+    figure = new_figure(TWO_COLUMNS, 3.2 * len(names))
+    rows = figure.subplots(len(names), 2, squeeze=False)
+    for axes, name in zip(rows, names, strict=True):
+        study = tree[name].to_dataset()
+        runs = study.stack(run=("surface", "seed", "rms_slope", "material"), create_index=False)
+        materials = list(study["material"].values)
+        for k in range(runs.sizes["run"]):
+            run = runs.isel(run=k)
+            colour = COLOURS[materials.index(str(run["material"].values)) % len(COLOURS)]
+            _curves(axes, run, colour, lw=0.7)
+        for material, colour in zip(materials, COLOURS, strict=False):
+            axes[0].plot([], [], color=colour, label=material)
+        axes[0].legend()
+        axes[0].set_title(name)
+        _label(axes, loops="work" in study)
+    return figure
+
+
+def _curves(axes, run, colour, lw=1.0):
+    pressure = run["reduced_pressure"].values
+    for ax, name in zip(axes, ("contact_area_fraction", "reduced_separation"), strict=True):
+        ax.plot(pressure, run[name].values, color=colour, marker=".", ms=3, lw=lw)
+
+
+def _label(axes, *, loops):
+    for ax, label in zip(axes, (AREA_LABEL, SEPARATION_LABEL), strict=True):
+        # Loads on the way back may be tensile.
+        ax.set_xscale("linear" if loops else "log")
+        ax.set_xlabel(PRESSURE_LABEL)
+        ax.set_ylabel(label)
+    axes[0].set_yscale("linear" if loops else "log")
+
+
+@styled
+def _surface(surface: xr.Dataset) -> Figure:
+    spectrum = "power_spectrum" in surface
+    figure = new_figure(TWO_COLUMNS if spectrum else ONE_COLUMN, 3.2)
+    axes = figure.subplots(1, 2) if spectrum else [figure.subplots()]
+    side = float(surface["period"])
+    every = max(1, surface.sizes["x"] // 1024)
+    image = axes[0].imshow(
+        surface["height"].values[::every, ::every] * 1e6, extent=np.array([0, side, 0, side]) * 1e6, origin="lower"
+    )
+    figure.colorbar(image, ax=axes[0], label="height as stored (µm)")
+    axes[0].set_xlabel("x (µm)")
+    axes[0].set_ylabel("y (µm)")
+    if spectrum:
+        q, power = surface["psd_wavevector"].values, surface["power_spectrum"].values
+        axes[1].loglog(q[power > 0], power[power > 0], color=COLOURS[0])
+        axes[1].set_xlabel("wave vector q (rad/m)")
+        axes[1].set_ylabel("C(q) (m⁴)")
+    return figure

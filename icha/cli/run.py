@@ -1,0 +1,223 @@
+"""Run a campaign by Snakemake, and tell how it goes and what has become of it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from icha.cli.options import Cores, Folder
+from icha.cli.project import DEFAULT, FAILED, Mistake, configuration_path, counted, project, read_configuration, shown
+
+TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
+PLUGINS = Path(__file__).parent / "plugin"
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# Lines of a reason that are printed at the end.
+_MOST_LINES = 12
+
+
+def run(
+    config: Annotated[
+        str | None,
+        typer.Argument(
+            help="Configuration file, or name of a campaign. Left out: config/config.yaml.", show_default=False
+        ),
+    ] = None,
+    targets: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[TARGET]...",
+            help=f"What is made: {', '.join(TARGETS)}, or a file. Left out: all. After `--`, options of Snakemake.",
+            show_default=False,
+        ),
+    ] = None,
+    cores: Cores = None,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            help="Folder of a Snakemake profile, or its name under profiles/, e.g. slurm.", show_default=False
+        ),
+    ] = None,
+    folder: Folder = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="Only say which jobs would run.")] = False,
+    plain: Annotated[
+        bool, typer.Option("--plain", help="Print a line for every job instead of the live view.")
+    ] = False,
+) -> None:
+    """Run a campaign; what is there and up to date is not computed again.
+
+    Ends with what failed, and where figures, dataset and report are. Exit status: 0 if everything was made, 1 if
+    something failed (the rest is made all the same), 2 if the campaign cannot be run.
+
+    Ctrl-C stops it; the next call goes on where it was.
+    """
+    home = project()
+    asked = list(targets or [])
+    if config is not None and config in TARGETS and not Path(config).is_file():
+        config, asked = None, [config, *asked]  # `icha run figures`
+    elif config is not None and config.startswith("-"):
+        config, asked = None, [config, *asked]  # `icha run -- --forceall`
+    path = configuration_path(config)
+    campaign = read_configuration(path).campaign
+    folder = (folder or home).resolve()
+    command = [
+        *(sys.executable, "-m", "snakemake", *asked),
+        *("--snakefile", str(home / "Snakefile"), "--directory", str(folder)),
+        *(["--configfile", str(path.resolve())] if path.resolve() != (home / DEFAULT).resolve() else []),
+        *(["--cores", cores] if cores else []),
+        *(["--profile", str(_profile(profile, home))] if profile else []),
+    ]
+    if dry_run:
+        raise typer.Exit(subprocess.run([*command, "--dry-run"], cwd=home).returncode and FAILED)
+    from rich.console import Console
+
+    from icha.cli.events import Watch
+    from icha.cli.live import LiveView, PlainView
+    from icha.cli.plan import expected_seconds
+
+    console = Console()
+    watch = Watch(expected_seconds(campaign, folder / "results" / campaign.name))
+    if plain or not console.is_terminal:
+        view = PlainView(watch, campaign.name, folder, lambda line: print(line, flush=True))
+    else:
+        view = LiveView(watch, campaign.name, folder, console)
+    log = _log_file(folder, campaign.name)
+    status = _follow([*command, "--logger", "icha"], home, log, watch, view)
+    if not _tell(status, watch, campaign, folder, log):
+        raise typer.Exit(FAILED)
+
+
+def _profile(asked: str, home: Path) -> Path:
+    for path in (Path(asked), home / "profiles" / asked):
+        if (path / "config.yaml").is_file():
+            return path.resolve()
+    there = sorted(path.parent.name for path in (home / "profiles").glob("*/config.yaml"))
+    raise Mistake(f"--profile {asked}: no folder with a config.yaml; there are: {', '.join(there)}")
+
+
+def _log_file(folder: Path, campaign: str) -> Path:
+    """A new file beside Snakemake's own logs."""
+    logs = folder / ".snakemake/log"
+    try:
+        logs.mkdir(parents=True, exist_ok=True)
+        file, name = tempfile.mkstemp(prefix=f"icha-{campaign}-", suffix=".log", dir=logs)
+    except OSError as error:
+        raise Mistake(f"{folder} cannot be written to: {error}") from None
+    os.close(file)
+    return Path(name)
+
+
+def _follow(command: list[str], home: Path, log: Path, watch, view) -> int:
+    """Run Snakemake, feed its events to `watch` and what ends to `view`; return its exit status."""
+    reading, writing = os.pipe()
+    found = [str(PLUGINS), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = os.environ | {"ICHA_EVENTS": str(writing), "PYTHONPATH": os.pathsep.join(found)}
+    with view, log.open("w", encoding="utf-8") as said:
+        # In a process group of its own, so that Ctrl-C comes to it and its jobs once, from here.
+        process = subprocess.Popen(
+            command,
+            cwd=home,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            pass_fds=[writing],
+            process_group=0,
+        )
+        os.close(writing)
+
+        def stop(number, frame):
+            view.remark("stopping")
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, number)
+
+        former = {number: signal.signal(number, stop) for number in _SIGNALS}
+        try:
+            listener = threading.Thread(target=_listen, args=(reading, watch, view), daemon=True)
+            listener.start()
+            status = process.wait()
+            # What a job has left running may hold the pipe open; everything was said by now.
+            listener.join(timeout=2)
+        finally:
+            for number, handler in former.items():
+                signal.signal(number, handler)
+    return status
+
+
+def _listen(reading: int, watch, view) -> None:
+    with open(reading, encoding="utf-8") as events:
+        for line in events:
+            event = json.loads(line)
+            job = watch.take(event)
+            if job is not None:
+                view.ended(job, failed=event["event"] == "job_error")
+
+
+def _tell(status: int, watch, campaign, folder: Path, log: Path) -> bool:
+    """Print what has become of the campaign; return whether all is well."""
+    from icha.cli.events import reason_of
+    from icha.cli.live import duration
+    from icha.cli.plan import failed_runs
+
+    results = folder / "results" / campaign.name
+    ended = len(watch.done) + len(watch.failed)
+    if status == 0 and watch.started is None:
+        log.unlink(missing_ok=True)
+        print("Nothing to do: everything that was asked for is there and up to date.")
+    elif watch.started is not None:
+        took = duration(watch.clock() - watch.started)
+        print(f"{ended} of {counted(watch.job_count, 'job')} ended in {took}, {len(watch.failed)} failed")
+    incomplete = failed_runs(campaign, results) if status else {}
+    if incomplete:
+        _heading(f"{counted(len(incomplete), 'run')} could not be computed to the end:")
+        for path, reason in incomplete.items():
+            _reason(path, [reason])
+    if watch.failed:
+        _heading(f"{counted(len(watch.failed), 'job')} failed:")
+        for job in watch.failed:
+            logs = ", ".join(str(shown(folder / name)) for name in job.logs)
+            # The verdict repeats the runs that were just listed.
+            reason = [line for line in reason_of(job, folder) if not any(line.startswith(path) for path in incomplete)]
+            _reason(job.title, reason or [f"it ended without a word; see {logs or log}"])
+            if logs:
+                typer.echo(f"    log: {logs}")
+    kept_back = watch.job_count - ended
+    if status < 0 or (status and watch.started is not None and kept_back and not watch.failed):
+        _heading(f"Stopped before the end; {counted(kept_back, 'job')} not done. The same command goes on from here.")
+    elif status and kept_back:
+        typer.echo(f"{counted(kept_back, 'job')} not done, for want of what failed")
+    if status and watch.started is None:
+        _heading("Snakemake could not start:")
+        for line in log.read_text(encoding="utf-8", errors="replace").splitlines()[-_MOST_LINES:]:
+            typer.echo(f"    {line}")
+    for what, path in (
+        ("figures", results / "figures"),
+        ("dataset", results / "dataset" / f"{campaign.name}.nc"),
+        ("report", results / "report.html"),
+    ):
+        if path.exists():
+            print(f"{what + ':':<9}{shown(path)}")
+    if status:
+        typer.echo(f"log:     {shown(log)}")
+    return status == 0
+
+
+def _heading(text: str) -> None:
+    typer.secho(text, fg="red")
+
+
+def _reason(name: str, lines: list[str]) -> None:
+    typer.secho(f"  {name}", bold=True)
+    for line in lines[:_MOST_LINES]:
+        typer.echo(f"    {line}")
+    if len(lines) > _MOST_LINES:
+        typer.echo(f"    … and {len(lines) - _MOST_LINES} more lines in its log")

@@ -1,0 +1,159 @@
+"""Look into a file: what it is, its numbers in short, and a quick plot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from icha.cli.project import Mistake
+
+_BARS = " ▁▂▃▄▅▆▇█"
+_WIDTH = 60
+_CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_separation": "u/h_rms"}
+
+
+def show(
+    file: Annotated[Path, typer.Argument(help="A run, surface or campaign dataset (.nc).")],
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw it into this file (.png, .pdf or .svg).", show_default=False)
+    ] = None,
+    study: Annotated[
+        str | None, typer.Option(help="Study of a campaign dataset. Left out: all of them.", show_default=False)
+    ] = None,
+) -> None:
+    """Show what is in a file: a run, a surface or a campaign dataset; --plot draws it."""
+    if plot is not None and plot.suffix not in (".png", ".pdf", ".svg"):
+        raise Mistake(f"--plot {plot}: ends in {plot.suffix!r}; allowed: .png, .pdf, .svg")
+    from icha.cli.quick_plot import draw
+    from icha.format import CAMPAIGN, RUN, SURFACE, UnknownFile, kind_of
+
+    try:
+        kind, data = kind_of(file)
+    except UnknownFile as error:
+        raise Mistake(str(error)) from None
+    if kind == CAMPAIGN:
+        studies = list(data.children)
+        if study is not None and study not in studies:
+            raise Mistake(f"--study {study}: there is none in {file}; there are: {', '.join(studies)}")
+        data = data if study is None else data.filter(lambda node: node.name in (None, data.name, study))
+    if kind == RUN:
+        show_run(data, str(file))
+    elif kind == SURFACE:
+        _show_surface(data, file)
+    else:
+        _show_campaign(data, file)
+    if plot is not None:
+        draw(kind, data, plot)
+        typer.echo(f"drawn:   {plot}")
+
+
+def show_run(run, name: str) -> None:
+    """Print what a run was and what came out."""
+    from icha.figures.style import quantity
+
+    def value(variable):
+        return float(run[variable])
+
+    say = typer.echo
+    say(f"{name}: {run.attrs.get('title', 'run')}")
+    place = [run.attrs[key] for key in ("campaign", "study") if run.attrs.get(key)]
+    if place:
+        say(f"campaign {' and study '.join(place)}")
+    say(
+        f"material: E* {quantity(value('contact_modulus'), 'Pa')}, surface energy "
+        f"{quantity(value('surface_energy'), 'J/m²')}, range {quantity(value('interaction_range'), 'm')}, "
+        f"Tabor parameter {value('tabor_parameter'):.3g}"
+    )
+    say(
+        f"surface:  period {quantity(value('period'), 'm')}, rms slope {value('rms_slope'):.4g}, rms height "
+        f"{quantity(value('rms_height'), 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
+    )
+    if "incomplete" in run.attrs:
+        typer.secho(f"failed:   {run.attrs['incomplete']}", fg="red")
+    steps = run.sizes["step"]
+    if not steps:
+        say("no step was reached")
+        return
+    residual = float(run["residual"].max())
+    say(f"{steps} steps, {run.sizes.get('snapshot', 0)} snapshots, residual at most {residual:.1e} h_rms")
+    for variable, label in _CURVES.items():
+        values = run[variable].values
+        say(f"{label:>8} {sparkline(values)} {values.min():.3g} to {values.max():.3g}")
+    if "hysteresis_loss" in run:
+        say(
+            f"pull-off: {quantity(-value('pull_off_pressure'), 'Pa')} of tension; "
+            f"loss {value('hysteresis_loss'):.3g} J/m²"
+        )
+    say("")
+    say("  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
+    for k in _some(steps):
+        row = run.isel(step=k)
+        say(
+            f"{k:>6}  {float(row['reduced_pressure']):>16.4e}   {float(row['contact_area_fraction']):.4e}   "
+            f"{float(row['reduced_separation']):>8.4f}   {int(row['spot_count']):>6}"
+        )
+
+
+def _some(count: int, most: int = 12) -> list[int]:
+    """At most so many indices, evenly spread from the first to the last."""
+    if count <= most:
+        return list(range(count))
+    return sorted({round(k * (count - 1) / (most - 1)) for k in range(most)})
+
+
+def _show_surface(surface, file) -> None:
+    from icha.figures.style import quantity
+
+    say = typer.echo
+    say(f"{file}: {surface.attrs.get('title', 'surface')}")
+    for key in ("summary", "boundary", "source_file", "preparation"):
+        if key in surface.attrs:
+            say(f"{key.replace('_', ' ')}: {surface.attrs[key]}")
+    say("")
+    for name in surface.data_vars:
+        variable = surface[name]
+        if variable.ndim == 0 and variable.dtype.kind in "fiu":
+            unit = variable.attrs.get("units", "1")
+            text = quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g}"
+            say(f"{variable.attrs.get('long_name', name)}: {text}{'' if unit in ('1', 'm') else f' {unit}'}")
+    heights = surface["height"].values
+    say(f"heights from {heights.min():.3g} to {heights.max():.3g} m, as stored; a line through the middle:")
+    say(f"  {sparkline(heights[len(heights) // 2])}")
+
+
+def _show_campaign(tree, file) -> None:
+    say = typer.echo
+    say(f"{file}: {tree.attrs.get('title', 'campaign')}")
+    say(tree.attrs.get("summary", ""))
+    for name, node in tree.children.items():
+        study = node.to_dataset()
+        sizes = ", ".join(f"{study.sizes[d]} {d}" for d in ("surface", "seed", "rms_slope", "material"))
+        status = study["status"].values.ravel()
+        meanings = study["status"].attrs.get("flag_meanings", "").split()
+        numbers = {word: int((status == k).sum()) for k, word in enumerate(meanings)}
+        counts = ", ".join(f"{number} {word}" for word, number in numbers.items() if number)
+        say(f"\n{name}: {sizes}; {counts}")
+        for label, variable in (("A/A0", "contact_area_fraction"), ("p*", "reduced_pressure")):
+            values = study[variable].values
+            if (known := values[values == values]).size:
+                say(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
+        if "failure" in study:
+            for where in zip(*(study["failure"] != "").values.nonzero(), strict=True):
+                labels = [str(study[d].values[k]) for d, k in zip(study["failure"].dims, where, strict=True)]
+                typer.secho(f"  failed: {', '.join(labels)}: {study['failure'].values[where]}", fg="red")
+
+
+def sparkline(values) -> str:
+    """A row of bars, at most 60, as high as the values are between their least and their largest."""
+    import numpy as np
+
+    values = np.asarray(values, dtype=float)
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return ""
+    if values.size > _WIDTH:
+        values = values[np.linspace(0, values.size - 1, _WIDTH).round().astype(int)]
+    span = np.ptp(values) or 1.0
+    return "".join(_BARS[1 + round((value - values.min()) / span * 7)] for value in values)

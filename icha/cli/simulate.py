@@ -1,0 +1,153 @@
+"""One surface against one material, without the workflow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from icha.cli.project import FAILED, Mistake
+
+
+def _length(value: str | None) -> float | None:
+    return None if value is None else _si(value, "m", "100 um")
+
+
+def _si(value: str, si_unit: str, example: str) -> float:
+    from icha.configuration.units import to_si
+
+    try:
+        return to_si(value, si_unit)
+    except ValueError as error:
+        raise typer.BadParameter(f"{value!r}: {error}; allowed: such as {example!r}") from None
+
+
+def _numbers(value: str | None) -> list[float] | None:
+    try:
+        return None if value is None else [float(part) for part in value.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"{value!r} is no list of numbers; allowed: such as 1e-3,1e-2") from None
+
+
+def _modulus(value: str) -> float:
+    return _si(value, "Pa", "25 MPa")
+
+
+def _energy(value: str) -> float:
+    return _si(value, "J/m^2", "50 mJ/m^2")
+
+
+def _unset(text: str, callback=None):
+    """An option without a default value; the text says what its absence means."""
+    return typer.Option(help=text, callback=callback, show_default=False)
+
+
+def simulate(
+    output: Annotated[Path, typer.Argument(help="Run file to write (.nc).")],
+    surface: Annotated[
+        Path | None,
+        _unset(
+            "Topography: a surface file of a campaign, or heights in m as .npy with --period. Left out: one is made."
+        ),
+    ] = None,
+    period: Annotated[str, typer.Option(help="Side of the periodic cell.", callback=_length)] = "100 um",
+    rolloff: Annotated[str, typer.Option(help="Roll-off wavelength.", callback=_length)] = "20 um",
+    short: Annotated[str | None, _unset("Short cut-off wavelength. Left out: 8 grid cells.", _length)] = None,
+    hurst: Annotated[float, typer.Option(help="Hurst exponent.")] = 0.8,
+    grid: Annotated[int, typer.Option(help="Grid points along a side.")] = 128,
+    seed: Annotated[int, typer.Option(help="Seed of the random phases.")] = 1,
+    rms_slope: Annotated[float | None, _unset("Rms slope to scale to. Left out: 1, or the file's own.")] = None,
+    modulus: Annotated[str, typer.Option(help="Contact modulus E*.", callback=_modulus)] = "25 MPa",
+    energy: Annotated[str, typer.Option(help="Surface energy.", callback=_energy)] = "50 mJ/m^2",
+    interaction_range: Annotated[
+        str, typer.Option("--range", help="Range of the attraction.", callback=_length)
+    ] = "2 nm",
+    pressures: Annotated[
+        str | None, _unset("Stops p/(E* h'rms), increasing. Left out: 1e-3,3e-3,1e-2,3e-2.", _numbers)
+    ] = None,
+    areas: Annotated[str | None, _unset("Stops instead: contact area fractions A/A0, increasing.", _numbers)] = None,
+    unload: Annotated[bool, typer.Option("--unload", help="Pull the surfaces apart again.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if it is there.")] = False,
+) -> None:
+    """Press one surface against one material and write the run, without a campaign.
+
+    `icha show FILE` shows what came out. Exit status 1 if the path could not be followed to its end; the file then
+    holds the stops that were reached, and says why there are no more.
+    """
+    if output.exists() and not force:
+        raise Mistake(f"{output} is there already; --force replaces it")
+    if not output.absolute().parent.is_dir():
+        raise Mistake(f"{output}: no such folder as {output.parent}")
+    from icha.cli.show import show_run
+    from icha.material import Material
+    from icha.path import Path as LoadingPath
+    from icha.records import write_dataset
+    from icha.simulation import ConvergenceError
+    from icha.simulation import simulate as press
+
+    try:
+        topography = _topography(surface, period, rolloff, short, hurst, grid, seed, rms_slope)
+        material = Material(modulus, energy, interaction_range)
+        if pressures is None and areas is None:
+            pressures = [1e-3, 3e-3, 1e-2, 3e-2]
+        path = LoadingPath(pressures, areas, unload=unload)
+        with _Progress(len(path.targets)) as progress:
+            run = press(topography, material, path, seed=seed if surface is None else -1, progress=progress)
+    except ConvergenceError as error:
+        run = error.dataset
+    except ValueError as error:
+        raise Mistake(str(error)) from None
+    write_dataset(run, output)
+    show_run(run, str(output))
+    if "incomplete" in run.attrs:
+        raise typer.Exit(FAILED)
+
+
+def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope):
+    from icha.spectrum import SelfAffineSpectrum
+    from icha.surface import Surface
+
+    if file is None:
+        slope = 1.0 if rms_slope is None else rms_slope
+        return SelfAffineSpectrum(period, rolloff, short or 8 * period / max(grid, 1), hurst, slope).realise(grid, seed)
+    if file.suffix == ".npy":
+        from icha.configuration.height_map import read_height_map
+
+        try:
+            found = Surface(read_height_map(file, 1.0), period)
+        except ValueError as error:
+            raise ValueError(f"{file}: {error}") from None
+    else:
+        from icha.records import read_surface
+
+        found = read_surface(file)
+    return found if rms_slope is None else found.scaled_to_rms_slope(rms_slope)
+
+
+class _Progress:
+    """A progress bar over the stops of a path, on the standard error."""
+
+    def __init__(self, stops: int):
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        self._bar = Progress(
+            TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.description}"),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._bar.add_task("first contact", total=stops)
+
+    def __enter__(self):
+        self._bar.start()
+        return self._tell
+
+    def __exit__(self, *error):
+        self._bar.stop()
+
+    def _tell(self, line: str) -> None:
+        self._bar.update(self._task, advance=line.startswith("stop "), description=line)
