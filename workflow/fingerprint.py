@@ -35,6 +35,16 @@ def code_fingerprint(script: str | Path, *modules: str) -> str:
     return digest.hexdigest()[:16]
 
 
+def imported_modules(*scripts: Path) -> list[str]:
+    """Names of the modules of the package that some scripts import at their top."""
+    names = {}
+    for script in scripts:
+        for node in _tree(script).body:
+            if isinstance(node, ast.ImportFrom) and node.module.split(".")[0] == PACKAGE:
+                names[node.module] = None
+    return list(names)
+
+
 @cache
 def _package_folder() -> Path:
     # The package that jobs will import, wherever it is installed.

@@ -5,9 +5,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(workflow.basedir, "workflow")))
 
+import warm
 from campaign_lock import hold_lock
 from command_line import campaign_configuration
-from fingerprint import code_fingerprint
+from fingerprint import code_fingerprint, imported_modules
 
 from icha.configuration.expansion import (
     asperity_cases,
@@ -69,11 +70,11 @@ wildcard_constraints:
     entry="[a-z0-9_-]+",
     asperity="hertz|mu[0-9.]+",
     study="[a-z0-9_-]+",
-    surface="[a-z0-9_-]+",
+    surface="[A-Za-z0-9_.+-]+",
     seed=r"\d+",
     slope=r"[0-9.e+-]+",
     pressure=r"[0-9.e+-]+",
-    material="[a-z0-9_-]+",
+    material="[A-Za-z0-9_.+-]+",
 
 
 def code_of(script, *modules):
@@ -217,5 +218,18 @@ def measurements_of(name):
     return measurement_settings(CAMPAIGN, CAMPAIGN.figures.drawn()[name].study)
 
 
+def warm_modules():
+    """Modules that the scripts of the campaign's jobs import."""
+    modules = imported_modules(*sorted(Path(workflow.basedir, "workflow/scripts").glob("*.py")))
+    return [
+        "snakemake.logging",
+        "snakemake.iocontainers",
+        *modules,
+        *map("icha.figures.{}".format, CAMPAIGN.figures.drawn()),
+    ]
+
+
 onstart:
     hold_lock(f".snakemake/{CAMPAIGN.name}.lock")
+    if workflow.local_exec:
+        warm.start(warm_modules())

@@ -1,9 +1,23 @@
-"""What the scripts of all jobs share: where they write what they have to say, and how they fail."""
+"""What the scripts of all jobs share: who runs them, where they write what they have to say, and how they fail.
 
+Imported before anything else, for a script that is handed over to the warm process (`workflow/warm.py`) must not spend
+seconds on imports of its own.
+"""
+
+import json
 import os
+import resource
 import sys
 import traceback
 from contextlib import contextmanager
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from warm import hand_over
+
+if hasattr(sys.modules["__main__"], "snakemake"):
+    hand_over(sys.argv[0])
 
 
 def _failures_of_solvers():
@@ -21,7 +35,7 @@ def logged(log):
     """Send all output to the file `log`; an error ends the job with its message there.
 
     The errors that users can mend say all in their message. The traceback of any other one is for the developers
-    and is kept beside the log.
+    and is kept beside the log; so is what the job took, which Snakemake cannot see of one that was handed over.
     """
     with open(log, "w", encoding="utf-8", buffering=1) as file:
         sys.stdout.flush()
@@ -38,3 +52,7 @@ def logged(log):
                     traceback.print_exc(file=details)
                 print(f"Details for the developers: {log}.traceback")
             sys.exit(1)
+        finally:
+            took = resource.getrusage(resource.RUSAGE_SELF)
+            usage = {"cpu_seconds": round(took.ru_utime + took.ru_stime, 3), "megabytes": took.ru_maxrss // 1024}
+            Path(log).with_suffix(".usage.json").write_text(json.dumps(usage) + "\n", encoding="ascii")
