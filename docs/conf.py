@@ -35,7 +35,7 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
-autodoc_default_options = {"members": True, "undoc-members": False, "inherited-members": False}
+autodoc_default_options = {"members": True}
 add_module_names = False
 
 html_theme = "furo"

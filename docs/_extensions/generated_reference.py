@@ -192,15 +192,37 @@ def always_read(app, env, added, changed, removed):
 ENTRY = re.compile(r"^(?P<indent>\s*)(?P<names>[*\w]+(?:, [*\w]+)*) : (?P<text>.+)$")
 
 
+# Stand for what is returned, and for a colon in the first line of an attribute, while napoleon, which would take what
+# is there for a type, is at work.
+RETURNED, COLON = "RETURNED", "\ue000"
+
+
 def plain_docstring(app, what, name, obj, options, lines):
     """Take `name : text` of a list of parameters for the description that it is, and bars and asterisks for signs."""
-    inside, new = False, []
+    section, new, returned = "", [], []
     for number, line in enumerate(lines):
         if number + 1 < len(lines) and re.fullmatch(r"-{3,}", lines[number + 1].strip()):
-            inside = line.strip() == "Parameters"
-        match = ENTRY.match(line) if inside else None
-        new += [f"{match['indent']}{match['names']}", f"{match['indent']}    {match['text']}"] if match else [line]
+            section = line.strip()
+            new.append(line)
+            continue
+        match = ENTRY.match(line) if section == "Parameters" else None
+        if match:
+            new += [f"{match['indent']}{match['names']}", f"{match['indent']}    {match['text']}"]
+        elif section == "Returns" and line.strip() and not re.fullmatch(r"-{3,}", line.strip()):
+            new += [] if returned else [RETURNED]
+            returned.append(line.strip())
+        else:
+            new.append(line)
+    app.env.temp_data["returned"] = " ".join(returned)
+    if what in ("attribute", "property") and new:
+        new[0] = new[0].replace(":", COLON)
     lines[:] = [_literal(line) for line in new]
+
+
+def what_is_returned(app, what, name, obj, options, lines):
+    """Put what is returned back in its place."""
+    text = _literal(app.env.temp_data.get("returned", ""))
+    lines[:] = [re.sub(rf"\*{RETURNED}\*", lambda match: text, line).replace(COLON, ":") for line in lines]
 
 
 def _literal(line):
@@ -215,4 +237,5 @@ def setup(app):
     app.connect("env-get-outdated", always_read)
     # Before napoleon, which turns sections into fields.
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)
+    app.connect("autodoc-process-docstring", what_is_returned, priority=600)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
