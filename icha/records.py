@@ -26,8 +26,8 @@ from icha.netcdf import (
     define_text,
     is_text,
 )
-from icha.roughness import SpectralMoments, spectral_moments
-from icha.surface import Surface
+from icha.roughness import SpectralMoments, radial_power_spectrum, spectral_moments
+from icha.surface import PERIODIC, Surface
 
 # Larger arrays are heights: a fifth less space would take half a minute for 8192 nodes a side.
 _COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
@@ -169,9 +169,10 @@ def write_surface(
     name: str,
     seed: int,
     spectrum=None,
+    measured=None,
     attrs: Mapping[str, str] = {},
 ) -> None:
-    """Write a topography, the statistics of its grid and, if it was synthesised, its spectrum's parameters.
+    """Write a topography, its statistics and power spectrum, and where it comes from.
 
     Parameters
     ----------
@@ -179,6 +180,7 @@ def write_surface(
     surface : the topography; the campaigns keep it at rms slope 1.
     name, seed : what the campaign calls it.
     spectrum : the `icha.spectrum.SelfAffineSpectrum` that it realises, if any.
+    measured : the `icha.topography.PreparedTopography` whose heights, scaled, it has, if any.
     attrs : further global attributes.
     """
     n = surface.grid
@@ -188,18 +190,26 @@ def write_surface(
         return xr.Variable(dims, value, {"units": units, "long_name": long_name})
 
     moments = spectral_moments(surface)
+    wave_number, power = radial_power_spectrum(surface)
     variables = {
         "height": variable(("y", "x"), surface.heights, "m", "height towards the elastic body"),
-        "period": variable((), surface.period, "m", "side of the periodic cell"),
+        "period": variable((), surface.period, "m", "side of the periodic cell, or of the free square"),
         "grid": variable((), np.int32(n), "1", "nodes along a side"),
         "seed": variable((), np.int32(seed), "1", "seed of the random phases"),
-        "rms_slope": variable((), surface.rms_slope, "1", "root mean square slope, from the spectrum"),
+        "rms_slope": variable((), surface.rms_slope, "1", "root mean square slope"),
         "rms_height": variable((), surface.rms_height, "m", "root mean square height"),
         "rms_curvature": variable((), surface.rms_curvature, "m-1", "root mean square curvature of a profile"),
         "spectral_moment_0": variable((), moments.m0, "m2", "variance of a profile's height"),
         "spectral_moment_2": variable((), moments.m2, "1", "variance of a profile's slope"),
         "spectral_moment_4": variable((), moments.m4, "m-2", "variance of a profile's curvature"),
         "nayak_parameter": variable((), moments.nayak_parameter, "1", "Nayak's parameter m0 m4/m2^2"),
+        "psd_wavevector": variable("psd_bin", wave_number, "rad m-1", "mean wave number of a ring of wave vectors"),
+        "power_spectrum": variable(
+            "psd_bin",
+            power,
+            "m4",
+            "isotropic power spectrum C(q); its integral over the plane is the variance of height",
+        ),
     }
     if spectrum is not None:
         variables |= {
@@ -207,15 +217,27 @@ def write_surface(
             "short_wavelength": variable((), spectrum.short_wavelength, "m", "short cut-off wavelength"),
             "hurst": variable((), spectrum.hurst, "1", "Hurst exponent"),
         }
+    if measured is not None:
+        variables["measured_rms_slope"] = variable(
+            (), measured.rms_slope, "1", "root mean square slope of the measurement as prepared, before scaling"
+        )
     coords = {axis: variable((axis,), nodes, "m", f"{axis} of the nodes") for axis in ("x", "y")}
-    kind = "Self-affine surface" if spectrum is not None else "Measured or computed surface"
+    kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
+    if measured is not None:
+        kind = "Measured topography"
+        origin = {
+            "source_file": measured.source_file,
+            "source_sha256": measured.source_sha256,
+            "preparation": measured.description,
+        }
     title = {
         "title": f"Topography {name}, seed {seed}",
-        "summary": f"{kind} on a periodic grid of {n} by {n} nodes.",
+        "summary": f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
         "Conventions": "CF-1.11",
         "surface": name,
+        "boundary": surface.boundary,
     }
-    write_dataset(xr.Dataset(variables, coords, title | dict(attrs)), path)
+    write_dataset(xr.Dataset(variables, coords, title | origin | dict(attrs)), path)
 
 
 def read_surface(path: str | os.PathLike) -> Surface:
@@ -231,7 +253,8 @@ def read_surface(path: str | os.PathLike) -> Surface:
         if name not in dataset:
             raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
     try:
-        return Surface(dataset["height"].transpose("y", "x").values, float(dataset["period"]))
+        heights = dataset["height"].transpose("y", "x").values
+        return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from icha.configuration.topography import MeasuredSurface
+from icha.records import read_dataset, read_surface, write_surface
 from icha.roughness import radial_power_spectrum
 from icha.spectrum import SelfAffineSpectrum
 from icha.surface import Surface
@@ -538,3 +539,36 @@ def test_wrong_sections_are_refused_in_words(change, words):
         MeasuredSurface.model_validate(SECTION | change)
     for word in words:
         assert word in str(raised.value)
+
+
+# --- the surface file ----------------------------------------------------------------------------------------
+
+
+def test_surface_file_says_where_a_measurement_comes_from(tmp_path, prepared):
+    result = prepared(np.random.default_rng(6).normal(size=(24, 24)), boundary="free")
+    unit = result.surface.scaled_to_rms_slope(1.0)
+    for name in ("one.nc", "two.nc"):
+        write_surface(tmp_path / name, unit, name="scan", seed=0, measured=result)
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+    file = read_dataset(tmp_path / "one.nc")
+    assert file.attrs["boundary"] == "free" and file.attrs["source_file"] == "scan.npy"
+    assert file.attrs["source_sha256"] == result.source_sha256
+    assert file.attrs["preparation"] == result.description
+    assert float(file["measured_rms_slope"]) == result.rms_slope and float(file["rms_slope"]) == pytest.approx(1.0)
+    # Heights times the measured slope are those of the measurement.
+    again = read_surface(tmp_path / "one.nc")
+    assert again.free
+    np.testing.assert_allclose(again.scaled_to_rms_slope(result.rms_slope).heights, result.surface.heights, atol=1e-13)
+
+
+def test_surface_files_of_all_kinds_have_their_power_spectrum(tmp_path):
+    spectrum = SelfAffineSpectrum(1.0, 0.5, 0.1, 0.8)
+    write_surface(tmp_path / "s.nc", spectrum.realise(64, 1), name="rough", seed=1, spectrum=spectrum)
+    file = read_dataset(tmp_path / "s.nc")
+    assert file.attrs["boundary"] == "periodic" and "source_file" not in file.attrs
+    q, power = file["psd_wavevector"].values, file["power_spectrum"].values
+    assert file["power_spectrum"].attrs["units"] == "m4" and file["psd_wavevector"].attrs["units"] == "rad m-1"
+    # The integral over the plane of wave vectors, ring by ring, is the mean square height.
+    edges = np.concatenate([[0.5 * 2 * np.pi], 0.5 * (q[1:] + q[:-1]), [q[-1]]])
+    variance = np.sum(np.pi * np.diff(edges**2) * power)
+    assert variance == pytest.approx(float(file["rms_height"]) ** 2, rel=0.1)

@@ -6,19 +6,24 @@ from icha.configuration.height_map import read_height_map
 from icha.records import write_surface
 from icha.spectrum import SelfAffineSpectrum
 from icha.surface import Surface
+from icha.topography import prepared_topography
 
 SPECTRUM = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
 
 
 def make_surface(output, *, name, seed, settings, height_map=None, attributes):
     """Write the surface `name` to `output`; `settings` are those of the configuration, in SI units."""
-    spectrum = None
+    spectrum = measured = None
     if settings["kind"] == "self_affine":
         spectrum = SelfAffineSpectrum(**{key: settings[key] for key in SPECTRUM})
         surface = spectrum.realise(settings["grid"], seed, amplitudes=settings["amplitudes"])
+    elif settings["kind"] == "measured":
+        measured = prepared_topography(height_map, {key: settings[key] for key in settings if key != "kind"})
+        surface = measured.surface
     else:
         surface = Surface(read_height_map(height_map, settings["metres_per_unit"]), settings["period"])
-    write_surface(output, surface.scaled_to_rms_slope(1.0), name=name, seed=seed, spectrum=spectrum, attrs=attributes)
+    surface = surface.scaled_to_rms_slope(1.0)
+    write_surface(output, surface, name=name, seed=seed, spectrum=spectrum, measured=measured, attrs=attributes)
 
 
 if "snakemake" in globals():
