@@ -79,6 +79,11 @@ class Surface:
         """Whether it is a single square."""
         return self.boundary == FREE
 
+    def require_periodic(self, what: str) -> None:
+        """Raise ValueError, naming what it is for, if the surface is a free square."""
+        if self.free:
+            raise ValueError(f"boundary: {FREE!r}; {what} needs a surface of boundary {PERIODIC!r}")
+
     def by_wave_vector(self, function) -> list:
         """Results of `function(k2, count, power)` for all wave vectors 2 pi/L (kx, ky) but zero, in blocks.
 
@@ -153,9 +158,14 @@ class Surface:
 
     def refined(self, factor: int) -> Surface:
         """The same topography on a grid `factor` times as fine, by its trigonometric interpolant; old nodes keep their
-        heights. A free square has no such interpolant: ValueError."""
-        if self.free:
-            raise ValueError(f"boundary: {FREE!r} has no trigonometric interpolant; allowed: {PERIODIC!r}")
+        heights.
+
+        Raises
+        ------
+        ValueError
+            If the factor is not an integer of at least 1, or the surface is a free square.
+        """
+        self.require_periodic("a trigonometric interpolant")
         if integer("factor", factor, 1) == 1:
             return self
         # Slow to import, and seldom needed.

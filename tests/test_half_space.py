@@ -13,6 +13,8 @@ from icha.fields import DisplacementField, displacement_field
 from icha.images import _image_potential
 from icha.jkr import JKR
 from icha.observables import contact_cover, covered_nodes, displacement, gap, gap_distribution
+from icha.reference.boundary_elements import boundary_elements
+from icha.reference.error_sources import error_sources
 
 MODULUS, RANGE = 1.0, 1e-3
 ENERGIES = [0.0, 3e-4]
@@ -292,8 +294,11 @@ def test_moments_of_a_free_square_are_means_over_it():
     assert surface.spectral_moments[1:] == pytest.approx((slope, 0.36), rel=1e-10)
     scaled = surface.scaled_to_rms_slope(0.7)
     assert scaled.free and scaled.rms_slope == pytest.approx(0.7, rel=1e-12)
-    with pytest.raises(ValueError, match="free"):
-        surface.refined(2)
+    for periodic_only in (lambda: surface.refined(2), lambda: boundary_elements(surface, law(0.0).material, 1e-3)):
+        with pytest.raises(ValueError, match="boundary: 'free'"):
+            periodic_only()
+    with pytest.raises(ValueError, match="boundary: 'free'"):
+        error_sources(surface, law(0.0).material, [1e-3])
     with pytest.raises(ValueError, match="boundary: 'open' must be one of periodic, free"):
         icha.Surface(surface.heights, 1.0, boundary="open")
 

@@ -244,6 +244,7 @@ def _silent(line):
 
 def resolved(surface, material, refinement, say):
     """The surface on the solution's grid, which has to resolve the attraction."""
+    surface.require_periodic("the solution by boundary elements")
     fine = surface.refined(integer("refinement", refinement, 1))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
     if material.surface_energy > 0:

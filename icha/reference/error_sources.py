@@ -210,6 +210,7 @@ def error_sources(
     icha.reference.boundary_elements.NotSolved, icha.equilibrium.NotConverged
         If a variant was not solved.
     """
+    surface.require_periodic("the comparison with boundary elements")
     path = Path(reduced_pressures=reduced_pressures)
     pressures = [target.value for target in path.targets]
     if integer("refinement", refinement, 2) % 2:
