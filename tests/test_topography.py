@@ -88,6 +88,26 @@ def test_xyz_in_any_order(tmp_path, separator):
     assert_read(scan(tmp_path / "scan.txt", height_unit=NM, lateral_unit=UM, size=SIZE))
 
 
+def test_text_files_of_the_challenge(tmp_path):
+    """Remarks, numbers with commas and blanks between them, an empty line after every line of points."""
+    x = np.arange(8) / 8
+    heights = np.round(np.random.default_rng(2).normal(size=(8, 8)), 5)
+    lines = ["# surface", "# x, y, h"]
+    for row, y in zip(heights, x, strict=True):
+        lines += [f"{x_k:.6f}, {y:.6f}, {h:.5f}" for x_k, h in zip(x, row, strict=True)] + [""]
+    (tmp_path / "surface.0008x0008.ASCII.xyz.dat").write_text("\n".join(lines) + "\n")
+    matrix = "\n".join(", ".join(f"{h:.5f}" for h in row) + "," for row in heights)
+    (tmp_path / "surface.0008x0008.ASCII.dat").write_text(f"# surface\n{matrix}\n")
+    for name, keys in (
+        ("surface.0008x0008.ASCII.xyz.dat", {}),
+        ("surface.0008x0008.ASCII.dat", {"size": (1e-4, 1e-4)}),
+    ):
+        how = preparation(boundary="periodic", height_unit=1e-4, touches_first="low", **keys)
+        surface = prepared_topography(tmp_path / name, how).surface
+        np.testing.assert_allclose(surface.heights, -1e-4 * centred(heights), atol=1e-18)
+        assert surface.period == pytest.approx(1e-4, rel=1e-12)
+
+
 def test_xyz_without_some_points(tmp_path):
     path = write_xyz(tmp_path / "scan.xyz", np.setdiff1d(np.arange(HEIGHTS.size), [0, 37]))
     heights = scan(path, height_unit=NM).heights
