@@ -219,14 +219,11 @@ def measurements_of(name):
 
 
 def warm_modules():
-    """Modules that the scripts of the campaign's jobs import."""
+    """Modules that the jobs of the campaign import, and those that libraries import when they are first used."""
     modules = imported_modules(*sorted(Path(workflow.basedir, "workflow/scripts").glob("*.py")))
-    return [
-        "snakemake.logging",
-        "snakemake.iocontainers",
-        *modules,
-        *map("icha.figures.{}".format, CAMPAIGN.figures.drawn()),
-    ]
+    figures = [f"icha.figures.{name}" for name in CAMPAIGN.figures.drawn()]
+    late = ["pint", "PIL.PngImagePlugin", "matplotlib.style", "matplotlib.backends.backend_pdf", "fontTools.subset"]
+    return ["snakemake.logging", "snakemake.iocontainers", *modules, *late, *figures]
 
 
 onstart:
