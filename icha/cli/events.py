@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -39,6 +40,8 @@ class Watch:
     ----------
     expected : seconds that the job of an output file is expected to take on one core, by the file's path.
     clock : time in s.
+
+    Whoever reads it while another thread feeds it holds its `lock`.
     """
 
     expected: Mapping[str, float] = field(default_factory=dict)
@@ -49,9 +52,14 @@ class Watch:
     failed: list[Job] = field(default_factory=list)
     cores: int = 1
     started: float | None = None
+    lock: threading.RLock = field(default_factory=threading.RLock)
 
     def take(self, event: Mapping) -> Job | None:
         """Take in one event of the logger plugin; return the job that it has ended, if any."""
+        with self.lock:
+            return self._take(event)
+
+    def _take(self, event):
         match event["event"]:
             case "run_info":
                 counts = {rule: count for rule, count in event["stats"].items() if rule not in (*_TARGETS, "total")}

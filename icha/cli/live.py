@@ -23,7 +23,7 @@ class LiveView:
 
     def __init__(self, watch: Watch, campaign: str, folder: Path, console: Console):
         """Keep what is drawn; `folder` is where paths of logs start."""
-        self._watch, self._campaign, self._folder, self._console = watch, campaign, folder, console
+        self._watch, self._campaign, self.folder, self._console = watch, campaign, folder, console
         self._remark = "planning"
         self._live = Live(get_renderable=self._draw, console=console, refresh_per_second=4, transient=True)
 
@@ -40,7 +40,7 @@ class LiveView:
         """Print a failed job above the table, where it stays."""
         if failed:
             self._console.print(Text(f"failed: {job.title}", style="red"))
-            for line in reason_of(job, self._folder)[:3]:
+            for line in reason_of(job, self.folder)[:3]:
                 self._console.print(Text(f"    {line}", style="red"), overflow="fold")
 
     def remark(self, text: str) -> None:
@@ -48,6 +48,10 @@ class LiveView:
         self._remark = text
 
     def _draw(self):
+        with self._watch.lock:
+            return self._picture()
+
+    def _picture(self):
         watch = self._watch
         if watch.started is None:
             return Text(f"{self._campaign}: {self._remark} …")
@@ -67,7 +71,7 @@ class LiveView:
         lines = []
         for job in sorted(watch.running.values(), key=lambda job: job.started)[:_MOST_JOBS]:
             lines.append(Text(f"▸ {duration(watch.clock() - job.started):>8}  {job.title}", no_wrap=True))
-            if said := last_line(job, self._folder):
+            if said := last_line(job, self.folder):
                 lines.append(Text(f"            {said}", style="dim", no_wrap=True))
         if more := len(watch.running) - _MOST_JOBS:
             lines += [Text(f"  and {more} more", style="dim")] if more > 0 else []
@@ -79,7 +83,7 @@ class PlainView:
 
     def __init__(self, watch: Watch, campaign: str, folder: Path, say: Callable[[str], None]):
         """Keep where the lines go; `folder` is where paths of logs start."""
-        self._watch, self._campaign, self._folder, self._say = watch, campaign, folder, say
+        self._watch, self._campaign, self.folder, self._say = watch, campaign, folder, say
 
     def __enter__(self):
         """Begin."""
@@ -95,7 +99,7 @@ class PlainView:
         what = "failed: " if failed else ""
         count = f"{ended:>{len(str(watch.job_count))}}/{watch.job_count}"
         self._say(f"[{count}, {time_left(watch)}] {what}{job.title} ({duration(job.seconds)})")
-        for line in reason_of(job, self._folder)[:3] if failed else ():
+        for line in reason_of(job, self.folder)[:3] if failed else ():
             self._say(f"    {line}")
 
     def remark(self, text: str) -> None:

@@ -91,8 +91,9 @@ def run(
     else:
         view = LiveView(watch, campaign.name, folder, console)
     log = _log_file(folder, campaign.name)
-    status = _follow([*command, "--logger", "icha"], home, log, watch, view)
-    if not _tell(status, watch, campaign, folder, log):
+    status, stopped = _follow([*command, "--logger", "icha"], home, log, watch, view)
+    _tell(status, stopped, watch, campaign, folder, log)
+    if status:
         raise typer.Exit(FAILED)
 
 
@@ -116,8 +117,12 @@ def _log_file(folder: Path, campaign: str) -> Path:
     return Path(name)
 
 
-def _follow(command: list[str], home: Path, log: Path, watch, view) -> int:
-    """Run Snakemake, feed its events to `watch` and what ends to `view`; return its exit status."""
+def _follow(command: list[str], home: Path, log: Path, watch, view) -> tuple[int, bool]:
+    """Run Snakemake, feed its events to `watch` and what ends to `view`.
+
+    Returns its exit status, and whether it was told to stop.
+    """
+    stopped = []
     reading, writing = os.pipe()
     found = [str(PLUGINS), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = os.environ | {"ICHA_EVENTS": str(writing), "PYTHONPATH": os.pathsep.join(found)}
@@ -136,13 +141,14 @@ def _follow(command: list[str], home: Path, log: Path, watch, view) -> int:
         os.close(writing)
 
         def stop(number, frame):
+            stopped.append(number)
             view.remark("stopping")
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, number)
 
         former = {number: signal.signal(number, stop) for number in _SIGNALS}
         try:
-            listener = threading.Thread(target=_listen, args=(reading, watch, view), daemon=True)
+            listener = threading.Thread(target=_listen, args=(reading, watch, view, stopped), daemon=True)
             listener.start()
             status = process.wait()
             # What a job has left running may hold the pipe open; everything was said by now.
@@ -150,40 +156,46 @@ def _follow(command: list[str], home: Path, log: Path, watch, view) -> int:
         finally:
             for number, handler in former.items():
                 signal.signal(number, handler)
-    return status
+    return status, bool(stopped)
 
 
-def _listen(reading: int, watch, view) -> None:
+def _listen(reading: int, watch, view, stopped: list) -> None:
+    from icha.cli.events import reason_of
+
     with open(reading, encoding="utf-8") as events:
         for line in events:
             event = json.loads(line)
             job = watch.take(event)
-            if job is not None:
-                view.ended(job, failed=event["event"] == "job_error")
+            failed = event["event"] == "job_error"
+            # Jobs that were stopped have not failed.
+            if job is not None and not (failed and stopped and not reason_of(job, view.folder)):
+                view.ended(job, failed)
 
 
-def _tell(status: int, watch, campaign, folder: Path, log: Path) -> bool:
-    """Print what has become of the campaign; return whether all is well."""
+def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) -> None:
+    """Print what has become of the campaign."""
     from icha.cli.events import reason_of
     from icha.cli.live import duration
     from icha.cli.plan import failed_runs
 
     results = folder / "results" / campaign.name
     ended = len(watch.done) + len(watch.failed)
+    if status == 0:
+        log.unlink(missing_ok=True)  # Snakemake's own has all of it
     if status == 0 and watch.started is None:
-        log.unlink(missing_ok=True)
         print("Nothing to do: everything that was asked for is there and up to date.")
     elif watch.started is not None:
         took = duration(watch.clock() - watch.started)
-        print(f"{ended} of {counted(watch.job_count, 'job')} ended in {took}, {len(watch.failed)} failed")
+        print(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}")
     incomplete = failed_runs(campaign, results) if status else {}
     if incomplete:
         _heading(f"{counted(len(incomplete), 'run')} could not be computed to the end:")
         for path, reason in incomplete.items():
             _reason(path, [reason])
-    if watch.failed:
-        _heading(f"{counted(len(watch.failed), 'job')} failed:")
-        for job in watch.failed:
+    failed = [job for job in watch.failed if not stopped or reason_of(job, folder)]
+    if failed:
+        _heading(f"{counted(len(failed), 'job')} failed:")
+        for job in failed:
             logs = ", ".join(str(shown(folder / name)) for name in job.logs)
             # The verdict repeats the runs that were just listed.
             reason = [line for line in reason_of(job, folder) if not any(line.startswith(path) for path in incomplete)]
@@ -191,14 +203,14 @@ def _tell(status: int, watch, campaign, folder: Path, log: Path) -> bool:
             if logs:
                 typer.echo(f"    log: {logs}")
     kept_back = watch.job_count - ended
-    if status < 0 or (status and watch.started is not None and kept_back and not watch.failed):
-        _heading(f"Stopped before the end; {counted(kept_back, 'job')} not done. The same command goes on from here.")
-    elif status and kept_back:
-        typer.echo(f"{counted(kept_back, 'job')} not done, for want of what failed")
-    if status and watch.started is None:
+    if stopped or status < 0:
+        _heading("Stopped before the end. The same command goes on from here.")
+    elif status and watch.started is None:
         _heading("Snakemake could not start:")
         for line in log.read_text(encoding="utf-8", errors="replace").splitlines()[-_MOST_LINES:]:
             typer.echo(f"    {line}")
+    elif status and kept_back:
+        typer.echo(f"{counted(kept_back, 'job')} not done, for want of what failed")
     for what, path in (
         ("figures", results / "figures"),
         ("dataset", results / "dataset" / f"{campaign.name}.nc"),
@@ -208,7 +220,6 @@ def _tell(status: int, watch, campaign, folder: Path, log: Path) -> bool:
             print(f"{what + ':':<9}{shown(path)}")
     if status:
         typer.echo(f"log:     {shown(log)}")
-    return status == 0
 
 
 def _heading(text: str) -> None:
