@@ -1,5 +1,7 @@
 """Figures can be drawn from small and unusual campaigns, say what is wrong, and have the same bytes every time."""
 
+import itertools
+
 import compared_campaign as compared
 import cyclic_campaign as cyclic
 import matplotlib as mpl
@@ -7,10 +9,11 @@ import numpy as np
 import pytest
 import small_campaign as small
 import xarray as xr
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_hex, to_rgb
 
 import icha
 from icha.campaign import RunLabels, campaign_tree, find_snapshot
+from icha.ensemble import ensemble
 from icha.figures import (
     fig1_jkr,
     fig2_area_and_gap,
@@ -24,9 +27,10 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
+from icha.figures.scale import Scale, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
 from icha.figures.spots import periodic_circles
-from icha.figures.style import BLUE, VERMILLION, material_label, number, quantity, save, unit_for
+from icha.figures.style import BLACK, BLUE, VERMILLION, material_label, number, quantity, save, unit_for
 from icha.model_error import jaccard
 from icha.records import read_dataset, write_surface
 from icha.reference import reference_dataset
@@ -142,7 +146,8 @@ def test_stops_are_those_of_the_first_loading():
 
 @pytest.mark.parametrize("module", [fig2_area_and_gap, fig5_multi_slope])
 def test_ways_back_are_thin_dashed_lines_in_the_colour_of_the_material(module):
-    figure = module.figure(cyclic.tree(), study="loops")
+    runs = {labels: run for labels, run in cyclic.runs().items() if (labels.study, labels.seed) == ("loops", 2)}
+    figure = module.figure(campaign_tree(runs.items()), study="loops")
     left, right = figure.axes
     names = [text.get_text() for each in (*figure.axes, figure) for text in getattr(each, "texts", ())]
     legends = [each for each in (left.get_legend(), right.get_legend(), *figure.legends) if each is not None]
@@ -151,7 +156,7 @@ def test_ways_back_are_thin_dashed_lines_in_the_colour_of_the_material(module):
     for axes in (left, right):
         ways = [line for line in axes.get_lines() if line.get_linewidth() == 0.7 and len(line.get_xdata())]
         markers = [line for line in axes.get_lines() if line.get_marker() not in ("None", "") and len(line.get_xdata())]
-        assert len(ways) == len(markers) == 4
+        assert len(ways) == len(markers) == 2
         assert {line.get_color() for line in ways} == {line.get_markeredgecolor() for line in markers}
         assert all(line.is_dashed() for line in ways)
         for way in ways:
@@ -197,17 +202,17 @@ def test_fig3_points_keep_the_probability():
     run = small.run()
     for at in range(run.sizes["snapshot"]):
         edges = run["gap_bin_edges"].values / float(run["rms_height"])
-        u, density = fig3_distributions.gap_points(run, at)
+        u, (density,) = fig3_distributions.gap_densities([(run, at)])
         assert np.all(np.diff(u) > 0) and np.all(density > 0)
         assert u[0] > edges[1] and u[-1] < edges[-1]
-        p, density = fig3_distributions.pressure_points(run, at)
+        p, (density,) = fig3_distributions.pressure_densities([(run, at)])
         width = np.diff(run["pressure_bin_edges"].values) / float(run["contact_modulus"] * run["rms_slope"])
         held = width[run["pressure_density"].values[at] > 0]
         area = float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at])])
         assert np.sum(density * held) == pytest.approx(area, rel=1e-9)
         assert p.min() < 0, "adhesion pulls at the edges"
     hertz = small.run(material="hertz")
-    assert fig3_distributions.pressure_points(hertz, 0)[0].min() > 0
+    assert fig3_distributions.pressure_densities([(hertz, 0)])[0].min() > 0
 
 
 def test_fig4_refuses_the_surface_of_another_run(tmp_path, surface):
@@ -307,10 +312,11 @@ def test_fig7_is_the_slope_of_fig2_whatever_the_rms_slope():
     common = sorted(set(one) & set(other))
     assert len(common) >= len(small.PRESSURES)
     np.testing.assert_allclose([one[p] for p in common], [other[p] for p in common], rtol=1e-6)
-    left, right = fig7_stiffness.figure(small.tree(), study="single").axes
-    p, stiffness = fig7_stiffness.stiffness_points(path_steps(small.run(seed=2)))
-    assert any(np.array_equal(line.get_ydata(), stiffness) for line in left.get_lines())
-    assert any(np.array_equal(line.get_ydata(), stiffness / p) for line in right.get_lines())
+    left, right = fig7_stiffness.figure(small.tree(), study="slopes").axes
+    p, stiffness = fig7_stiffness.stiffness_points(path_steps(small.run(rms_slope=0.2)))
+    for axes, values in ((left, stiffness), (right, stiffness / p)):
+        drawn = [line.get_ydata() for line in axes.get_lines() if len(line.get_xdata()) == len(p)]
+        assert any(np.allclose(each, values, rtol=1e-9) for each in drawn)
 
 
 def test_fig7_leaves_out_what_has_no_logarithm():
@@ -328,20 +334,33 @@ def test_fig8_density_and_counts_of_a_known_distribution():
     # Quantiles of n(A) ~ A^-2 between 1 and 1000, on a nominal area of 50.
     count, nominal = 20000, 50.0
     area = np.sort(1 / (1 - (np.arange(count) + 0.5) / count * (1 - 1e-3)))
-    at, density = fig8_patch_sizes.patch_density(area, nominal)
+    at, (density,) = fig8_patch_sizes.patch_density([area], nominal)
     exact = count / nominal / (1 - 1e-3) / at**2
     np.testing.assert_allclose(density[at < 100], exact[at < 100], rtol=0.03)
-    at, above = fig8_patch_sizes.patches_above(area, nominal)
+    at, (above,) = fig8_patch_sizes.patches_above([area], nominal)
     assert at[0] == area[0] and at[-1] == area[-1] and len(at) <= 300
     np.testing.assert_allclose(above * nominal, [np.count_nonzero(area >= a) for a in at])
 
 
 @pytest.mark.parametrize("areas", [[], [2.0], [2.0, 2.0], [1.0, 2.0, 5.0]])
 def test_fig8_of_few_patches(areas):
-    at, density = fig8_patch_sizes.patch_density(np.array(areas), 10.0)
-    above = fig8_patch_sizes.patches_above(np.array(areas), 10.0)
+    at, (density,) = fig8_patch_sizes.patch_density([np.array(areas)], 10.0)
     assert len(at) == min(len(areas), 1) and np.all(np.isfinite(density))
-    assert [len(each) for each in above] == [len(areas)] * 2
+    at, (above,) = fig8_patch_sizes.patches_above([np.array(areas)], 10.0)
+    assert len(at) == len(above) == len(areas)
+
+
+def test_fig8_counts_the_patches_of_every_member():
+    rng = np.random.default_rng(3)
+    areas = [np.sort(rng.pareto(1.0, count) + 1) for count in (900, 1100, 0)]
+    at, densities = fig8_patch_sizes.patch_density(areas, 10.0)
+    assert densities.shape == (3, len(at)) and not densities[2].any()
+    ratio = densities[1] / densities[0]
+    # One distribution, and eleven patches for nine.
+    assert np.median(ratio) == pytest.approx(11 / 9, rel=0.2)
+    at, above = fig8_patch_sizes.patches_above(areas, 10.0)
+    for counts, area in zip(above * 10.0, areas, strict=True):
+        np.testing.assert_allclose(counts, [np.count_nonzero(area >= a) for a in at])
 
 
 def test_fig8_counts_the_spots_of_the_snapshot():
@@ -372,7 +391,7 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
     assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
     assert len({text.get_text() for text in left.get_legend().get_texts()}) == 2
     tree = campaign_tree([(RunLabels("tabor", "rough", 1, 1.0, "bare"), runs["bare"])])
-    with pytest.raises(ValueError, match="study tabor: no run with adhesion"):
+    with pytest.raises(ValueError, match="study tabor: no complete run with adhesion"):
         fig9_tabor.figure(tree, study="tabor")
 
 
@@ -381,11 +400,11 @@ def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
     for axes, name in zip(figure.axes, ("contact_area_fraction", "reduced_separation"), strict=True):
         crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
         runs = [line for line in axes.get_lines() if line.get_marker() not in ("+", "None")]
-        assert len(crosses) == 2 and len(runs) == 6
+        assert len(crosses) == 2 and len(runs) == 2
         assert {line.get_markeredgecolor() for line in crosses} == {line.get_markeredgecolor() for line in runs}
         for line, entry in zip(crosses, ("adhesive", "bare"), strict=True):
             truth = compared.errors()[entry][f"{name}_boundary_elements"].values
-            np.testing.assert_array_equal(np.sort(line.get_ydata()), np.sort(truth.ravel()))
+            np.testing.assert_allclose(line.get_ydata(), truth.mean(axis=1).ravel(), rtol=1e-12)
             assert sorted(set(line.get_xdata())) == list(compared.PRESSURES)
         names = [text.get_text() for text in axes.get_legend().get_texts()]
         assert names.count("boundary elements") == 1
@@ -428,30 +447,33 @@ def test_fig3_shows_boundary_elements_of_the_same_state_only():
         figure = fig3_distributions.figure(compared.tree(), compared.errors(), study="one", **options)
         return [[line for line in axes.get_lines() if line.get_linewidth() > 3] for axes in figure.axes]
 
-    for shown in broad(target=3e-3):
-        assert len(shown) == 3  # both materials, and what the legend shows
+    for shown, more in zip(broad(target=3e-3), (0, 1), strict=True):
+        # Both materials, and what the legends show: boundary elements, and in one of them bands.
+        assert len(shown) == 3 + more
     only = compared.errors().isel(reduced_pressure=[1])
     figure = fig3_distributions.figure(compared.tree(), only, study="one", target=3e-3)
-    assert all(line.get_linewidth() < 3 for axes in figure.axes for line in axes.get_lines())
+    assert all(line.get_linewidth() < 3 for axes in figure.axes for line in axes.get_lines() if len(line.get_xdata()))
     # These solutions are the runs' own states, so that their points lie on those of the runs.
     truth = compared.errors()["bare"].to_dataset().isel(surface=0, seed=0, rms_slope=0, material=0, reduced_pressure=0)
     truth["solution_grid"] = 32
-    for drawn, own in zip(
-        fig3_distributions.solution_gap_points(truth),
-        fig3_distributions.gap_points(compared.runs()["one", "rough", 1, 1.0, "hertz"], 0),
-        strict=True,
-    ):
+    u, (density,) = fig3_distributions.gap_densities([(compared.runs()["one", "rough", 1, 1.0, "hertz"], 0)])
+    for drawn, own in zip(fig3_distributions.solution_gap_points(truth), (u, density), strict=True):
         np.testing.assert_allclose(drawn, own, rtol=1e-9)
 
 
 def test_fig3_joined_bins_keep_what_they_hold():
     rng = np.random.default_rng(3)
     edges, content = np.cumsum(rng.uniform(0.1, 1, 41)), rng.uniform(0, 1, 40) * (rng.random(40) < 0.5)
-    low, high, density = fig3_distributions._joined(edges, content, 0.7)
+    low, high, (density,) = fig3_distributions._joined(edges, content[None], 0.7)
     assert low[0] == edges[0] and np.array_equal(low[1:], high[:-1])
     held = density * (high - low)
     assert np.all(held >= 0.7 - 1e-12)
     assert 0 <= content.sum() - held.sum() < 0.7
+    # Of several members the bins are the same, and each keeps what it holds.
+    shares = np.array([0.2, 0.5, 0.3])
+    same = fig3_distributions._joined(edges, shares[:, None] * content, 0.7)
+    np.testing.assert_array_equal(same[0], low)
+    np.testing.assert_allclose(same[2], shares[:, None] * density)
 
 
 def test_fig4_puts_boundary_elements_beside_the_spots(surface):
@@ -488,7 +510,9 @@ def test_fig10_shows_means_and_scatter_of_the_errors_in_per_cent():
     (adhesive, _, (bars,)), (bare, _, _) = left.containers
     np.testing.assert_allclose(adhesive.get_ydata(), expected.mean())
     for segment in bars.get_segments():
-        np.testing.assert_allclose(segment[:, 1], expected.mean() + expected.std(ddof=1) * np.array([-1, 1]))
+        # Three seeds: 4.303 standard errors, by Student's table.
+        reach = 4.30265273 * expected.std(ddof=1) / np.sqrt(3)
+        np.testing.assert_allclose(segment[:, 1], expected.mean() + reach * np.array([-1, 1]))
     np.testing.assert_allclose(bare.get_ydata(), -20)
     np.testing.assert_allclose(right.containers[1][0].get_ydata(), 25)
     np.testing.assert_allclose(adhesive.get_xdata(), compared.PRESSURES, rtol=0.03)
@@ -509,12 +533,13 @@ def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
     for name, node in compared.errors().children.items():
         parts[f"/{name}"].attrs = node.attrs
     figure = fig10_model_error.figure(xr.DataTree.from_dict(parts), study="one")
-    assert len(figure.axes) == 4
-    assert [len(axes.containers) for axes in figure.axes] == [9, 9, 9, 9]
+    *panels, bar = figure.axes
+    assert [len(axes.containers) for axes in panels] == [9, 9, 9, 9]
+    # Too many for a legend: a scale names them.
+    assert bar.get_ylabel() == "s" and [text.get_text() for text in bar.get_yticklabels()] == list("012345678")
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == [*(f"s{k}" for k in range(9)), "against the energetic area"]
-    looks = {(c[0].get_color(), c[0].get_marker()) for c in figure.axes[0].containers}
-    assert len(looks) == 9
+    assert set(names) == {"bars: 95 % confidence of the mean of 3 seeds", "against the energetic area"}
+    assert len({container[0].get_color() for container in panels[0].containers}) == 9
 
 
 def test_fig11_shows_distances_and_overlap():
@@ -578,3 +603,103 @@ def test_units_as_people_write_them():
     assert unit_for(100e-6, "m")[1] == "µm" and unit_for(0.1, "m")[1] == "mm"
     assert unit_for(1e-3, "m") == (pytest.approx(1e3), "mm")
     assert number(0.01) == "0.01" and number(1e-5) == "$10^{-5}$" and number(3.2e-5) == r"$3.2\times10^{-5}$"
+
+
+# --- ensembles --------------------------------------------------------------------------------------------------
+
+
+def shaded(axes):
+    """The edges of the bands in an axes, lower and upper, by their colour."""
+    found = {}
+    for band in axes.collections:
+        x, y = band.get_paths()[0].vertices.T
+        edges = [(y[x == at].min(), y[x == at].max()) for at in np.unique(x)]
+        found[to_hex(band.get_facecolor()[0])] = np.transpose(edges)
+    return found
+
+
+def test_fig2_shows_means_with_bands_instead_of_every_seed():
+    figure = fig2_area_and_gap.figure(compared.tree(), study="one")
+    for axes, name in zip(figure.axes, ("contact_area_fraction", "reduced_separation"), strict=True):
+        means = [line for line in axes.get_lines() if len(line.get_xdata()) == len(compared.PRESSURES)]
+        bands = shaded(axes)
+        assert len(means) == len(bands) == 2
+        for line, material in zip(means, ("soft", "hertz"), strict=True):
+            runs = [run for labels, run in compared.runs().items() if labels.material == material]
+            over = ensemble([path_steps(run)[name].values for run in runs])
+            np.testing.assert_allclose(line.get_ydata(), over.mean, rtol=1e-12)
+            for edge, sign in zip(bands[to_hex(line.get_color())], (-1, 1), strict=True):
+                np.testing.assert_allclose(edge, over.mean + sign * over.confidence, rtol=1e-12)
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert names.count("mean and 95 % band, n = 3 seeds") == 1
+
+
+def test_fig9_points_are_means_over_the_seeds():
+    left, _ = fig9_tabor.figure(compared.tree(), study="one").axes
+    runs = {material: [] for material in ("soft", "hertz")}
+    for labels, run in compared.runs().items():
+        runs[labels.material].append(float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[0])]))
+    curve, bare = (line for line in left.get_lines() if len(line.get_xdata()))
+    np.testing.assert_allclose(curve.get_ydata(), [np.mean(runs["soft"])])
+    np.testing.assert_allclose(bare.get_ydata(), np.mean(runs["hertz"]))
+
+
+def many(surfaces=30, materials=1):
+    """A study of many surfaces or materials, of the same run, named as variations of a parameter."""
+    names = [f"rough-hurst{0.2 + 0.02 * k:.2f}" for k in range(surfaces)]
+    kinds = ["soft"] if materials == 1 else [f"soft-surface_energy{k}mJ" for k in range(materials)]
+    runs = []
+    for name, (k, kind) in itertools.product(names, enumerate(kinds)):
+        run = small.run().assign(surface_energy=small.run()["surface_energy"] * (1 + 0.1 * k))
+        runs.append((RunLabels("many", name, 1, 1.0, kind), run))
+    return campaign_tree(runs)
+
+
+MANY = [fig2_area_and_gap, fig5_multi_slope, fig7_stiffness, fig9_tabor]
+
+
+@pytest.mark.parametrize("module", MANY, ids=lambda module: module.__name__)
+def test_many_surfaces_have_a_scale_of_colours(module):
+    figure = module.figure(many(), study="many")
+    bar = figure.axes[-1]
+    labels = [text.get_text() for text in bar.get_yticklabels()]
+    assert bar.get_ylabel() == "rough-hurst" and labels[0] == "0.20" and labels[-1] == "0.78" and len(labels) == 9
+    own = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o" and len(line.get_xdata())]
+    assert len({line.get_color() for line in own}) == 30
+    legends = [legend for each in (figure, *figure.axes) for legend in _legends(each)]
+    assert sum(len(legend.get_texts()) for legend in legends) < 4
+
+
+def _legends(part):
+    if hasattr(part, "legends"):
+        return part.legends
+    return [part.get_legend()] if part.get_legend() else []
+
+
+@pytest.mark.parametrize(
+    "module", [fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig8_patch_sizes], ids=lambda m: m.__name__
+)
+def test_many_materials_have_a_scale_of_what_differs(module):
+    figure = module.figure(many(surfaces=1, materials=12), study="many")
+    bar = figure.axes[-1]
+    assert "Delta" in bar.get_ylabel() and "mJ/m²" in bar.get_ylabel()
+    labels = [text.get_text() for text in bar.get_yticklabels()]
+    assert labels[0] == "50" and labels[-1] == "105"
+    curves = [line for line in figure.axes[0].get_lines() if len(line.get_xdata())]
+    assert len({line.get_color() for line in curves} - {BLACK}) == 12
+
+
+def test_names_of_a_scale_lose_what_they_share_but_no_digits():
+    assert Scale(["s-hurst0.55", "s-hurst0.5"]).names == ["0.55", "0.5"]
+    assert Scale(["s-hurst0.55", "s-hurst0.5"]).title == "s-hurst"
+    assert Scale(["rough", "smooth"]).names == ["rough", "smooth"]
+    assert materials_scale(small.tree()["slopes"].to_dataset(), ["soft", "hertz"]).names == ["50", "0"]
+    assert places_scale([("a", 1.0), ("a", 0.5)]).names == ["1", "0.5"]
+
+
+def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
+    runs = [(RunLabels("one", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2)]
+    runs[0] = (runs[0][0], runs[0][1].assign_attrs(incomplete="no equilibrium"))
+    tree = campaign_tree(runs, allow_missing=True)
+    with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):
+        fig4_contact_map.figure(tree, surface, study="one")

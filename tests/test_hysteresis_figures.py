@@ -187,7 +187,10 @@ def test_fig13_lays_boundary_elements_over_the_run_they_belong_to(tree):
             assert line.get_markeredgecolor() == colour
         assert [line.get_markerfacecolor() for line in own] == [colour, "none"]
     assert {"boundary elements, loading", "boundary elements, unloading"} <= set(legend(figure))
-    assert not any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard")))
+    assert not any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard", seed=1)))
+    # Without a seed asked for it is one with boundary elements, and without any the mean over the seeds.
+    assert any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard")))
+    assert "mean and 95 % band, n = 2 seeds" in legend(fig13_loops.figure(tree, study="hard"))
     stranger = shown.assign(surface_energy=0.06)
     with pytest.raises(ValueError, match=r"study hard: no run is of the same contact .* surface_energy 0\.06"):
         fig13_loops.figure(tree, [stranger], study="hard")
@@ -214,7 +217,8 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree, quantity):
     )
     np.testing.assert_array_equal(sticky[0].get_xdata(), slopes)
     np.testing.assert_allclose(sticky[0].get_ydata(), values.mean(axis=0))
-    np.testing.assert_allclose(bars(sticky, 1), values.std(axis=0, ddof=1))
+    # Two seeds: 12.706 standard errors, by Student's table.
+    np.testing.assert_allclose(bars(sticky, 1), 12.7062047 * values.std(axis=0, ddof=1) / np.sqrt(2), rtol=1e-6)
     assert np.all(bare[0].get_ydata() == 0) and bare[0].get_markerfacecolor() == "white"
 
     sticky, bare = right.containers
@@ -231,7 +235,7 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree, quantity):
     assert np.all(bare[0].get_ydata() == 0)
     assert "0.5" in right.get_title("right")
     assert sticky[0].get_color() == left.containers[0][0].get_color() != bare[0].get_color()
-    assert len(legend(figure)) == 2
+    assert len(legend(figure)) == 3
 
 
 def test_fig14_has_a_place_for_zero_and_for_decades():
@@ -260,7 +264,8 @@ def test_fig14_tells_slopes_of_the_loads_apart(tree):
     looks = {(each[0].get_color(), each[0].get_marker()) for each in figure.axes[1].containers}
     assert len(figure.axes[1].containers) == len(looks) == 4
     names = legend(figure)
-    assert len(names) == 4 and sum("0.5" in name or "= 1$" in name or name.endswith("1") for name in names) >= 2
+    assert names[-1] == "means of n = 2 seeds, bars 95 %" and len(names) == 5
+    assert sum("0.5" in name or "= 1$" in name or name.endswith("1") for name in names) >= 2
 
 
 def test_fig14_names_what_there_is(tree):
@@ -333,9 +338,11 @@ def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
     line = averages([{1: (2.0, 10.0), 2: (4.0, 30.0), 3: (9.0, 99.0)}, {2: (1.0, 6.0), 1: (1.0, 2.0)}])
     assert line.same_seeds
     assert line.x.tolist() == [1, 3] and line.y.tolist() == [4, 20]
-    np.testing.assert_allclose(line.y_deviation, [8**0.5, 200**0.5])
+    # Two seeds: 12.706 standard errors, half the difference of both.
+    np.testing.assert_allclose(line.y_confidence, [12.7062047 * 2, 12.7062047 * 10], rtol=1e-7)
+    assert line.counts.tolist() == [2, 2]
     apart = averages([{1: (2.0, 10.0)}, {2: (3.0, 8.0)}])
-    assert not apart.same_seeds and apart.y.tolist() == [10, 8] and not apart.y_deviation.any()
+    assert not apart.same_seeds and apart.y.tolist() == [10, 8] and not apart.y_confidence.any()
 
 
 def test_fig15_in_joule_shows_runs_without_adhesion_too(tree):
@@ -435,7 +442,7 @@ def test_fig16_refuses_another_surface_or_run(tmp_path, tree, surface):
         fig16_snap_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="slopes")
     with pytest.raises(ValueError, match="another period or grid"):
         fig16_snap_map.figure(tree, surface.assign(period=surface["period"] * 2), study="slopes")
-    with pytest.raises(ValueError, match=r"study slopes: no unloaded run of .* rms slope 0\.7"):
+    with pytest.raises(ValueError, match=r"study slopes: no run of .* rms slope 0\.7"):
         fig16_snap_map.figure(tree, surface, study="slopes", rms_slope=0.7)
     with pytest.raises(ValueError, match="no material 'glue' in this study; there are sticky"):
         fig16_snap_map.figure(tree, surface, study="slopes", material="glue")

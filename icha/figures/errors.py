@@ -10,9 +10,21 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from icha.ensemble import ensemble
 from icha.figures.curves import PRESSURE_LABEL
+from icha.figures.scale import MOST_COLOURS, places_scale
 from icha.figures.select import study_errors
-from icha.figures.style import COLOURS, DASHES, GREY, MARKERS, TWO_COLUMNS, material_label, new_figure, panel_label
+from icha.figures.style import (
+    COLOURS,
+    DASHES,
+    GREY,
+    MARKERS,
+    TWO_COLUMNS,
+    material_label,
+    new_figure,
+    panel_label,
+    slope_label,
+)
 
 # More surfaces than this, and every material has panels of its own.
 _MOST_LINES = 2
@@ -36,7 +48,9 @@ class Quantity(NamedTuple):
 
 
 def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity, ...]) -> Figure:
-    """A panel for every quantity, with a curve for every surface, slope and material; bars are the scatter over seeds.
+    """A panel for every quantity, with a curve for every surface, slope and material: means over the seeds.
+
+    Bars are the 95 % confidence of the means. Many surfaces and slopes have colours of a scale.
 
     Raises
     ------
@@ -56,7 +70,7 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
     ]
     lines = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in places))
     materials = list(dict.fromkeys(material for *_, material in places))
-    interfaces = _interfaces(entries, materials)
+    interfaces = interfaces_of(entries, materials)
     own_rows = len(lines) > _MOST_LINES
     rows = [[material] for material in materials] if own_rows else [materials]
 
@@ -65,6 +79,8 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
     letters = iter("abcdefghijklmnopqrstuvwxyz")
     named: dict[str, object] = {}
     against_other = False
+    scale = places_scale(lines) if len(lines) > MOST_COLOURS else None
+    counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
         mine = [place for place in places if place[-1] in shown]
         for k, (entry, surface, slope, material) in enumerate(mine):
@@ -72,17 +88,15 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
             # Solutions of the same state on another grid, say.
             again = [place[0] for place in places if place[1:] == (surface, slope, material)].index(entry)
             line, kind = lines.index((surface, slope)), materials.index(material)
-            colour = COLOURS[(line if own_rows else kind + 1) % len(COLOURS)]
+            colour = scale.colours[line] if scale else COLOURS[(line if own_rows else kind + 1) % len(COLOURS)]
             adhesive = float(errors["surface_energy"]) > 0
             name = [] if own_rows else [material_label(interfaces, material)]
-            name += [surface] if len({surface for surface, _ in lines}) > 1 else []
-            name += (
-                [rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"] if len({slope for _, slope in lines}) > 1 else []
-            )
+            name += [surface] if not scale and len({surface for surface, _ in lines}) > 1 else []
+            name += [slope_label(slope)] if not scale and len({slope for _, slope in lines}) > 1 else []
             name += [entry] if again else []
             look = {
                 "color": colour,
-                "marker": MARKERS[(line // len(COLOURS) if own_rows else line) % len(MARKERS)],
+                "marker": MARKERS[(0 if own_rows else line) % len(MARKERS)],
                 "ls": DASHES[again % len(DASHES)],
                 "mfc": colour if adhesive else "white",
                 "ms": 4,
@@ -92,10 +106,10 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
             }
             p = errors["reduced_pressure"].values * _APART ** (k - (len(mine) - 1) / 2)
             for ax, quantity in zip(row, quantities, strict=True):
-                deviation = errors.get(f"{quantity.name}_deviation")
-                bars = None if deviation is None else quantity.factor * deviation.values
-                values = quantity.factor * errors[f"{quantity.name}_mean"].values
-                handle = ax.errorbar(p, values, bars, **look)
+                over = ensemble(errors[quantity.name].transpose("seed", ...).values)
+                bars = quantity.factor * over.confidence if over.count.max() > 1 else None
+                handle = ax.errorbar(p, quantity.factor * over.mean, bars, **look)
+                counts.update(over.count.tolist())
                 if quantity.other and adhesive:
                     others = quantity.factor * errors[f"{quantity.other}_mean"].values
                     ax.plot(p, others, color=colour, **_OTHER)
@@ -113,7 +127,14 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
         ax.set_ylim(*quantity.limits)
     if against_other:
         named["against the energetic area"] = Line2D([], [], color=GREY, **_OTHER)
-    if len(named) > 1 or "" not in named:
+    if max(counts) > 1:
+        named[f"bars: 95 % confidence of the mean of {' to '.join(map(str, sorted(counts - {0, 1})))} seeds"] = Line2D(
+            [], [], color=GREY, marker="|", ls="none", ms=8
+        )
+    if scale:
+        scale.draw(fig, panels.ravel().tolist())
+        named.pop("", None)
+    if named and (len(named) > 1 or "" not in named):
         fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=_columns(named))
     return fig
 
@@ -128,7 +149,7 @@ def _count(lines, materials, places, own_rows):
     return 2 * np.ceil(names / (4 if own_rows else 2))
 
 
-def _interfaces(entries, materials):
+def interfaces_of(entries, materials):
     """Modulus, energy and range of the materials of all entries."""
     names = ("contact_modulus", "surface_energy", "interaction_range")
     found = {}

@@ -14,8 +14,9 @@ CAPTION = (
     "between the cumulative distributions) between the P(p), in units of the nominal pressure, and between the P(u), "
     "in units of the rms height, both over the nominal area; and the overlap of the contact maps, area in contact in "
     "both over area in contact in either, on the nodes of the boundary elements. Points: mean over the seeds; bars: "
-    "their standard deviation; open markers are without adhesion. At the ranges that a grid resolves boundary elements "
-    "show practically no hysteresis: with adhesion they bound the limit of short ranges (JKR), they do not prove it."
+    "the 95 % confidence of that mean (Student's t); open markers are without adhesion. At the ranges that a grid "
+    "resolves boundary elements show practically no hysteresis: with adhesion they bound the limit of short ranges "
+    "(JKR), they do not prove it."
 )
 
 QUANTITIES = (

@@ -11,17 +11,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
+from icha.aggregation import mean_way
+from icha.ensemble import Ensemble
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, band_handle, draw_band
 from icha.figures.hysteresis import (
     BRANCH_DASHES,
     Lines,
     legend_below,
     pull_off_step,
-    slope_label,
     unloaded_runs,
 )
 from icha.figures.select import branches, pick
-from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, slope_label, styled
+from icha.labels import RunLabels
 from icha.model_error import run_of_same_contact
 
 CAPTION = (
@@ -30,10 +32,12 @@ CAPTION = (
     "Symbols with a black edge: pull-off, the largest tension on the last way back, where there is any; where slopes "
     "share a panel, symbols without it mark where the first way in ends. Insets enlarge the surroundings of zero load "
     "where the tension is small beside the largest load. The energy lost per nominal area is the area between the "
-    "ways, of the pressure against the mean separation. Steps are jumps of single spots or of several. Dots and "
-    "rings, where given: boundary elements, an independent code, at some of their states, of the same topography, "
-    "half-space and range of attraction, dots on the way in and rings on the way back, with the area corrected by the "
-    "perimeter of the contact."
+    "ways, of the pressure against the mean separation. Where several seeds are drawn the lines are means at common "
+    "separations, as far as all seeds go, with the 95 % band of confidence of the mean (Student's t), and the marks "
+    "means over the seeds. Steps are jumps of single spots or of several. Dots and rings, where given: boundary "
+    "elements, an independent code, at some of their states, of the same topography, half-space and range of "
+    "attraction, dots on the way in and rings on the way back, with the area corrected by the perimeter of the "
+    "contact."
 )
 
 # More loops than this in one panel, and every slope has panels of its own.
@@ -53,11 +57,39 @@ _DOT, _RING = 2.0, 3.4
 
 
 class _Loop(NamedTuple):
-    """A run, boundary elements beside it, and the look of its markers."""
+    """The runs of a loop, one for every seed, what is drawn of them, boundary elements, and the look of markers.
 
-    run: xr.Dataset
+    `ways` are branch, reduced separation, reduced pressure and contact area of every leg, the last two with their bands
+    where there are several seeds.
+    """
+
+    runs: list[xr.Dataset]
+    ways: list[_Way]
     truths: list[xr.Dataset]
     marker: dict
+
+
+class _Way(NamedTuple):
+    branch: str
+    reduced_separation: np.ndarray
+    reduced_pressure: np.ndarray
+    contact_area_fraction: np.ndarray
+    bands: dict[str, Ensemble]
+
+
+def _ways(runs):
+    """The legs of a run; of several seeds their means at common separations."""
+    legs = [list(branches(run)) for run in runs]
+    if len(runs) == 1 or len({len(own) for own in legs}) > 1:
+        return [_Way(name, *(leg[axis].values for axis in _COLUMNS), {}) for own in legs for name, leg in own]
+    found = []
+    for members in zip(*legs, strict=True):
+        separation, over = mean_way([leg for _, leg in members])
+        found.append(_Way(members[0][0], separation, *(over[name].mean for name in _COLUMNS[1:]), over))
+    return found
+
+
+_COLUMNS = ("reduced_separation", "reduced_pressure", "contact_area_fraction")
 
 
 @styled
@@ -69,7 +101,7 @@ def figure(
     surface: str | None = None,
     seed: int | None = None,
 ) -> Figure:
-    """Draw the runs of all slopes and materials of a study, for one surface and seed.
+    """Draw the runs of all slopes and materials of a study, for one surface, and one seed or the mean over the seeds.
 
     Parameters
     ----------
@@ -77,7 +109,8 @@ def figure(
     loops : boundary elements both ways of runs of the study, if there are any; those of other surfaces or seeds than
         the one drawn are left out.
     study : name of the study; its runs are unloaded, at least in part.
-    surface, seed : which topography; the study's first, if left out.
+    surface : which surface; the study's first, if left out.
+    seed : which seed; if left out the first that has boundary elements, or else the mean over all.
 
     Raises
     ------
@@ -87,9 +120,16 @@ def figure(
     """
     runs = unloaded_runs(campaign, study)
     surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
-    seed = pick("seed", seed, list(dict.fromkeys(labels.seed for labels, _ in runs if labels.surface == surface)))
     truths = _truths(study, runs, loops or ())
-    own = {labels: run for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)}
+    seeds = list(dict.fromkeys(labels.seed for labels, _ in runs if labels.surface == surface))
+    if seed is None:
+        seed = next((labels.seed for labels, _ in runs if labels.surface == surface and labels in truths), None)
+    seeds = seeds if seed is None else [pick("seed", seed, seeds)]
+    own: dict[RunLabels, list[xr.Dataset]] = {}
+    for labels, run in runs:
+        if labels.surface == surface and labels.seed in seeds:
+            same = (each for each in own if each._replace(seed=labels.seed) == labels)
+            own.setdefault(next(same, labels), []).append(run)
     slopes = sorted({labels.rms_slope for labels in own}, reverse=True)
     own_rows = len(own) > _MOST_LOOPS and 1 < len(slopes) < len(own)
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
@@ -102,8 +142,8 @@ def figure(
     letters = iter("abcdefghijklmnopqrstuvwxyz")
     for (left, right), shown in zip(panels, rows, strict=True):
         drawn = [
-            _Loop(run, truths.get(labels, []), lines.marker(keys[labels]))
-            for labels, run in own.items()
+            _Loop(members, _ways(members), truths.get(labels, []), lines.marker(keys[labels]))
+            for labels, members in own.items()
             if labels.rms_slope in shown
         ]
         for ax, axis in ((left, _LOADS), (right, _AREAS)):
@@ -117,6 +157,8 @@ def figure(
         _enlarge(left, right, drawn)
     for ax, axis in zip(panels[-1], (_LOADS, _AREAS), strict=True):
         ax.set_xlabel(axis.x_label)
+    if lines.scale:
+        lines.scale.draw(fig, panels.ravel().tolist())
     legend_below(fig, _handles(lines, rows, own, truths))
     return fig
 
@@ -134,34 +176,42 @@ _AREAS = _Axis("reduced_pressure", "contact_area_fraction", PRESSURE_LABEL, AREA
 
 def _draw(ax, loop, axis, *, turn):
     """Draw a loop, a mark at its pull-off and, if wanted, one where it turns first."""
-    run, colour = loop.run, loop.marker["mec"]
-    x, y = run[axis.x].values, run[axis.y].values
-    for branch, leg in branches(run):
-        ax.plot(leg[axis.x].values, leg[axis.y].values, ls=BRANCH_DASHES[branch], color=colour, **_LOOP)
+    colour = loop.marker["mec"]
+    for way in loop.ways:
+        x, y = (getattr(way, name) for name in (axis.x, axis.y))
+        ax.plot(x, y, ls=BRANCH_DASHES[way.branch], color=colour, **_LOOP)
+        if axis.y in way.bands:
+            draw_band(ax, x, way.bands[axis.y], colour)
     if turn:
-        at = int(np.flatnonzero(run["leg"].values == 0)[-1])
-        ax.plot(x[at], y[at], ls="none", zorder=5, **loop.marker)
-    at = pull_off_step(run)
-    if at is not None:
-        ax.plot(x[at], y[at], **loop.marker | _PULL_OFF)
+        ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in loop.runs]
+        ax.plot(*_mean_point(ends, axis), ls="none", zorder=5, **loop.marker)
+    pulls = [run.isel(step=at) for run in loop.runs if (at := pull_off_step(run)) is not None]
+    if pulls:
+        ax.plot(*_mean_point(pulls, axis), **loop.marker | _PULL_OFF)
     for truth in loop.truths:
         for branch, face, size in (("loading", colour, _DOT), ("unloading", "none", _RING)):
             way = truth.isel(step=truth["branch"].values == branch)
             ax.plot(way[axis.x], way[axis.y], mec=colour, mfc=face, ms=size, markevery=_APART, **_TRUTH)
 
 
+def _mean_point(states, axis):
+    """Where a mark of states of all seeds stands."""
+    return tuple(float(np.mean([float(state[name]) for state in states])) for name in (axis.x, axis.y))
+
+
 def _enlarge(left, right, loops):
     """Insets around zero load, if the tension is there but small."""
-    pressures = np.concatenate([loop.run["reduced_pressure"].values for loop in loops])
+    ways = [way for loop in loops for way in loop.ways]
+    pressures = np.concatenate([way.reduced_pressure for way in ways])
     tension = -pressures.min()
     if not 0 < tension < _SMALL_TENSION * pressures.max():
         return
     reach = np.array([-1, 1]) * _REACH * tension
-    near = [loop.run.isel(step=np.abs(loop.run["reduced_pressure"].values) <= reach[1]) for loop in loops]
-    near = [run.isel(step=run["contact_area_fraction"].values > 0) for run in near]
     separations, areas = (
-        np.concatenate([run[name].values for run in near]) for name in ("reduced_separation", "contact_area_fraction")
+        np.concatenate([getattr(way, name) for way in ways]) for name in ("reduced_separation", "contact_area_fraction")
     )
+    near = (np.abs(pressures) <= reach[1]) & (areas > 0)
+    separations, areas = separations[near], areas[near]
     room = 0.06 * np.ptp(separations)
     right.set_ylim(top=_HEADROOM * right.dataLim.y1)
     for ax, axis, corner, limits in (
@@ -188,7 +238,11 @@ def _handles(lines, rows, runs, truths):
         handles = {name: Line2D([], [], color=handle.get_color(), **_LOOP) for name, handle in handles.items()}
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = Line2D([], [], color=GREY, ls=dashes, **_LOOP)
-    if any(pull_off_step(run) is not None for run in runs.values()):
+    counts = [len(members) for members in runs.values()]
+    if max(counts) > 1:
+        band = band_handle(counts)
+        handles[band.get_label()] = band
+    if any(pull_off_step(run) is not None for members in runs.values() for run in members):
         handles["pull-off"] = Line2D([], [], marker="o", mfc=GREY, **_PULL_OFF)
     if any(labels in truths for labels in runs):
         for branch, face, size in (("loading", GREY, _DOT), ("unloading", "none", _RING)):

@@ -12,23 +12,34 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from icha.figures.hysteresis import (
     Lines,
     averages,
-    detached_runs,
+    bars_handle,
+    detached_runs_of,
     draw_averages,
     legend_below,
     several,
-    slope_label,
 )
 from icha.figures.select import pick
-from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_figure, number, panel_label, styled, unit_for
+from icha.figures.style import (
+    GREY,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    new_figure,
+    number,
+    panel_label,
+    slope_label,
+    styled,
+    unit_for,
+)
 
 CAPTION = (
     "Pull-off, the largest tension on the way back to complete separation, against the rms slope (a) and, where "
     "studies of several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached before "
     "(b). It is drawn as nominal pressure, or over the strength of the interface (the largest attraction of the "
     "Lennard-Jones traction), or over all summits pulling their most, 3/2 pi dgamma R, at once; the axis says which. "
-    "Points are means over the seeds, bars the standard deviation where there are several seeds. Without adhesion "
-    "(open markers) there is no pull-off. Where the values span decades the axis is logarithmic down to the "
-    "decade of the smallest, and linear from there to zero. Runs that were not separated completely are left out."
+    "Points are means over the seeds, bars the 95 % confidence of that mean (Student's t) where there are several "
+    "seeds. Without adhesion (open markers) there is no pull-off. Where the values span decades the axis is "
+    "logarithmic down to the decade of the smallest, and linear from there to zero. Runs that were not separated "
+    "completely are left out."
 )
 
 _QUANTITIES = {
@@ -65,16 +76,15 @@ def figure(
     """
     pick("quantity", quantity, list(_QUANTITIES))
     by_slope, by_load = {}, {}
-    for labels, run in detached_runs(campaign, study):
+    for labels, run in detached_runs_of(campaign, [study]):
         at, value = labels.rms_slope, float(run[quantity])
         line = by_slope.setdefault((labels.material, labels.surface, None), {})
         line.setdefault(at, {})[labels.seed] = (at, value)
     load_studies = several("load_studies", load_studies) if load_studies else []
-    for name in load_studies:
-        for labels, run in detached_runs(campaign, name):
-            at, value = float(run["largest_reduced_pressure"]), float(run[quantity])
-            line = by_load.setdefault((labels.material, labels.surface, labels.rms_slope), {})
-            line.setdefault(name, {})[labels.seed] = (at, value)
+    for labels, run in detached_runs_of(campaign, load_studies):
+        at, value = float(run["largest_reduced_pressure"]), float(run[quantity])
+        line = by_load.setdefault((labels.material, labels.surface, labels.rms_slope), {})
+        line.setdefault(labels.study, {})[labels.seed] = (at, value)
     loaded_slopes = {slope for *_, slope in by_load}
     if len(loaded_slopes) == 1:
         # The panel's title names it, and the lines look like those of (a).
@@ -87,11 +97,13 @@ def figure(
 
     fig = new_figure(TWO_COLUMNS if by_load else ONE_COLUMN, 2.9)
     panels = fig.subplots(1, 2 if by_load else 1, squeeze=False)[0]
+    means = []
     for ax, letter, drawn in zip(panels, "ab", (by_slope, by_load), strict=False):
         shown = {key: averages(list(line.values())) for key, line in drawn.items()}
         for key, line in shown.items():
-            line = line._replace(y=factor * line.y, y_deviation=factor * line.y_deviation)
+            line = line._replace(y=factor * line.y, y_confidence=factor * line.y_confidence)
             draw_averages(ax, line, color=lines.colour(key), **lines.marker(key), **_LINE)
+        means += shown.values()
         _scale(ax, factor * np.concatenate([line.y for line in shown.values()]))
         panel_label(ax, letter)
     label = _QUANTITIES[quantity] + (f" ({unit})" if unit else "")
@@ -112,7 +124,9 @@ def figure(
         panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
         if len(loaded_slopes) == 1:
             panels[1].set_title(slope_label(*loaded_slopes), loc="right")
-    legend_below(fig, lines.handles(**_LINE), columns=len(panels))
+    if lines.scale:
+        lines.scale.draw(fig, list(panels))
+    legend_below(fig, lines.handles(**_LINE) | bars_handle(means), columns=len(panels))
     return fig
 
 

@@ -11,21 +11,23 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.stats import linregress
 
-from icha.figures.hysteresis import Lines, averages, detached_runs, draw_averages, legend_below, several
+from icha.figures.hysteresis import Lines, averages, bars_handle, detached_runs_of, draw_averages, legend_below, several
+from icha.figures.select import NothingToDraw
 from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, styled, unit_for
 
 CAPTION = (
     "(a) Hysteresis loss, the energy per nominal area that a path from first contact to the largest load and back to "
     "separation dissipates, against the contact area over the nominal area, the largest on the path. Points: means "
-    "over the seeds, bars their standard deviations. Lines: least squares of a straight line through the points that "
-    "differ in their largest load only, three at least; the legend gives its coefficient of determination r² and the "
-    "exponent of a power law through the same points, 1 where the loss is proportional to the area (Violano and "
-    "Afferrante, Lubricants 9 (2021) 7, found it to grow linearly). The axes are logarithmic where both quantities "
-    "span decades. Runs without adhesion have no value where the loss is drawn over the surface energy, and are left "
-    "out there. (b) What the loss consists of at the largest load of every line, for runs with adhesion: jumps into "
-    "contact, jumps off, unions of spots and their undoing (a property of the model, of either sign), jumps at "
-    "controlled load, and what none of them explains; parts are over the sum of their magnitudes, and those below "
-    "zero are gains. Bars carry the markers of (a). Runs that were not separated completely are left out."
+    "over the seeds, bars the 95 % confidence of that mean (Student's t) where there are several seeds. Lines: least "
+    "squares of a straight line through the points that differ in their largest load only, three at least; the legend "
+    "gives its coefficient of determination r² and the exponent of a power law through the same points, 1 where the "
+    "loss is proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found it to grow linearly). The "
+    "axes are logarithmic where both quantities span decades. Runs without adhesion have no value where the loss is "
+    "drawn over the surface energy, and are left out there. (b) What the loss consists of at the largest load of "
+    "every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and their undoing (a property "
+    "of the model, of either sign), jumps at controlled load, and what none of them explains; parts are over the sum "
+    "of their magnitudes, and those below zero are gains. Bars carry the markers of (a). Runs that were not separated "
+    "completely are left out."
 )
 
 # Parts of the loss, with the look of their bars: none has the colour of a material.
@@ -76,14 +78,13 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     studies = several("studies", studies)
     # Of every line the runs of every study, by seed.
     runs: dict[tuple, dict[str, dict[int, xr.Dataset]]] = {}
-    for study in studies:
-        for labels, run in detached_runs(campaign, study):
-            line = runs.setdefault((labels.material, labels.surface, labels.rms_slope), {})
-            line.setdefault(study, {})[labels.seed] = run
+    for labels, run in detached_runs_of(campaign, studies):
+        line = runs.setdefault((labels.material, labels.surface, labels.rms_slope), {})
+        line.setdefault(labels.study, {})[labels.seed] = run
     lines = Lines(campaign, studies, list(runs))
     sticky = {key: line for key, line in runs.items() if lines.adhesive(key[0])}
     if over_surface_energy and not sticky:
-        raise ValueError(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
+        raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
 
     fig = new_figure(TWO_COLUMNS, 3.1)
     loss, parts = fig.subplots(1, 2, width_ratios=(1.25, 1)) if sticky else (fig.subplots(), None)
@@ -96,14 +97,15 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     factor, unit = (1.0, "") if over_surface_energy else unit_for(largest, "J/m²")
     handles = {}
     for key, line in drawn.items():
-        line = line._replace(y=factor * line.y, y_deviation=factor * line.y_deviation)
+        line = line._replace(y=factor * line.y, y_confidence=factor * line.y_confidence)
         look = {"color": lines.colour(key), "ls": "none"} | lines.marker(key)
         points = draw_averages(loss, line, **look)
         fit = linear_fit(line.x, line.y) if line.same_seeds else None
         if fit is not None:
             along = np.linspace(line.x.min(), line.x.max(), _FIT_POINTS)
             loss.plot(along, fit.intercept + fit.slope * along, color=lines.colour(key), lw=0.9, zorder=2)
-        handles[lines.name(key) + _words(fit)] = points
+        if not lines.scale:
+            handles[lines.name(key) + _words(fit)] = points
     x, y = (np.concatenate([getattr(line, name) for line in drawn.values()]) for name in "xy")
     if all(np.all(values > 0) and values.max() > _SPAN * values.min() for values in (x, y)):
         loss.set_xscale("log")
@@ -116,6 +118,10 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
         shown = _draw_parts(parts, sticky, lines)
         panel_label(parts, "b")
         handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
+    handles |= bars_handle(drawn.values())
+    if lines.scale:
+        handles = lines.handles(ls="none") | handles
+        lines.scale.draw(fig, [loss])
     legend_below(fig, handles)
     return fig
 

@@ -12,8 +12,8 @@ from matplotlib.ticker import MaxNLocator
 
 from icha.figures.curves import SEPARATION_LABEL
 from icha.figures.fig4_contact_map import _means, _show_whole
-from icha.figures.hysteresis import BRANCH_DASHES, legend_below, slope_label, unloaded_runs
-from icha.figures.select import check_topography, pick_run, ways_back
+from icha.figures.hysteresis import BRANCH_DASHES, legend_below
+from icha.figures.select import NothingToDraw, check_topography, pick_run, ways_back
 from icha.figures.style import (
     BLACK,
     BLUE,
@@ -24,6 +24,7 @@ from icha.figures.style import (
     material_label,
     new_figure,
     panel_label,
+    slope_label,
     styled,
     unit_for,
 )
@@ -85,7 +86,9 @@ def figure(
         If there is no such run, it was not unloaded, or the surface is another one's.
     """
     asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
-    labels, run = pick_run(unloaded_runs(campaign, study), f"study {study}: no unloaded run", **asked)
+    labels, run = pick_run(campaign, study, **asked)
+    if not ways_back(run):
+        raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
     period = float(run["period"])
     check_topography(labels, run, surface)
     adhesive = float(run["surface_energy"]) > 0

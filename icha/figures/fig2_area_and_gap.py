@@ -7,31 +7,34 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from icha.ensemble import ensemble
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
     SEPARATION_LABEL,
     UNLOADING,
     add_legends,
-    draw_unloading,
+    draw_line,
+    draw_ways_back,
     study_curves,
 )
 from icha.figures.select import study_errors
-from icha.figures.style import BLACK, COLOURS, GREY, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, new_figure, panel_label, styled
 
 CAPTION = (
     "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
     "F/(E* h'rms A0), on double logarithmic axes. Markers: ICHA, one for each stop of the loading path; open markers "
-    "are without adhesion. Thin dashed lines, where there are any: the way back, unloading, while the load is "
-    "compressive. Upright crosses, where there are any: boundary elements, an independent code, on the same "
-    "topographies and with the same interaction range, in the colour of the material; their area is corrected by the "
-    "perimeter of the contact. At the ranges that a grid resolves they show practically no hysteresis, so that with "
-    "adhesion they bound the limit of short ranges (JKR), and do not prove it. Lines: adhesionless theories of Persson "
-    "(area) and of Yang and Persson (separation), the linear law of Bush, Gibson and Thomas where few summits touch, "
-    "and the theories of separate summits of Greenwood and Williamson (no adhesion) and of Fuller and Tabor (with "
-    "adhesion, in the colour of the material), with the spectral moments of the surface. Oblique crosses: "
-    "adhesionless Green's function molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no roll-off), "
-    "reduced from published data."
+    "are without adhesion. Where there are several seeds the lines are means over them at common loads, with the 95 % "
+    "band of confidence of the mean (Student's t). Thin dashed lines, where there are any: the way back, unloading, "
+    "while the load is compressive. Upright crosses, where there are any: boundary elements, an independent code, on "
+    "the same topographies (means over their seeds) and with the same interaction range, in the colour of the "
+    "material; their area is corrected by the perimeter of the contact. At the ranges that a grid resolves they show "
+    "practically no hysteresis, so that with adhesion they bound the limit of short ranges (JKR), and do not prove "
+    "it. Lines: adhesionless theories of Persson (area) and of Yang and Persson (separation), the linear law of Bush, "
+    "Gibson and Thomas where few summits touch, and the theories of separate summits of Greenwood and Williamson (no "
+    "adhesion) and of Fuller and Tabor (with adhesion, in the colour of the material), with the spectral moments of "
+    "the surface. Oblique crosses: adhesionless Green's function molecular dynamics (GFMD) of other surfaces (H = "
+    "0.8, q1/q0 = 100, no roll-off), reduced from published data."
 )
 
 
@@ -65,20 +68,19 @@ def figure(
     fig = new_figure(TWO_COLUMNS, 3.3)
     left, right = fig.subplots(1, 2)
     pressures, areas, gaps = [], [], []
-    for run, back, look in curves:
-        p = run["reduced_pressure"].values
-        left.loglog(p, run["contact_area_fraction"].values, **look)
-        right.loglog(p, run["reduced_separation"].values, **look)
-        for way in back:
-            for ax, name in ((left, "contact_area_fraction"), (right, "reduced_separation")):
-                draw_unloading(ax, way["reduced_pressure"], way[name], look["mec"])
+    for line in curves.lines:
+        p, area = draw_line(left, line, _areas, logarithmic=True)
+        areas.append(area)
         pressures.append(p[p > 0])
-        areas.append(run["contact_area_fraction"].values)
-        gaps.append(run["reduced_separation"].values)
-    if any(back for _, back, _ in curves):
+        p, gap = draw_line(right, line, _separations, logarithmic=True)
+        gaps.append(gap)
+        draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
+    for ax in (left, right):
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+    if curves.unloaded:
         left.plot([], [], color=GREY, label="unloading", **UNLOADING)
-    materials = campaign[study]["material"].values.tolist()
-    for p, area, gap in _draw_solutions(left, right, materials, study_errors(model_error, study)):
+    for p, area, gap in _draw_solutions(left, right, curves.colours, study_errors(model_error, study)):
         pressures.append(p)
         areas.append(area)
         gaps.append(gap)
@@ -88,7 +90,7 @@ def figure(
     x = (pressures.min() / 1.6, max(pressures.max() * 1.6, 0.3))
     if references is not None:
         _draw_references(left, right, references, x)
-        _draw_separate_summits(left, right, references, campaign[study].to_dataset())
+        _draw_separate_summits(left, right, references, campaign[study].to_dataset(), curves.colours)
     left.set_xlim(x)
     right.set_xlim(x)
     left.set_ylim(min(areas.min(), 1.6 * x[0]) / 1.5, 1)
@@ -106,8 +108,16 @@ def figure(
     return fig
 
 
-def _draw_solutions(left, right, materials, entries):
-    """Mark the states of boundary elements; returns their pressures, areas and separations."""
+def _areas(run):
+    return run["reduced_pressure"].values, run["contact_area_fraction"].values
+
+
+def _separations(run):
+    return run["reduced_pressure"].values, run["reduced_separation"].values
+
+
+def _draw_solutions(left, right, colours, entries):
+    """Mark the states of boundary elements, means over their seeds; returns pressures, areas and separations."""
     states, drawn = [], []
     for entry, errors in entries.items():
         for material in errors["material"].values.tolist():
@@ -115,14 +125,14 @@ def _draw_solutions(left, right, materials, entries):
             drawn.append(material)
             own = errors.sel(material=material)
             area, gap = (
-                own[f"{name}_boundary_elements"].transpose(..., "reduced_pressure").values
+                ensemble(own[f"{name}_boundary_elements"].transpose("seed", ..., "reduced_pressure").values).mean
                 for name in ("contact_area_fraction", "reduced_separation")
             )
             p = np.broadcast_to(own["reduced_pressure"].values, area.shape)
             look = {
                 "ls": "none",
                 "marker": _CROSSES[again % len(_CROSSES)],
-                "mec": COLOURS[(materials.index(material) + 1) % len(COLOURS)],
+                "mec": colours.get(material, GREY),
                 "mew": 1.0,
                 # The larger ones show behind the others where the results agree, as the runs' markers do.
                 "ms": 8 if float(own["surface_energy"]) > 0 else 11,
@@ -176,7 +186,7 @@ def _draw_references(left, right, references, limits):
         )
 
 
-def _draw_separate_summits(left, right, references, dataset):
+def _draw_separate_summits(left, right, references, dataset, colours):
     """Thin lines of the theories of separate summits, where the references have them; Fuller & Tabor by material."""
     area, look = references.get("summit_area_fraction"), {"lw": 0.8, "zorder": 1.8}
     dashes = {"Greenwood & Williamson": (0, (5, 2, 1, 2)), "Fuller & Tabor": (0, (1, 1.5))}
@@ -185,14 +195,12 @@ def _draw_separate_summits(left, right, references, dataset):
         values = [references[f"greenwood_williamson_reduced_{name}"].values for name in ("pressure", "separation")]
         curves.append(("Greenwood & Williamson", GREY, *values))
     if "fuller_tabor_reduced_pressure" in references:
-        materials = dataset["material"].values.tolist()
         for k, name in enumerate(references["fuller_tabor_material"].values.tolist()):
             slope = float(references["fuller_tabor_rms_slope"][k])
-            if name in materials and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
-                colour = COLOURS[(materials.index(name) + 1) % len(COLOURS)]
+            if name in colours and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
                 own = references.isel(fuller_tabor_curve=k)
                 values = [own[f"fuller_tabor_reduced_{quantity}"].values for quantity in ("pressure", "separation")]
-                curves.append(("Fuller & Tabor", colour, *values))
+                curves.append(("Fuller & Tabor", colours[name], *values))
     for name, colour, p, separation in curves:
         pushed = p > 0
         for ax, values in ((left, area.values), (right, separation)):

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.select import first_line_runs, snapshot_label, study_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, line_look, material_label, new_figure, panel_label, styled
+from icha.ensemble import ensemble
+from icha.figures.curves import band_handle, draw_mean, material_looks
+from icha.figures.select import first_line, snapshot_label, study_errors
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.model_error import state_of
 from icha.reference.persson import persson_pressure_density
 
 CAPTION = (
     "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure p "
-    "(b), at the load given in the figure; open markers are without adhesion. Gaps are in units of the rms height, "
-    "pressures of E* h'rms. Only contact carries pressure in this model, so the integral of (b) is A/A0 and that of "
-    "(a) is 1 - A/A0 less the overlap fraction; adhesion gives the tensile tail at negative pressures. Broad "
-    "pale lines, where there are any: boundary elements, an independent code, on the same topography and with the same "
-    "interaction range, in the colour of the material; gaps out of contact and pressures in contact. At the ranges "
-    "that a grid resolves they show practically no hysteresis, so that with adhesion they bound the limit of short "
-    "ranges (JKR), and do not prove it. Line: Persson's theory of adhesionless contact."
+    "(b), at the load given in the figure; open markers are without adhesion. Where there are several seeds the lines "
+    "are means over them, with the 95 % band of confidence of the mean (Student's t). Gaps are in units of the rms "
+    "height, pressures of E* h'rms. Only contact carries pressure in this model, so the integral of (b) is A/A0 and "
+    "that of (a) is 1 - A/A0 less the overlap fraction; adhesion gives the tensile tail at negative pressures. Broad "
+    "pale lines, where there are any: boundary elements, an independent code, on the same topographies (means over "
+    "those seeds that have them) and with the same interaction range, in the colour of the material; gaps out of "
+    "contact and pressures in contact. At the ranges that a grid resolves they show practically no hysteresis, so "
+    "that with adhesion they bound the limit of short ranges (JKR), and do not prove it. Line: Persson's theory of "
+    "adhesionless contact."
 )
 
 # Sampled gaps per plotted point: bins with less are joined with their neighbours.
@@ -38,7 +45,7 @@ def figure(
     kind: str | None = None,
     target: float | None = None,
 ) -> Figure:
-    """Draw the distributions of every material on the first surface, seed and slope of a study.
+    """Draw the distributions of every material on the first surface and slope of a study, means over the seeds.
 
     Parameters
     ----------
@@ -52,29 +59,44 @@ def figure(
     ValueError
         If there is no such study or snapshot.
     """
-    runs = first_line_runs(campaign, study, kind, target)
-    dataset = campaign[study].to_dataset()
+    lines = first_line(campaign, study, kind, target)
+    looks, scale = material_looks(campaign[study].to_dataset(), [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2)
-    lowest, highest, top, named = -0.3, 0.3, 0.0, False
-    for k, (labels, run, at) in enumerate(runs):
-        look = line_look(k, adhesive=float(run["surface_energy"]) > 0)
-        look["label"] = material_label(dataset, labels.material)
-        u, density = gap_points(run, at)
-        left.loglog(u, density, markevery=1 + len(u) // _MOST_MARKERS, **look)
-        p, density = pressure_points(run, at)
-        right.semilogy(p, density, markevery=3, **look)
+    lowest, highest, top, named, floor = -0.3, 0.3, 0.0, False, []
+    for line, look in zip(lines, looks, strict=True):
+        u, densities = gap_densities(line.members)
+        if len(densities) == 1:
+            left.plot(u, densities[0], markevery=1 + len(u) // _MOST_MARKERS, **look)
+        else:
+            draw_mean(left, u, ensemble(densities), look)
+        floor.append(densities.mean(axis=0).min())
+        p, densities = pressure_densities(line.members)
+        density = densities.mean(axis=0)
+        if len(densities) == 1:
+            right.plot(p, density, markevery=3, **look)
+        else:
+            draw_mean(right, p, ensemble(densities), look)
         if len(density):  # before first contact there is no pressure
             shown = density > 1e-3 * density.max()
             lowest, highest = min(lowest, p[shown].min()), max(highest, p[shown].max())
             top = max(top, density.max())
-        step = int(run["snapshot_step"].values[at])
-        load = float(run["reduced_pressure"].values[step])
-        if (truth := _solution(study_errors(model_error, study), labels, load)) is not None:
+        loads = [float(state_of(run, at)["reduced_pressure"]) for run, at in line.members]
+        load, (run, at) = float(np.mean(loads)), line.members[0]
+        truths = _solutions(study_errors(model_error, study), line, loads)
+        if truths:
             broad = _BROAD | {"color": look["color"]}
-            left.loglog(*solution_gap_points(truth), **broad)
-            right.semilogy(*solution_pressure_points(truth), **broad)
+            left.plot(*solution_gap_points(*truths), **broad)
+            right.plot(*solution_pressure_points(*truths), **broad)
             named = True
+    left.set_xscale("log")
+    for ax in (left, right):
+        ax.set_yscale("log")
+    left.set_ylim(min(floor) / 2)
+    if scale:
+        scale.draw(fig, [left, right])
+    if any(len(line.members) > 1 for line in lines):
+        right.add_line(band_handle(len(line.members) for line in lines))
     if named:
         for ax in (left, right):
             ax.plot([], [], **_BROAD | {"color": GREY}, label="boundary elements")
@@ -91,63 +113,83 @@ def figure(
         right.set_ylim(top * 5e-5, top * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
     left.set_title(snapshot_label(run, at), loc="right")
-    left.legend(loc="lower left")
-    right.legend(loc="lower center", frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)
+    if left.get_legend_handles_labels()[0]:
+        left.legend(loc="lower left")
+    if right.get_legend_handles_labels()[0]:
+        right.legend(loc="lower center", frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)
     for ax, letter in ((left, "a"), (right, "b")):
         panel_label(ax, letter)
     return fig
 
 
-def gap_points(run: xr.Dataset, snapshot: int) -> tuple[np.ndarray, np.ndarray]:
-    """u/h_rms and P(u) h_rms of one snapshot; thinly filled bins are joined until they hold enough grid cells."""
-    height = float(run["rms_height"])
-    density = run["gap_density"].values[snapshot] * height
-    return _gap_points(run["gap_bin_edges"].values / height, density, int(run["grid"]))
+def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
+    """u/h_rms (k,) and P(u) h_rms (members, k) of snapshots; thinly filled bins are joined until they hold cells.
+
+    Raises
+    ------
+    ValueError
+        If the distributions are empty.
+    """
+    (first, _), *_ = members
+    heights = [float(run["rms_height"]) for run, _ in members]
+    densities = [run["gap_density"].values[at] * height for (run, at), height in zip(members, heights, strict=True)]
+    return _gap_densities(first["gap_bin_edges"].values / heights[0], np.array(densities), int(first["grid"]))
 
 
-def pressure_points(run: xr.Dataset, snapshot: int) -> tuple[np.ndarray, np.ndarray]:
-    """p/(E* h'_rms) and P(p) E* h'_rms of the bins of one snapshot that hold anything."""
-    unit = float(run["contact_modulus"]) * float(run["rms_slope"])
-    edges = run["pressure_bin_edges"].values / unit
-    density = run["pressure_density"].values[snapshot] * unit
-    filled = density > 0
-    return (0.5 * (edges[1:] + edges[:-1]))[filled], density[filled]
+def pressure_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
+    """p/(E* h'_rms) (k,) and P(p) E* h'_rms (members, k) of the bins of snapshots that hold anything."""
+    (first, _), *_ = members
+    unit = float(first["contact_modulus"]) * float(first["rms_slope"])
+    edges = first["pressure_bin_edges"].values / unit
+    densities = np.array([run["pressure_density"].values[at] * unit for run, at in members])
+    filled = densities.max(axis=0) > 0
+    return (0.5 * (edges[1:] + edges[:-1]))[filled], densities[:, filled]
 
 
-def solution_gap_points(truth: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """u/h_rms and P(u) h_rms of boundary elements, one state of the model error; bins joined as those of a run."""
-    return _gap_points(truth["gap_bin_edges"].values, truth["gap_density"].values, int(truth["solution_grid"]))
+def solution_gap_points(*truths: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """u/h_rms and P(u) h_rms of boundary elements, states of the model error, the mean of all; bins joined as above."""
+    densities = np.array([truth["gap_density"].values for truth in truths])
+    at, densities = _gap_densities(truths[0]["gap_bin_edges"].values, densities, int(truths[0]["solution_grid"]))
+    return at, densities.mean(axis=0)
 
 
-def solution_pressure_points(truth: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """p/(E* h'_rms) and P(p) E* h'_rms of boundary elements; bins are joined until they hold enough nodes."""
-    edges = truth["pressure_bin_edges"].values
-    content = truth["pressure_density"].values * np.diff(edges)
-    held = np.flatnonzero(content)
+def solution_pressure_points(*truths: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """p/(E* h'_rms) and P(p) E* h'_rms of boundary elements, the mean of all; bins joined until they hold nodes."""
+    edges = truths[0]["pressure_bin_edges"].values
+    content = np.array([truth["pressure_density"].values for truth in truths]) * np.diff(edges)
+    held = np.flatnonzero(content.any(axis=0))
     inside = slice(held[0], held[-1] + 1)
-    low, high, density = _joined(
-        edges[held[0] : held[-1] + 2], content[inside], _LEAST_NODES / int(truth["solution_grid"]) ** 2
-    )
-    return 0.5 * (low + high), density
+    least = _LEAST_NODES / int(truths[0]["solution_grid"]) ** 2
+    low, high, densities = _joined(edges[held[0] : held[-1] + 2], content[:, inside], least)
+    return 0.5 * (low + high), densities.mean(axis=0)
 
 
-def _gap_points(edges, density, grid):
-    """The distribution without its first bin: from zero, it has no place on a logarithmic axis."""
-    low, high, density = _joined(edges[1:], density[1:] * np.diff(edges)[1:], _LEAST_CELLS / grid**2)
-    if not len(density):
+def _gap_densities(edges, densities, grid):
+    """The distributions without their first bin: from zero, it has no place on a logarithmic axis."""
+    low, high, densities = _joined(edges[1:], densities[:, 1:] * np.diff(edges)[1:], _LEAST_CELLS / grid**2)
+    if not len(low):
         raise ValueError("the gap distribution is empty")
-    return np.sqrt(low * high), density
+    return np.sqrt(low * high), densities
 
 
-def _joined(edges, content, least):
-    """Lower and upper edges, and densities, of bins joined with those after them until they hold at least so much."""
-    points, start, gathered = [], 0, 0.0
-    for k, part in enumerate(content):
+def _joined(edges, contents, least):
+    """Lower and upper edges, and densities of every member, of bins joined until they all together hold so much."""
+    bounds, gathered = [0], 0.0
+    for k, part in enumerate(contents.sum(axis=0)):
         gathered += part
         if gathered >= least:
-            points.append((edges[start], edges[k + 1], gathered / (edges[k + 1] - edges[start])))
-            start, gathered = k + 1, 0.0
-    return np.array(points).reshape(-1, 3).T
+            bounds.append(k + 1)
+            gathered = 0.0
+    low, high = edges[bounds[:-1]], edges[bounds[1:]]
+    held = np.concatenate([np.zeros((len(contents), 1)), np.cumsum(contents, axis=1)], axis=1)
+    return low, high, np.diff(held[:, bounds], axis=1) / (high - low)
+
+
+def _solutions(entries, line, loads):
+    """The first boundary-element solutions of the states of a line's members that have some."""
+    labels = [line.labels._replace(seed=int(run["seed"])) for run, _ in line.members]
+    found = (_solution(entries, each, load) for each, load in zip(labels, loads, strict=True))
+    return [truth for truth in found if truth is not None]
 
 
 def _solution(entries, labels, load):

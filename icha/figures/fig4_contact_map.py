@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from icha.campaign import find_snapshot, spots_of
-from icha.figures.select import check_topography, pick_run, study_runs
+from icha.figures.select import check_topography, pick_run
 from icha.figures.spots import draw_spots, periodic_circles
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, new_figure, number, panel_label, styled, unit_for
 from icha.model_error import check_same_contact, contact_of_spots, jaccard, state_of
@@ -77,7 +77,7 @@ def figure(
         If there is no such run or snapshot, or the surface or the solution is another one's.
     """
     asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
-    labels, run = pick_run(study_runs(campaign, study), f"study {study}: no run", **asked)
+    labels, run = pick_run(campaign, study, **asked)
     at = find_snapshot(run, kind, target)
     period = float(run["period"])
     check_topography(labels, run, surface)

@@ -10,8 +10,15 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, UNLOADING, draw_unloading
-from icha.figures.select import path_steps, study_runs, ways_back
+from icha.figures.curves import (
+    AREA_LABEL,
+    PRESSURE_LABEL,
+    UNLOADING,
+    band_handle,
+    draw_line,
+    draw_ways_back,
+    study_curves,
+)
 from icha.figures.style import (
     BLACK,
     COLOURS,
@@ -22,16 +29,18 @@ from icha.figures.style import (
     material_label,
     new_figure,
     panel_label,
+    slope_label,
     styled,
 )
 
 CAPTION = (
     "Real contact area over nominal area against the reduced pressure F/(E* h'rms A0) (a) and against F/(E* A0) (b) "
-    "for several rms slopes (shape of the markers) and materials (colour and size). Without adhesion the curves of one "
-    "topography, scaled to different slopes, are one curve in (a); what adhesion adds depends on the material and "
-    "grows as the slope falls. In (b) the slope orders the curves: at a given load the area falls as the slope rises. "
-    "Thin dashed lines, where there are any: the way back, unloading, while the load is compressive. Measurements, "
-    "where given, are drawn as lines."
+    "for several rms slopes (shape of the markers) and materials (colour and size). Where there are several seeds the "
+    "lines are means over them at common loads, with the 95 % band of confidence of the mean (Student's t). Without "
+    "adhesion the curves of one topography, scaled to different slopes, are one curve in (a); what adhesion adds "
+    "depends on the material and grows as the slope falls. In (b) the slope orders the curves: at a given load the "
+    "area falls as the slope rises. Thin dashed lines, where there are any: the way back, unloading, while the load "
+    "is compressive. Measurements, where given, are drawn as lines."
 )
 
 
@@ -62,35 +71,33 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
     ValueError
         If there is no such study or no run in it.
     """
-    runs = study_runs(campaign, study)
+    curves = study_curves(campaign, study)
     dataset = campaign[study].to_dataset()
-    materials = [str(name) for name in dataset["material"].values]
+    materials = list(curves.colours)
     # The largest slope comes first and gets circles, as in the paper.
     slopes = sorted((float(value) for value in dataset["rms_slope"].values), reverse=True)
-    colour = {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(materials)}
-    marker = {slope: MARKERS[k % len(MARKERS)] for k, slope in enumerate(slopes)}
-    # Of curves that lie on each other all stay visible: later materials have smaller markers.
-    size = {name: 7.0 * 0.68**k for k, name in enumerate(materials)}
+    colour, marker, size = curves.colours, {}, {}
+    if curves.scale is None:
+        colour = {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(materials)}
+        marker = {slope: MARKERS[k % len(MARKERS)] for k, slope in enumerate(slopes)}
+        # Of curves that lie on each other all stay visible: later materials have smaller markers.
+        size = {name: 7.0 * 0.68**k for k, name in enumerate(materials)}
 
     fig = new_figure(TWO_COLUMNS, 3.5)
     left, right = fig.subplots(1, 2, sharey=True)
-    for labels, run in runs:
-        look = {
-            "ls": "none",
-            "marker": marker[labels.rms_slope],
-            "mec": colour[labels.material],
-            "mfc": "none",
-            "mew": 0.9,
-            "ms": size[labels.material],
-        }
-        for way in ways_back(run):
-            for ax, factor in ((left, 1.0), (right, float(run["rms_slope"]))):
-                draw_unloading(ax, factor * way["reduced_pressure"], way["contact_area_fraction"], look["mec"])
-        run = path_steps(run)
-        area = run["contact_area_fraction"].values
-        p = run["reduced_pressure"].values
-        left.loglog(p, area, **look)
-        right.loglog(p * float(run["rms_slope"]), area, **look)
+    for line in curves.lines:
+        labels = line.labels
+        if curves.scale is None:
+            own = {"marker": marker[labels.rms_slope], "mfc": "none", "ms": size[labels.material]}
+            line = line._replace(look=line.look | own | dict.fromkeys(("color", "mec"), colour[labels.material]))
+        line = line._replace(look=line.look | {"label": None})
+        slope = float(line.runs[0]["rms_slope"])
+        draw_ways_back([(left, lambda p, a, _: (p, a)), (right, lambda p, a, _, slope=slope: (p * slope, a))], line)
+        draw_line(left, line, _points, logarithmic=True)
+        draw_line(right, line, _points_at_load, logarithmic=True)
+    for ax in (left, right):
+        ax.set_xscale("log")
+        ax.set_yscale("log")
     for k, measured in enumerate(measurements):
         look = {
             "color": colour.get(measured.material, BLACK),
@@ -106,17 +113,7 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
     left.set_ylabel(AREA_LABEL)
 
     slope_handles = [
-        Line2D(
-            [],
-            [],
-            ls="none",
-            marker=marker[s],
-            mec=GREY,
-            mfc="none",
-            ms=6,
-            label=rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {s:g}",
-        )
-        for s in slopes
+        Line2D([], [], ls="none", marker=marker[s], mec=GREY, mfc="none", ms=6, label=slope_label(s)) for s in marker
     ]
     material_handles = [
         Line2D(
@@ -130,15 +127,31 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
             ms=size[m],
             label=material_label(dataset, m),
         )
-        for m in materials
+        for m in size
     ]
-    if any(ways_back(run) for _, run in runs):
+    if curves.scale:
+        curves.scale.draw(fig, [left, right])
+        named = {line.look["label"]: line.look | {"ls": "none", "ms": 5} for line in curves.lines if line.look["label"]}
+        material_handles = [Line2D([], [], **look) for look in named.values()]
+    if curves.unloaded:
         slope_handles.append(Line2D([], [], color=GREY, label="unloading", **UNLOADING))
-    right.legend(handles=slope_handles, loc="lower right")
-    first = left.legend(handles=material_handles, loc="lower right")
+    if curves.several_seeds:
+        slope_handles.append(band_handle(len(line.runs) for line in curves.lines))
+    if slope_handles:
+        right.legend(handles=slope_handles, loc="lower right")
+    first = left.legend(handles=material_handles, loc="lower right") if material_handles else None
     if measurements:
-        left.add_artist(first)
+        if first is not None:
+            left.add_artist(first)
         left.legend(loc="upper left", title="measured")
     for ax, letter in ((left, "a"), (right, "b")):
         panel_label(ax, letter)
     return fig
+
+
+def _points(run):
+    return run["reduced_pressure"].values, run["contact_area_fraction"].values
+
+
+def _points_at_load(run):
+    return run["reduced_pressure"].values * float(run["rms_slope"]), run["contact_area_fraction"].values

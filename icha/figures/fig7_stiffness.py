@@ -6,16 +6,19 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.curves import PRESSURE_LABEL, add_legends, study_curves
+from icha.figures.curves import PRESSURE_LABEL, add_legends, draw_line, study_curves
+from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, TWO_COLUMNS, new_figure, panel_label, styled
 
 CAPTION = (
-    "Contact stiffness K = -dp/du, nominal pressure p over mean separation u, against the reduced pressure "
-    "F/(E* h'rms A0): in units of E* h'rms/h_rms (a) and of p/h_rms (b), where the law K = p/u0 is a constant. "
-    "Markers: ICHA, from the tangent of the equilibrium with the present spots; open ones are without adhesion. States "
-    "under tension or of negative stiffness have no place on these axes. Line: derivative of the adhesionless "
-    "separation of Yang and Persson for an infinite surface. On a finite surface the stiffness at small loads lies "
-    "above the proportional law, as only its highest parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
+    "Contact stiffness K = -dp/du, nominal pressure p over mean separation u, against the reduced pressure F/(E* "
+    "h'rms A0): in units of E* h'rms/h_rms (a) and of p/h_rms (b), where the law K = p/u0 is a constant. Markers: "
+    "ICHA, from the tangent of the equilibrium with the present spots; open ones are without adhesion. Where there "
+    "are several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
+    "(Student's t). States under tension or of negative stiffness have no place on these axes. Line: derivative of "
+    "the adhesionless separation of Yang and Persson for an infinite surface. On a finite surface the stiffness at "
+    "small loads lies above the proportional law, as only its highest parts touch (Pastewka et al., Phys. Rev. E 87 "
+    "(2013) 062809)."
 )
 
 
@@ -32,21 +35,23 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     Raises
     ------
     ValueError
-        If there is no such study or no run in it, or nothing in it has a positive load and stiffness.
+        If there is no such study or no run in it, or nothing in it has a positive load and stiffness (`NothingToDraw`).
     """
     curves = study_curves(campaign, study)
     fig = new_figure(TWO_COLUMNS, 3.3)
     left, right = fig.subplots(1, 2)
     pressures, stiffnesses = [], []
-    for run, _, look in curves:
-        p, stiffness = stiffness_points(run)
-        left.loglog(p, stiffness, **look)
-        right.semilogx(p, stiffness / p, **look)
+    for line in curves.lines:
+        p, stiffness = draw_line(left, line, stiffness_points, logarithmic=True)
+        draw_line(right, line, _over_pressure, logarithmic=True)
         pressures.append(p)
         stiffnesses.append(stiffness)
+    left.set_xscale("log")
+    left.set_yscale("log")
+    right.set_xscale("log")
     pressures, stiffnesses = np.concatenate(pressures), np.concatenate(stiffnesses)
     if not len(pressures):
-        raise ValueError(f"study {study}: no stop with a positive load and a positive stiffness to draw")
+        raise NothingToDraw(f"study {study}: no stop with a positive load and a positive stiffness to draw")
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     ratio = stiffnesses / pressures
     if references is not None and "persson_reduced_stiffness" in references:
@@ -67,6 +72,11 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     right.set_ylabel(r"$K h_{\mathrm{rms}}/p$")
     add_legends(fig, {left: "lower right", right: "lower left"}, curves)
     return fig
+
+
+def _over_pressure(run):
+    p, stiffness = stiffness_points(run)
+    return p, stiffness / p
 
 
 def stiffness_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:

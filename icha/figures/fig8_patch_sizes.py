@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from icha.campaign import spots_of
-from icha.figures.select import first_line_runs, snapshot_label
-from icha.figures.style import TWO_COLUMNS, line_look, material_label, new_figure, panel_label, styled, unit_for
+from icha.ensemble import ensemble
+from icha.figures.curves import band_handle, draw_mean, material_looks
+from icha.figures.select import first_line, snapshot_label
+from icha.figures.style import TWO_COLUMNS, new_figure, panel_label, styled, unit_for
 
 CAPTION = (
     "Sizes of the contact patches, the areas A of the spots (united ones count as one), at the load given in the "
-    "figure; open markers are without adhesion. Number density n(A) per area of a patch and nominal area (a), bins "
-    "with few patches being joined; number of patches larger than A per nominal area (b), down to the largest one."
+    "figure; open markers are without adhesion. Where there are several seeds the lines are means over them, with the "
+    "95 % band of confidence of the mean (Student's t). Number density n(A) per area of a patch and nominal area (a), "
+    "bins with few patches being joined; number of patches larger than A per nominal area (b), down to the largest "
+    "one."
 )
 
 # Patches per plotted point of the density: bins with less are joined with their neighbours.
@@ -31,7 +37,7 @@ def figure(
     kind: str | None = None,
     target: float | None = None,
 ) -> Figure:
-    """Draw the patch sizes of every material on the first surface, seed and slope of a study.
+    """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds.
 
     Parameters
     ----------
@@ -44,26 +50,38 @@ def figure(
     ValueError
         If there is no such study or snapshot.
     """
-    runs = first_line_runs(campaign, study, kind, target)
-    dataset = campaign[study].to_dataset()
+    lines = first_line(campaign, study, kind, target)
+    looks, scale = material_looks(campaign[study].to_dataset(), [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2, sharex=True)
-    for k, (labels, run, at) in enumerate(runs):
+    for line, look in zip(lines, looks, strict=True):
+        run, at = line.members[0]
         factor, unit = unit_for(float(run["period"]), "m")
         cell = (float(run["period"]) * factor) ** 2
-        area = patch_areas(run, at) * factor**2
-        look = line_look(k, adhesive=float(run["surface_energy"]) > 0)
-        look["label"] = material_label(dataset, labels.material)
-        left.loglog(*patch_density(area, cell), **look)
-        right.loglog(*patches_above(area, cell), **look | {"marker": "none", "lw": 1.2})
+        areas = [patch_areas(run, at) * factor**2 for run, at in line.members]
+        smooth = look | {"marker": "none", "lw": 1.2}
+        for ax, points, own in ((left, patch_density, look), (right, patches_above, smooth)):
+            area, values = points(areas, cell)
+            if len(areas) == 1:
+                ax.plot(area, values[0], **own)
+            else:
+                draw_mean(ax, area, ensemble(values), own)
         shown = snapshot_label(run, at)
+    for ax in (left, right):
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+    if scale:
+        scale.draw(fig, [left, right])
+    if any(len(line.members) > 1 for line in lines):
+        right.add_line(band_handle(len(line.members) for line in lines))
     left.set_xlabel(f"patch area  $A$ ({unit}²)")
     right.set_xlabel(f"patch area  $A$ ({unit}²)")
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
     left.set_title(shown, loc="right")
-    left.legend(loc="best")
-    right.legend(loc="lower left")
+    for ax, corner in ((left, "best"), (right, "lower left")):
+        if ax.get_legend_handles_labels()[0]:
+            ax.legend(loc=corner)
     for ax, letter in ((left, "a"), (right, "b")):
         panel_label(ax, letter)
     return fig
@@ -75,18 +93,26 @@ def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
     return area[area > 0]
 
 
-def patch_density(area: np.ndarray, nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Areas, and number of patches per area of a patch and nominal area; thinly filled bins are joined.
+def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
+    """Number of patches per area of a patch and nominal area; thinly filled bins are joined.
 
-    The sum of density times width times nominal area over the points is the number of patches.
+    Parameters
+    ----------
+    areas : increasing areas of the patches of every member of an ensemble.
+
+    Returns
+    -------
+    Areas (k,), and densities (members, k): the sum of density times width times nominal area over the points is the
+    number of a member's patches.
     """
-    if not len(area):
-        return np.empty(0), np.empty(0)
-    decades = np.log10([area[0], area[-1]])
+    pooled = np.sort(np.concatenate(areas))
+    if not len(pooled):
+        return np.empty(0), np.empty((len(areas), 0))
+    decades = np.log10([pooled[0], pooled[-1]])
     count = max(int(np.ceil((decades[1] - decades[0]) * _BINS_PER_DECADE)), 1)
-    edges = np.logspace(*decades, count + 1) if count > 1 else np.array([area[0], area[-1] * (1 + 1e-9)])
-    edges[0], edges[-1] = area[0], max(area[-1], np.nextafter(area[0], np.inf))
-    number, _ = np.histogram(area, edges)
+    edges = np.logspace(*decades, count + 1) if count > 1 else np.array([pooled[0], pooled[-1] * (1 + 1e-9)])
+    edges[0], edges[-1] = pooled[0], max(pooled[-1], np.nextafter(pooled[0], np.inf))
+    number, _ = np.histogram(pooled, edges)
     # A bin ends where enough patches are gathered; what is left over at the end belongs to the last one.
     ends, gathered = [], 0
     for k, here in enumerate(number):
@@ -96,14 +122,17 @@ def patch_density(area: np.ndarray, nominal_area: float) -> tuple[np.ndarray, np
             gathered = 0
     ends = [*ends[:-1], count] if ends else [count]
     limits = edges[[0, *ends]]
-    number = np.add.reduceat(number, [0, *ends[:-1]])
-    return np.sqrt(limits[1:] * limits[:-1]), number / (np.diff(limits) * nominal_area)
+    densities = [np.histogram(area, limits)[0] / (np.diff(limits) * nominal_area) for area in areas]
+    return np.sqrt(limits[1:] * limits[:-1]), np.array(densities)
 
 
-def patches_above(area: np.ndarray, nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Areas, and number of patches at least that large per nominal area, from all patches to the largest one."""
-    above = np.arange(len(area), 0, -1)
+def patches_above(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
+    """Areas (k,), and number of patches at least that large per nominal area (members, k), down to the largest one.
+
+    `areas` as for `patch_density`.
+    """
+    pooled = np.sort(np.concatenate(areas))
     # Evenly spaced on the logarithmic axis of the number, so that the few largest patches are all there.
-    kept = np.unique(np.rint(np.geomspace(1, len(area), _CURVE_POINTS)).astype(int)) if len(area) else []
-    at = len(area) - np.asarray(kept, int)[::-1]
-    return area[at], above[at] / nominal_area
+    kept = np.unique(np.rint(np.geomspace(1, len(pooled), _CURVE_POINTS)).astype(int)) if len(pooled) else []
+    at = pooled[len(pooled) - np.asarray(kept, int)[::-1]]
+    return at, np.array([len(area) - np.searchsorted(area, at) for area in areas]) / nominal_area

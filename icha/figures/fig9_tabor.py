@@ -7,8 +7,10 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from icha.campaign import find_snapshot
-from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL
-from icha.figures.select import snapshot_label, study_runs
+from icha.ensemble import Ensemble, ensemble
+from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL, band_handle, draw_band
+from icha.figures.scale import MOST_COLOURS, places_scale
+from icha.figures.select import NothingToDraw, snapshot_label, study_runs
 from icha.figures.style import COLOURS, GREY, MARKERS, TWO_COLUMNS, new_figure, panel_label, quantity, styled
 from icha.simulation import WU_RANGE
 
@@ -16,9 +18,10 @@ CAPTION = (
     "Real contact area over nominal area (a) and mean separation over rms height (b) at the load given in the figure, "
     "against the Tabor parameter of the surface, (R_c Δγ²/E*²)^(1/3) over the range of attraction, with R_c = 1/rms "
     "curvature. Runs that differ only in the range are joined by a line: at a given surface energy a longer range "
-    "(smaller Tabor parameter) lets asperities jump into contact from farther away. Dashed: without adhesion. Shaded: "
-    "outside the Tabor parameters for which the jump-in distance was verified; single asperities, whose radii differ, "
-    "can lie there for every value of the surface's."
+    "(smaller Tabor parameter) lets asperities jump into contact from farther away. Where there are several seeds the "
+    "points are means over them, with the 95 % band of confidence of the mean (Student's t). Dashed: without "
+    "adhesion. Shaded: outside the Tabor parameters for which the jump-in distance was verified; single asperities, "
+    "whose radii differ, can lie there for every value of the surface's."
 )
 
 # The panels reach at least this part of the mean value up and down.
@@ -46,37 +49,59 @@ def figure(
     ValueError
         If there is no such study or snapshot, or no run with adhesion.
     """
-    curves, bare = {}, {}
-    for labels, run in study_runs(campaign, study):
+    # Of every line the points of every range of attraction, by seed: Tabor parameter, area and separation.
+    curves: dict[tuple, dict[float, list]] = {}
+    bare: dict[tuple, list] = {}
+    for labels, run in study_runs(campaign, study, ragged=False):
         at = find_snapshot(run, kind, target)
         step = int(run["snapshot_step"].values[at])
         state = [float(run[name].values[step]) for name in ("contact_area_fraction", "reduced_separation")]
-        line = (labels.surface, labels.seed, labels.rms_slope)
+        place = (labels.surface, labels.rms_slope)
         if float(run["surface_energy"]) > 0:
             interface = (float(run["contact_modulus"]), float(run["surface_energy"]))
-            curves.setdefault((line, interface), []).append((float(run["tabor_parameter"]), *state))
+            points = curves.setdefault((place, interface), {})
+            points.setdefault(float(run["interaction_range"]), []).append((float(run["tabor_parameter"]), *state))
         else:
-            bare[line] = state
+            bare.setdefault(place, []).append(state)
         shown = snapshot_label(run, at)
     if not curves:
-        raise ValueError(f"study {study}: no run with adhesion, so none with a Tabor parameter")
+        raise NothingToDraw(f"study {study}: no complete run with adhesion, so none with a Tabor parameter")
 
     fig = new_figure(TWO_COLUMNS, 3.1)
     panels = fig.subplots(1, 2)
-    lines = list(dict.fromkeys(line for line, _ in curves))
+    places = list(dict.fromkeys([*(place for place, _ in curves), *bare]))
     interfaces = list(dict.fromkeys(interface for _, interface in curves))
-    for (line, interface), points in curves.items():
-        colour = COLOURS[(interfaces.index(interface) + 1) % len(COLOURS)]
-        marker = MARKERS[lines.index(line) % len(MARKERS)]
-        mu, *states = np.array(sorted(points)).T
-        for ax, values in zip(panels, states, strict=True):
-            ax.plot(mu, values, "-", marker=marker, color=colour, lw=0.8, ms=4, label=_name(interface, line, lines))
-    for line, state in bare.items():
-        for ax, value in zip(panels, state, strict=True):
-            name = "no adhesion" if len(bare) == 1 or line == next(iter(bare)) else None
-            ax.axhline(value, color=GREY, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
-    parameters = [mu for points in curves.values() for mu, *_ in points]
-    smallest, largest = min(parameters), max(parameters)
+    scale = places_scale(places) if len(places) > MOST_COLOURS else None
+    drawn = []
+    for (place, interface), points in curves.items():
+        kind_of, place_of = interfaces.index(interface), places.index(place)
+        look = {
+            "color": scale.colours[place_of] if scale else COLOURS[(kind_of + 1) % len(COLOURS)],
+            "marker": MARKERS[(kind_of if scale else place_of) % len(MARKERS)],
+            "label": _name(interface, place, [] if scale else places),
+            "lw": 0.8,
+            "ms": 4,
+        }
+        over = [ensemble(members) for members in points.values()]
+        mu = np.array([each.mean[0] for each in over])
+        order = np.argsort(mu)
+        for k, ax in enumerate(panels, 1):
+            own = Ensemble(*(np.array([each[k] for each in part])[order] for part in zip(*over, strict=True)))
+            ax.plot(mu[order], own.mean, **look)
+            draw_band(ax, mu[order], own, look["color"])
+        drawn += mu.tolist()
+    for place, members in bare.items():
+        over = ensemble(members)
+        colour = scale.colours[places.index(place)] if scale else GREY
+        for k, ax in enumerate(panels):
+            name = "no adhesion" if place == next(iter(bare)) else None
+            ax.axhline(over.mean[k], color=colour, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
+    counts = [len(members) for points in curves.values() for members in points.values()]
+    if max(counts) > 1:
+        panels[0].add_line(band_handle(counts))
+    if scale:
+        scale.draw(fig, list(panels))
+    smallest, largest = min(drawn), max(drawn)
     for ax, letter, label in zip(panels, "ab", (AREA_LABEL, SEPARATION_LABEL), strict=True):
         low, high = ax.get_xlim()
         # A range of attraction that was rounded does not leave what was verified.
@@ -93,15 +118,16 @@ def figure(
         ax.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)
         panel_label(ax, letter)
     panels[0].set_title(shown, loc="right")
-    panels[0].legend(loc="best")
+    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
+    panels[0].legend(handles.values(), handles.keys(), loc="best")
     return fig
 
 
-def _name(interface, line, lines):
-    """What a curve is called: modulus and energy, and what tells its surface, seed and slope apart."""
+def _name(interface, place, places):
+    """What a curve is called: modulus and energy, and what tells its surface and slope apart."""
     name = rf"$E^{{\ast}}$ = {quantity(interface[0], 'Pa')}, $\Delta\gamma$ = {quantity(interface[1], 'J/m²')}"
-    words = ("{}", "seed {}", r"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {:g}")
+    words = ("{}", r"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {:g}")
     for k, word in enumerate(words):
-        if len({each[k] for each in lines}) > 1:
-            name += ", " + word.format(line[k])
+        if len({each[k] for each in places}) > 1:
+            name += ", " + word.format(place[k])
     return name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +10,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from icha.ensemble import ensemble
 from icha.figures.curves import UNLOADING
-from icha.figures.errors import _interfaces
-from icha.figures.select import study_runs, ways_back
-from icha.figures.style import COLOURS, GREY, MARKERS, material_label
+from icha.figures.errors import interfaces_of
+from icha.figures.scale import MOST_COLOURS, materials_scale, places_scale
+from icha.figures.select import NothingToDraw, study_runs, ways_back
+from icha.figures.style import COLOURS, GREY, MARKERS, material_label, slope_label
 from icha.labels import RunLabels
 
 # More names than this are written smaller.
@@ -22,16 +24,18 @@ BRANCH_DASHES = {"loading": "-", "unloading": UNLOADING["ls"]}
 
 
 def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
-    """The runs of a study with a way back.
+    """The runs of a study with a way back, without their spots and events.
 
     Raises
     ------
+    NothingToDraw
+        If no run is complete, or none was unloaded.
     ValueError
-        If there is no such study, or no run in it was unloaded.
+        If there is no such study.
     """
-    runs = [(labels, run) for labels, run in study_runs(campaign, study) if ways_back(run)]
+    runs = [(labels, run) for labels, run in study_runs(campaign, study, ragged=False) if ways_back(run)]
     if not runs:
-        raise ValueError(f"study {study}: no run was unloaded, so there is no way back to draw")
+        raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
     return runs
 
 
@@ -40,13 +44,33 @@ def detached_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
 
     Raises
     ------
+    NothingToDraw
+        If there is no such run in the study.
     ValueError
-        If there is no such study, or no such run in it.
+        If there is no such study.
     """
     runs = [(labels, run) for labels, run in unloaded_runs(campaign, study) if "hysteresis_loss" in run]
     if not runs:
-        raise ValueError(f"study {study}: no run was unloaded to complete separation")
+        raise NothingToDraw(f"study {study}: no run was unloaded to complete separation")
     return runs
+
+
+def detached_runs_of(campaign: xr.DataTree, studies: Sequence[str]) -> Iterator[tuple[RunLabels, xr.Dataset]]:
+    """`detached_runs` of the studies that have any.
+
+    Raises
+    ------
+    NothingToDraw
+        If none has.
+    """
+    reasons = []
+    for study in studies:
+        try:
+            yield from detached_runs(campaign, study)
+        except NothingToDraw as reason:
+            reasons.append(str(reason))
+    if reasons and len(reasons) == len(studies):
+        raise NothingToDraw("; ".join(reasons))
 
 
 def pull_off_step(run: xr.Dataset) -> int | None:
@@ -58,12 +82,15 @@ def pull_off_step(run: xr.Dataset) -> int | None:
 
 
 class Averages(NamedTuple):
-    """Means over seeds of the points of a line, their standard deviations, and whether all are of the same seeds."""
+    """Means over seeds of the points of a line, half the widths of their 95 % bands (0 of a single seed), numbers of
+    seeds, and whether all points are of the same seeds.
+    """
 
     x: np.ndarray
     y: np.ndarray
-    x_deviation: np.ndarray
-    y_deviation: np.ndarray
+    x_confidence: np.ndarray
+    y_confidence: np.ndarray
+    counts: np.ndarray
     same_seeds: bool
 
 
@@ -76,21 +103,32 @@ def averages(points: Sequence[Mapping[int, tuple[float, float]]]) -> Averages:
 
     Returns
     -------
-    Averages in the order of x; deviations of a single seed are 0.
+    Averages in the order of x.
     """
     common = set.intersection(*(set(point) for point in points))
-    samples = [np.array([point[seed] for seed in sorted(common or point)]) for point in points]
-    mean = np.array([sample.mean(axis=0) for sample in samples])
-    deviation = np.array([sample.std(axis=0, ddof=1) if len(sample) > 1 else np.zeros(2) for sample in samples])
+    over = [ensemble([point[seed] for seed in sorted(common or point)]) for point in points]
+    mean, confidence, counts = (np.array([getattr(each, name) for each in over]) for name in _AVERAGED)
     order = np.argsort(mean[:, 0], kind="stable")
-    return Averages(*mean[order].T, *deviation[order].T, bool(common))
+    return Averages(*mean[order].T, *np.nan_to_num(confidence[order].T), counts[order, 0], bool(common))
+
+
+_AVERAGED = ("mean", "confidence", "count")
+
+
+def bars_handle(lines: Iterable[Averages]) -> dict[str, Line2D]:
+    """What the legend says of bars, if there are any."""
+    counts = sorted({int(count) for line in lines for count in line.counts} - {1})
+    if not counts:
+        return {}
+    words = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
+    return {f"means of n = {words} seeds, bars 95 %": Line2D([], [], color=GREY, marker="|", ls="none", ms=8)}
 
 
 def draw_averages(axes, line: Averages, **look):
-    """Draw the points of a line with bars where there is scatter."""
+    """Draw the points of a line with bars of their 95 % confidence where there are several seeds."""
     bars = {
-        name: deviation if np.any(deviation > 0) else None
-        for name, deviation in (("xerr", line.x_deviation), ("yerr", line.y_deviation))
+        name: confidence if np.any(confidence > 0) else None
+        for name, confidence in (("xerr", line.x_confidence), ("yerr", line.y_confidence))
     }
     return axes.errorbar(line.x, line.y, **bars, elinewidth=0.6, capsize=1.5, **look)
 
@@ -99,6 +137,7 @@ class Lines:
     """Look and name of every line of a figure: a colour for every material, a marker for every surface and slope.
 
     The markers of lines without adhesion are open. A figure of one material has a colour for every surface and slope.
+    Of many materials, or many surfaces and slopes, those have colours of a `scale`, which is None otherwise.
     """
 
     def __init__(self, campaign: xr.DataTree, studies: Sequence[str], keys: Sequence[tuple]):
@@ -106,7 +145,11 @@ class Lines:
         self.keys = list(dict.fromkeys(keys))
         self.materials = list(dict.fromkeys(material for material, *_ in self.keys))
         self.places = list(dict.fromkeys((surface, slope) for _, surface, slope in self.keys))
-        self.interfaces = _interfaces({study: campaign[study].to_dataset() for study in studies}, self.materials)
+        self.interfaces = interfaces_of({study: campaign[study].to_dataset() for study in studies}, self.materials)
+        self.many_places = len(self.places) > MOST_COLOURS
+        self.scale = places_scale(self.places) if self.many_places else None
+        if not self.many_places and len(self.materials) > MOST_COLOURS:
+            self.scale = materials_scale(self.interfaces, self.materials)
 
     def adhesive(self, material: str) -> bool:
         """Whether a material has surface energy."""
@@ -115,6 +158,9 @@ class Lines:
     def colour(self, key: tuple) -> str:
         """Colour of a line."""
         material, *place = key
+        if self.scale:
+            at = self.places.index(tuple(place)) if self.many_places else self.materials.index(material)
+            return self.scale.colours[at]
         if len(self.materials) == 1:
             return COLOURS[self.places.index(tuple(place)) % len(COLOURS)]
         return COLOURS[(self.materials.index(material) + 1) % len(COLOURS)]
@@ -123,8 +169,9 @@ class Lines:
         """Look of a line's markers, arguments of `Axes.plot`."""
         material, *place = key
         colour = self.colour(key)
+        kind = self.materials.index(material) if self.many_places else self.places.index(tuple(place))
         return {
-            "marker": MARKERS[self.places.index(tuple(place)) % len(MARKERS)],
+            "marker": MARKERS[kind % len(MARKERS)],
             "mec": colour,
             "mfc": colour if self.adhesive(material) else "white",
             "mew": 0.8,
@@ -132,8 +179,20 @@ class Lines:
         }
 
     def handles(self, **look) -> dict[str, Line2D]:
-        """Legend of what tells the lines apart: materials by colour, surfaces and slopes by marker, in `look`."""
+        """Legend of what tells the lines apart: materials by colour, surfaces and slopes by marker, in `look`.
+
+        What the scale tells is not in it.
+        """
         first = self.places[0]
+        if self.many_places:
+            several = self.materials if 1 < len(self.materials) <= MOST_COLOURS else []
+            grey = {"color": GREY, "mec": GREY}
+            return {
+                material_label(self.interfaces, material): Line2D(
+                    [], [], **look | self.marker((material, *first)) | grey
+                )
+                for material in several
+            }
         if len(self.materials) == 1:
             return {
                 self.name(key): Line2D([], [], color=self.colour(key), **look | self.marker(key)) for key in self.keys
@@ -142,7 +201,7 @@ class Lines:
             material_label(self.interfaces, material): Line2D(
                 [], [], color=self.colour((material, *first)), **look | self.marker((material, *first))
             )
-            for material in self.materials
+            for material in ([] if self.scale else self.materials)
         }
         # Places that are not told apart by slope have the first marker, which the materials show.
         for place in self.places if len(self.places) > 1 else []:
@@ -167,13 +226,10 @@ class Lines:
         return ", ".join(filter(None, parts)) or material_label(self.interfaces, material)
 
 
-def slope_label(slope: float) -> str:
-    """An rms slope in text."""
-    return rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"
-
-
 def legend_below(figure: Figure, handles: Mapping[str, object], columns: int = 2) -> None:
     """Add a legend below the panels; the figure grows by its height."""
+    if not handles:
+        return
     size = 8 if len(handles) <= _MANY_NAMES else 7
     figure.set_figheight(figure.get_figheight() + 0.06 + 0.0194 * size * -(-len(handles) // columns))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)

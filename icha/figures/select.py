@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from icha.campaign import LABELS, RunLabels, find_snapshot, loading_stops, select_run
+from icha.campaign import LABELS, RAGGED, RunLabels, find_snapshot, loading_stops, run_labels, select_run
 from icha.figures.style import number
 from icha.records import COMPLETE
 
@@ -16,8 +17,8 @@ class NothingToDraw(ValueError):
     """A study has no complete run of the kind that a figure shows; the message says what is lacking."""
 
 
-def study_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All complete runs of a study, at least one.
+def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> list[tuple[RunLabels, xr.Dataset]]:
+    """All complete runs of a study, at least one; without their spots and events, which take long, if not `ragged`.
 
     Raises
     ------
@@ -33,6 +34,10 @@ def study_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Da
     complete = np.argwhere(dataset["status"].transpose(*LABELS).values == COMPLETE)
     if not len(complete):
         raise NothingToDraw(f"study {study}: no run is complete, so there is nothing to draw")
+    if not ragged:
+        campaign = xr.DataTree.from_dict(
+            {f"/{study}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])}
+        )
     found = (RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True))) for index in complete.tolist())
     return [(labels, select_run(campaign, labels)) for labels in found]
 
@@ -53,29 +58,38 @@ def pick(labels: str, wanted, there: list):
 
 
 def pick_run(
-    runs: list[tuple[RunLabels, xr.Dataset]],
-    called: str,
+    campaign: xr.DataTree,
+    study: str,
     *,
     surface: str | None = None,
     seed: int | None = None,
     rms_slope: float | None = None,
     material: str | None = None,
 ) -> tuple[RunLabels, xr.Dataset]:
-    """The first of `runs` asked for, with adhesion if there is one and no material is asked for.
+    """The first run of a study asked for, with adhesion if there is one and no material is asked for.
 
     Raises
     ------
+    NothingToDraw
+        If it is not complete.
     ValueError
-        If there is none: of what is `called`, such as "study load: no run".
+        If there is no such study or run.
     """
-    runs = [(labels, run) for labels, run in runs if surface in (None, labels.surface)]
-    runs = [(labels, run) for labels, run in runs if seed in (None, labels.seed)]
-    runs = [(labels, run) for labels, run in runs if rms_slope is None or np.isclose(rms_slope, labels.rms_slope)]
+    if study not in campaign.children:
+        raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
+    runs = [labels for labels in run_labels(campaign) if labels.study == study]
+    runs = [labels for labels in runs if surface in (None, labels.surface) and seed in (None, labels.seed)]
+    runs = [labels for labels in runs if rms_slope is None or np.isclose(rms_slope, labels.rms_slope)]
     if not runs:
-        raise ValueError(f"{called} of surface {surface}, seed {seed}, rms slope {rms_slope}")
-    adhesive = [labels.material for labels, run in runs if float(run["surface_energy"]) > 0]
-    material = pick("material", material, adhesive + [labels.material for labels, _ in runs])
-    return next((labels, run) for labels, run in runs if labels.material == material)
+        raise ValueError(f"study {study}: no run of surface {surface}, seed {seed}, rms slope {rms_slope}")
+    energy = campaign[study]["surface_energy"]
+    adhesive = [labels.material for labels in runs if float(energy.sel(material=labels.material)) > 0]
+    material = pick("material", material, adhesive + [labels.material for labels in runs])
+    labels = next(labels for labels in runs if labels.material == material)
+    status = campaign[study]["status"].sel({label: getattr(labels, label) for label in LABELS})
+    if int(status) != COMPLETE:
+        raise NothingToDraw(f"{labels}: this run is not complete, so there is nothing to draw")
+    return labels, select_run(campaign, labels)
 
 
 def check_topography(labels: RunLabels, run: xr.Dataset, surface: xr.Dataset) -> None:
@@ -109,10 +123,17 @@ def ways_back(run: xr.Dataset) -> list[xr.Dataset]:
     return [leg for name, leg in branches(run) if name == "unloading"]
 
 
-def first_line_runs(
+class Snapshots(NamedTuple):
+    """The runs of one contact, one for every seed, and where their snapshots of one kind and target are."""
+
+    labels: RunLabels
+    members: list[tuple[xr.Dataset, int]]
+
+
+def first_line(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
-) -> list[tuple[RunLabels, xr.Dataset, int]]:
-    """The runs of every material on the first surface, seed and slope of a study, and where their snapshot is.
+) -> list[Snapshots]:
+    """Of every material on the first surface and slope of a study a snapshot of every seed.
 
     Raises
     ------
@@ -121,11 +142,12 @@ def first_line_runs(
     """
     runs = study_runs(campaign, study)
     first = runs[0][0]
-    return [
-        (labels, run, find_snapshot(run, kind, target))
-        for labels, run in runs
-        if (labels.surface, labels.seed, labels.rms_slope) == (first.surface, first.seed, first.rms_slope)
-    ]
+    found: dict[str, Snapshots] = {}
+    for labels, run in runs:
+        if (labels.surface, labels.rms_slope) == (first.surface, first.rms_slope):
+            own = found.setdefault(labels.material, Snapshots(labels, []))
+            own.members.append((run, find_snapshot(run, kind, target)))
+    return list(found.values())
 
 
 _KIND_LABELS = {

@@ -143,6 +143,11 @@ def material_label(study, material: str) -> str:
     return ", ".join(parts)
 
 
+def slope_label(slope: float) -> str:
+    """An rms slope in text."""
+    return rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"
+
+
 def line_look(index: int, *, adhesive: bool) -> dict:
     """Look of the line and markers of the material `index` of a figure; open markers are without adhesion."""
     colour = COLOURS[(index + 1) % len(COLOURS)]
