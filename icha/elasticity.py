@@ -509,3 +509,20 @@ def displacement_at(
     if ewald.free:
         w -= ewald.by_images(ewald.bases(position), ewald.bases(points), moments[:2])
     return w
+
+
+def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
+    """Mean displacement of a square of a free half-space by point forces (n,) at (n, 2) in it, m.
+
+    By reciprocity it is that of the points under an even pressure on the square, whose four rectangles around a point
+    give x asinh(y/x) + y asinh(x/y) each.
+    """
+    x, y = ([along, side - along] for along in np.clip(position.T, 0.0, side))
+    potential = sum(_corner(one, other) for one in x for other in y)
+    return float(np.sum(force * potential)) / (np.pi * contact_modulus * side**2)
+
+
+def _corner(x, y):
+    """Integral of 1/r over a rectangle, r from one of its corners."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(x > 0, x * np.arcsinh(y / x), 0.0) + np.where(y > 0, y * np.arcsinh(x / y), 0.0)

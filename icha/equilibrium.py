@@ -30,7 +30,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.asperities import Asperities
 from icha.coalescence import covering_spot, disjoint_pairs, equivalent_spots, overlapping_pairs
-from icha.elasticity import HalfSpace, Interaction, displacement_at, periodic_difference
+from icha.elasticity import HalfSpace, Interaction, displacement_at, mean_displacement, periodic_difference
 from icha.jkr import JKR
 
 # Largest equilibrium error in units of h_rms at which an equilibrium counts as found.
@@ -298,6 +298,19 @@ def mean_pressure(contact: Contact, spots: Spots) -> float:
 def area_fraction(contact: Contact, spots: Spots) -> float:
     """Total contact area over nominal area."""
     return float(np.sum(np.pi * spots.contact_radius**2)) / contact.area
+
+
+def mean_gap(contact: Contact, state: ContactState) -> float:
+    """Mean over the square of separation and displacement, m; of a periodic surface the mean separation.
+
+    Of a free square the spots act as forces at their centres.
+    """
+    if not contact.asperities.free:
+        return state.separation
+    law, spots = contact.law, state.spots
+    force = law.force(spots.contact_radius, spots.radius_of_curvature)
+    sunk = mean_displacement(contact.asperities.period, law.material.contact_modulus, spots.position, force)
+    return state.separation + sunk
 
 
 def contact_stiffness(contact: Contact, state: ContactState) -> float:

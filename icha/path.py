@@ -25,6 +25,7 @@ from icha.equilibrium import (
     area_fraction,
     contact_stiffness,
     equilibrium,
+    mean_gap,
     mean_pressure,
     stored_energy,
     untouched,
@@ -444,7 +445,7 @@ class _Journey:
             reason = f"the contact area runs to {area:.2f} of the nominal one, beyond what the model covers,"
             raise self._end(NotConverged(f"{reason} before {what}"))
         self.state = state
-        if stop is None and state.separation <= 0:
+        if stop is None and mean_gap(self.contact, state) <= 0:
             raise self._end(NotConverged(f"the mean planes met before {what}, beyond what the model covers"))
 
     def _tell(self, name):

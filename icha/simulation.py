@@ -19,6 +19,7 @@ from icha.equilibrium import (
     NotConverged,
     area_fraction,
     contact_stiffness,
+    mean_gap,
     mean_pressure,
     stored_energy,
 )
@@ -53,6 +54,12 @@ VARIABLES = {
         ("step",),
         "m",
         "mean separation of the surfaces; of a free square that of its mean plane and the half-space far away",
+    ),
+    "mean_gap": (
+        ("step",),
+        "m",
+        "mean gap over the nominal area; of a periodic surface the mean separation, of a free square less or more by "
+        "what the half-space is displaced there",
     ),
     "nominal_pressure": (("step",), "Pa", "force over nominal area"),
     "contact_area_fraction": (("step",), "1", "real over nominal contact area, A/A0"),
@@ -299,6 +306,7 @@ def _step(contact, waypoint, unit):
     adhesive = contact.law.material.surface_energy > 0
     return {
         "mean_separation": state.separation,
+        "mean_gap": mean_gap(contact, state),
         "nominal_pressure": pressure,
         "contact_area_fraction": area_fraction(contact, spots),
         "spot_count": len(spots),

@@ -1,14 +1,17 @@
 """A single square on a free half-space, against closed forms and direct sums of single spots' displacements."""
 
+import itertools
+
 import numpy as np
 import pytest
+import scipy.integrate
 import scipy.optimize
 from half_space import displacement_by_quadrature, jkr_approach, jkr_force
 
 import icha
 from icha.asperities import Asperities, find_summits
-from icha.elasticity import HalfSpace, Interaction, displacement_at
-from icha.equilibrium import Contact, Control, equilibrium, mean_pressure, untouched
+from icha.elasticity import HalfSpace, Interaction, displacement_at, mean_displacement
+from icha.equilibrium import Contact, Control, equilibrium, mean_gap, mean_pressure, untouched
 from icha.fields import DisplacementField, displacement_field
 from icha.images import _image_potential
 from icha.jkr import JKR
@@ -212,6 +215,48 @@ def test_spots_far_apart_do_not_see_the_boundary():
     assert 8**2 * differences[1] < differences[0] < 0.01
 
 
+def test_mean_displacement_is_exact_for_forces():
+    """Against adaptive quadrature of 1/r; in the middle 4 asinh(1)/pi of F/(E* L), in a corner half of it."""
+    places = np.array([[0.5, 0.5], [0.0, 0.0], [0.31, 0.88], [1.0, 0.4]])
+    middle = 4 * np.arcsinh(1.0) / np.pi
+    for place, exact in zip(places, (middle, middle / 2, None, None), strict=True):
+        found = mean_displacement(2.0, MODULUS, 2.0 * place[None], np.array([3.0])) * 2.0 / 3.0
+        if exact is None:
+            x, y = place
+            exact = 0.0
+
+            # In polar coordinates around the point the integrand is the way to the edge.
+            def way(angle, x=x, y=y):
+                c, s = np.cos(angle), np.sin(angle)
+                along = (1 - x if c > 0 else x) / abs(c)
+                across = (1 - y if s > 0 else y) / abs(s)
+                return min(along, across)
+
+            corners = sorted(np.mod(np.arctan2(v - y, u - x), 2 * np.pi) for u in (0, 1) for v in (0, 1))
+            turns = sorted({0.0, *corners, np.pi / 2, np.pi, 1.5 * np.pi, 2 * np.pi})
+            for low, high in itertools.pairwise(turns):
+                exact += scipy.integrate.quad(way, low, high, epsrel=1e-11)[0] / np.pi
+        assert found == pytest.approx(exact, rel=1e-9)
+
+
+def test_a_wide_rough_square_is_nearly_periodic():
+    """The same heights: what differs are some spots at the rim, and the mean plane far away."""
+    heights = icha.SelfAffineSpectrum(1e-4, 1.5e-5, 4e-6, 0.8, rms_slope=0.2).realise(160, 3).heights
+    material = icha.Material(25e6, 0.0, 1e-8)
+    path = icha.Path(reduced_pressures=[2e-3, 1e-2, 3e-2])
+    periodic, free = (
+        icha.simulate(icha.Surface(heights, 1e-4, boundary), material, path) for boundary in ("periodic", "free")
+    )
+    area = free["contact_area_fraction"].values / periodic["contact_area_fraction"].values
+    np.testing.assert_allclose(area, 1.0, atol=0.06)
+    np.testing.assert_array_equal(periodic["mean_gap"], periodic["mean_separation"])
+    height = float(periodic["rms_height"])
+    np.testing.assert_allclose(free["mean_gap"] / height, periodic["mean_gap"] / height, atol=0.1)
+    # Sunk in by about the mean displacement under an even pressure.
+    sunk = (free["mean_gap"] - free["mean_separation"]).values
+    np.testing.assert_allclose(sunk / (0.9464 * 1e-4 * free["nominal_pressure"].values / 25e6), 1.0, atol=0.05)
+
+
 def test_the_way_back_of_a_free_square_ends_apart():
     rng = np.random.default_rng(11)
     n = 48
@@ -334,4 +379,10 @@ def test_distributions_and_fields_of_a_free_square():
     nodes = np.array([[3, 59], [0, 0], [31, 2]])
     exact = direct_sum(nodes[:, ::-1] / grid, spots.position, spots.contact_radius, spots.radius_of_curvature, energy)
     np.testing.assert_allclose(w[tuple(nodes.T)], exact, rtol=1e-6)
+    fine = displacement_field(
+        contact.law, 1.0, 600, spots.position, spots.contact_radius, spots.radius_of_curvature, free=True
+    )
+    # Nodes stand for the cells that follow them, too: the mean over the square by the trapezoidal rule.
+    mean = 0.25 * sum(np.mean(fine[y, x]) for y in (slice(-1), slice(1, None)) for x in (slice(-1), slice(1, None)))
+    assert mean_gap(contact, state) - state.separation == pytest.approx(mean, rel=0.01)
     np.testing.assert_allclose(gap(contact.law, surface, state), w + state.separation - surface.heights, atol=1e-15)
