@@ -12,7 +12,7 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page clean
+.PHONY: help environment slurm-environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -26,6 +26,7 @@ help:
 	@echo "make linkcheck  check the documentation's links to other sites"
 	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
+	@echo "make slurm-environment  install Snakemake with its executor for Slurm in .venv-slurm; docs/howto/cluster.md"
 	@echo "make clean   remove results, Snakemake's records and the built documentation (not the environment)"
 
 environment: .venv/.installed
@@ -38,6 +39,14 @@ environment: .venv/.installed
 .venv/.installed: .venv-tools/bin/uv pyproject.toml uv.lock
 	.venv-tools/bin/uv sync --quiet --locked --python $(PYTHON)
 	@touch $@
+
+# An environment of its own, for what Snakemake needs to talk to Slurm slows every start. See docs/howto/cluster.md.
+.venv-slurm/.installed: .venv-tools/bin/uv pyproject.toml uv.lock profiles/slurm/executor/pyproject.toml
+	UV_PROJECT_ENVIRONMENT=$(CURDIR)/.venv-slurm .venv-tools/bin/uv sync --quiet --locked --no-default-groups --extra slurm --python $(PYTHON)
+	.venv-tools/bin/uv pip install --quiet --no-deps --python .venv-slurm/bin/python --editable profiles/slurm/executor
+	@touch $@
+
+slurm-environment: .venv-slurm/.installed
 
 run: environment
 	$(if $(CONFIG),@python -m icha.configuration $(CONFIG))

@@ -16,6 +16,7 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/publish.smk"
 
 
+# On a cluster these are run where Snakemake runs, and not submitted: targets, and what is soon done.
 localrules:
     all,
     surfaces,
@@ -25,6 +26,15 @@ localrules:
     figures,
     report,
     publish,
+    configuration,
+    campaign_dataset,
+    comparison,
+    model_error,
+    checks,
+    verdict,
+    figure,
+    report_page,
+    deposit,
 
 
 rule all:
