@@ -1,0 +1,208 @@
+"""A Slurm of one node on this machine's loopback, for tests and benchmarks.
+
+Needs root and, on Debian, `apt-get install --no-install-recommends slurmctld slurmd slurm-client munge`. The daemons
+run as children of this process, with a configuration, a key, a socket and a spool of their own, and end with the
+`with` block. A Slurm that is already set up on the machine is never touched: `why_not` then says so.
+"""
+
+import fcntl
+import os
+import secrets
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "srun", "squeue", "sinfo", "scancel")
+PACKAGES = "slurmctld slurmd slurm-client munge"
+FOLDER = "icha-slurm-"
+# Job steps lose the variable SLURM_CONF on their way through the executor, and look here.
+SYSTEM_CONFIGURATION = Path("/etc/slurm/slurm.conf")
+
+CONFIGURATION = """\
+ClusterName=icha
+SlurmctldHost={host}(127.0.0.1)
+SlurmctldPort={controller_port}
+SlurmdPort={node_port}
+SlurmUser=root
+SlurmdUser=root
+AuthType=auth/munge
+AuthInfo=socket={folder}/munge.socket
+CredType=cred/munge
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.pid
+# Nothing here asks for the control groups of the kernel, which containers often do without.
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+# What every job asked for and how it ended, a line each.
+JobCompType=jobcomp/filetxt
+JobCompLoc={folder}/finished_jobs
+MpiDefault=none
+SwitchType=switch/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU_Memory
+SchedulerType=sched/backfill
+SchedulerParameters=sched_interval=1,bf_interval=1
+MinJobAge=3600
+KillWait=2
+ReturnToService=2
+# The node has as many cores as is said below, whatever the machine has.
+SlurmdParameters=config_overrides
+NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} RealMemory={memory} State=UNKNOWN
+PartitionName=local Nodes={host} Default=YES MaxTime=INFINITE State=UP
+"""
+
+
+@dataclass(frozen=True)
+class SingleNode:
+    """A running Slurm: its folder, and the environment in which its commands find it."""
+
+    folder: Path
+    environment: dict[str, str]
+
+    def command(self, *arguments: str) -> str:
+        """What a command of Slurm says."""
+        done = subprocess.run(
+            arguments, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60
+        )
+        if done.returncode:
+            raise RuntimeError(f"{' '.join(arguments)} ended with {done.returncode}:\n{done.stdout}")
+        return done.stdout
+
+    def active_jobs(self) -> list[str]:
+        """Numbers of the jobs that wait or run."""
+        return self.command("squeue", "--noheader", "--format=%i").split()
+
+    def finished_jobs(self) -> list[dict[str, str]]:
+        """Records of the jobs that have ended, in the order in which they ended, as Slurm's controller wrote them."""
+        records = self.folder / "finished_jobs"
+        lines = records.read_text().splitlines() if records.exists() else []
+        return [dict(field.split("=", 1) for field in line.split() if "=" in field) for line in lines]
+
+
+def why_not() -> str | None:
+    """Why a Slurm of one's own cannot be started here; None if it can."""
+    if os.geteuid() != 0:
+        return "Slurm's daemons need root"
+    missing = [name for name in PROGRAMS if shutil.which(name) is None]
+    if missing:
+        return f"Slurm is not installed ({', '.join(missing)} missing; on Debian: apt-get install {PACKAGES})"
+    if "SLURM_CONF" in os.environ:
+        return f"this machine belongs to a Slurm (SLURM_CONF={os.environ['SLURM_CONF']})"
+    if os.path.lexists(SYSTEM_CONFIGURATION) and not _ours(SYSTEM_CONFIGURATION):
+        return f"this machine belongs to a Slurm ({SYSTEM_CONFIGURATION})"
+    return None
+
+
+@contextmanager
+def single_node(cores: int = 4, memory: int = 8000):
+    """A Slurm with one node of `cores` cores and `memory` megabytes; all of it ends with the block."""
+    with ExitStack() as stack:
+        # One at a time on a machine: there is one place for the configuration.
+        lock = stack.enter_context(open(Path(tempfile.gettempdir(), "icha-slurm.lock"), "w"))
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        reason = why_not()
+        if reason:
+            raise RuntimeError(reason)
+        folder = Path(tempfile.mkdtemp(prefix=FOLDER))
+        stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        folder.chmod(0o755)
+        for name in ("state", "spool"):
+            (folder / name).mkdir()
+        key = folder / "munge.key"
+        key.write_bytes(secrets.token_bytes(1024))
+        key.chmod(0o400)
+
+        configuration = folder / "slurm.conf"
+        controller_port, node_port = _free_ports(2)
+        configuration.write_text(
+            CONFIGURATION.format(
+                host=socket.gethostname().split(".")[0],
+                folder=folder,
+                cores=cores,
+                memory=memory,
+                controller_port=controller_port,
+                node_port=node_port,
+            )
+        )
+        SYSTEM_CONFIGURATION.parent.mkdir(parents=True, exist_ok=True)
+        SYSTEM_CONFIGURATION.unlink(missing_ok=True)
+        SYSTEM_CONFIGURATION.symlink_to(configuration)
+        stack.callback(SYSTEM_CONFIGURATION.unlink, missing_ok=True)
+
+        environment = {name: value for name, value in os.environ.items() if not name.startswith(("SLURM_", "SBATCH_"))}
+        environment["SLURM_CONF"] = str(configuration)
+        node = SingleNode(folder, environment)
+        for name, *options in (
+            ("munged", "--foreground", "--force", f"--key-file={key}", f"--socket={folder}/munge.socket",
+             f"--pid-file={folder}/munged.pid", f"--seed-file={folder}/munged.seed", f"--log-file={folder}/munged.log"),
+            ("slurmctld", "-D", "-c"),
+            ("slurmd", "-D"),
+        ):  # fmt: skip
+            said = stack.enter_context(open(folder / f"{name}.said", "w"))
+            daemon = subprocess.Popen(
+                [shutil.which(name), *options],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=said,
+                stderr=said,
+                start_new_session=True,
+            )
+            stack.callback(_end, daemon)
+            if name == "munged":
+                _wait_for((folder / "munge.socket").exists, daemon, folder)
+        _wait_for(lambda: "idle" in node.command("sinfo", "--noheader", "--format=%t"), daemon, folder)
+        stack.callback(_cancel_all, node)
+        yield node
+
+
+def _ours(path: Path) -> bool:
+    """Whether a configuration is that of a single node of this module, perhaps one that was killed."""
+    return path.is_symlink() and os.readlink(path).startswith(str(Path(tempfile.gettempdir(), FOLDER)))
+
+
+def _free_ports(number: int) -> list[int]:
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket()) for _ in range(number)]
+        for each in sockets:
+            each.bind(("127.0.0.1", 0))
+        return [each.getsockname()[1] for each in sockets]
+
+
+def _wait_for(ready, daemon: subprocess.Popen, folder: Path, seconds: float = 30) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and daemon.poll() is None:
+        try:
+            if ready():
+                return
+        except RuntimeError:
+            pass  # the controller does not answer yet
+        time.sleep(0.1)
+    said = "\n".join(f"{file.name}: {file.read_text()[-2000:]}" for file in sorted(folder.glob("*.said")))
+    raise RuntimeError(f"Slurm did not start:\n{said}")
+
+
+def _cancel_all(node: SingleNode, seconds: float = 30) -> None:
+    """Cancel what still runs, and wait until its processes are gone."""
+    end = time.monotonic() + seconds
+    while (jobs := node.active_jobs()) and time.monotonic() < end:
+        node.command("scancel", *jobs)
+        time.sleep(0.3)
+
+
+def _end(daemon: subprocess.Popen) -> None:
+    daemon.terminate()
+    try:
+        daemon.wait(timeout=20)
+    except subprocess.TimeoutExpired:
+        daemon.send_signal(signal.SIGKILL)
+        daemon.wait()
