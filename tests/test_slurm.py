@@ -1,0 +1,239 @@
+"""A campaign on a Slurm: real daemons, real submissions, on a node of our own that ends with the tests.
+
+`ICHA_REQUIRE_SLURM=1` makes a failure of what would be a skip.
+"""
+
+import hashlib
+import os
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+from conftest import REPOSITORY, copy_project, snakemake
+from slurm.single_node import FOLDER, SYSTEM_CONFIGURATION, single_node, why_not
+
+PYTHON = REPOSITORY / ".venv-slurm/bin/python"
+CONFIGURATION = "config/campaigns/batches.yaml"
+CAMPAIGN = """
+name: batches
+title: Runs in batches
+summary: Twelve tiny runs; the numbers mean nothing.
+license: CC0-1.0
+surfaces:
+  rough:
+    kind: self_affine
+    period: 100 um
+    rolloff_wavelength: 50 um
+    short_wavelength: 10 um
+    hurst: 0.8
+    grid: 64
+materials:
+  soft: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 2.071 nm}
+  hertz: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2.071 nm}
+studies:
+  slopes:
+    surfaces: [rough]
+    seeds: [1, 2]
+    rms_slopes: [0.2, 0.5, 1.0]
+    materials: [soft, hertz]
+    targets:
+      reduced_pressures: [1.0e-3, 1.0e-2]
+figures:
+  fig2_area_and_gap:
+    study: slopes
+"""
+RUNS = {
+    f"runs/slopes/rough/seed{seed}/slope{slope}/{material}.nc"
+    for seed in (1, 2)
+    for slope in ("0.2", "0.5", "1")
+    for material in ("soft", "hertz")
+}
+SPOILT = "runs/slopes/rough/seed2/slope0.5/hertz.nc"
+
+
+def slurm_is_needed():
+    """Skip where there can be no Slurm, unless it is required."""
+    reason = why_not()
+    if reason is None and not PYTHON.exists():
+        reason = "Snakemake's executor for Slurm is not installed (make slurm-environment)"
+    if reason is not None:
+        (pytest.fail if os.environ.get("ICHA_REQUIRE_SLURM") == "1" else pytest.skip)(reason)
+
+
+def project_with_campaign(folder):
+    project = copy_project(REPOSITORY, folder)
+    (project / CONFIGURATION).write_text(CAMPAIGN)
+    return project
+
+
+def results_of(project):
+    """Checksums of all results but what is measured while they are made."""
+    folder = project / "results/batches"
+    return {
+        str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file() and file.relative_to(folder).parts[0] not in ("logs", "benchmarks", "run_times.tsv")
+    }
+
+
+@dataclass
+class Call:
+    """A call of Snakemake, and what Slurm knows of its submissions."""
+
+    said: str
+    returncode: int
+    results: dict[str, str]
+    records: list[dict[str, str]]
+    comments: dict[str, str]
+
+
+def call_with_profile(node, project, *arguments):
+    """Call Snakemake with the profile as it is shipped, but for the time between two questions to Slurm."""
+    before = len(node.finished_jobs())
+    done = subprocess.run(
+        [PYTHON, "-m", "snakemake", "--workflow-profile", "slurm", "--configfile", CONFIGURATION,
+         "--slurm-batches-init-seconds-before-status-checks", "1", *arguments],
+        cwd=project,
+        env=node.environment | {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=500,
+    )  # fmt: skip
+    records = node.finished_jobs()[before:]
+    known = dict(
+        line.split("|") for line in node.command("squeue", "--states=all", "--noheader", "--format=%i|%k").splitlines()
+    )
+    comments = {record["JobId"]: known[record["JobId"]] for record in records}
+    return Call(done.stdout, done.returncode, results_of(project), records, comments)
+
+
+@pytest.fixture(scope="module")
+def calls(tmp_path_factory):
+    """The campaign with one run that cannot be written, then with what was in its way removed, then with an edit."""
+    slurm_is_needed()
+    project = project_with_campaign(tmp_path_factory.mktemp("slurm") / "project")
+    obstacle = project / "results/batches" / Path(SPOILT).with_name(".hertz.nc.part")
+    obstacle.mkdir(parents=True)
+    batches = ("--group-components", "surfaces=10", "references=10", "runs=6")
+    with single_node() as node:
+        spoilt = call_with_profile(node, project, *batches)
+        obstacle.rmdir()
+        whole = call_with_profile(node, project, *batches)
+        # All runs of `soft` are outdated, and none of them can be submitted.
+        configuration = project / CONFIGURATION
+        configuration.write_text(CAMPAIGN.replace("50 mJ", "60 mJ"))
+        refused = call_with_profile(node, project, "--default-resources", "slurm_partition=nowhere")
+        plan = snakemake(project, "--dry-run", configuration=CONFIGURATION)
+    return {"spoilt": spoilt, "whole": whole, "refused": refused, "plan": plan}
+
+
+def test_runs_go_through_slurm_in_fewer_submissions_than_runs(calls):
+    call = calls["spoilt"]
+    submitted = sorted(call.comments.values())
+    assert submitted == ["rule_references_reference", "rule_runs_run", "rule_runs_run", "rule_surfaces_surface"]
+    assert len(RUNS) == 12
+    # Every submission that Snakemake speaks of is in Slurm's records, and nothing else is.
+    assert all(f"SLURM jobid {record['JobId']} " in call.said for record in call.records)
+    assert call.said.count("SLURM jobid") == len(call.records) == 4
+
+
+def test_batches_ask_for_the_cores_and_the_memory_of_what_runs_side_by_side(calls):
+    call = calls["spoilt"]
+    batches = [record for record in call.records if call.comments[record["JobId"]] == "rule_runs_run"]
+    for record in batches:
+        # Six runs on four cores are a layer of four and one of two: four times a run's memory, twice its time.
+        assert record["ProcCnt"] == "4"
+        assert "mem=2400M" in record["Tres"] and record["TimeLimit"] == "480"
+    (surfaces,) = [record for record in call.records if call.comments[record["JobId"]] == "rule_surfaces_surface"]
+    assert surfaces["ProcCnt"] == "2" and "mem=1200M" in surfaces["Tres"] and surfaces["TimeLimit"] == "30"
+
+
+def test_a_run_that_fails_is_reported_and_stops_no_other(calls):
+    call = calls["spoilt"]
+    assert call.returncode != 0
+    assert {name for name in call.results if name.startswith("runs/")} == RUNS - {SPOILT}
+    assert "references/rough.nc" in call.results and "config.used.yaml" in call.results
+    states = [record["JobState"] for record in call.records]
+    assert sorted(states) == ["COMPLETED", "COMPLETED", "COMPLETED", "FAILED"]
+    failed = next(record["JobId"] for record in call.records if record["JobState"] == "FAILED")
+    assert f"SLURM-job '{failed}' failed" in call.said
+    # The reason stands in the log of the run, which is shown.
+    assert "Error in group runs" in call.said
+    assert f"logs/{Path(SPOILT).with_suffix('.log')}" in call.said
+    assert ".hertz.nc.part" in call.said
+
+
+def test_the_next_call_computes_what_is_missing_and_nothing_else(calls):
+    before, call = calls["spoilt"], calls["whole"]
+    assert call.returncode == 0, call.said
+    assert list(call.comments.values()) == ["rule_runs_run"]
+    assert call.records[0]["ProcCnt"] == "1"
+    assert before.results.items() <= call.results.items()
+
+
+def test_results_are_those_of_a_local_run_byte_for_byte(calls, tmp_path):
+    project = project_with_campaign(tmp_path / "project")
+    local = snakemake(project, configuration=CONFIGURATION)
+    assert local.returncode == 0, local.stdout
+    expected = results_of(project)
+    assert RUNS | {"dataset/batches.nc", "report.html", "verdict.txt"} <= expected.keys()
+    assert calls["whole"].results == expected
+
+
+def test_outdated_results_are_not_taken_for_new_ones_when_their_jobs_never_ran(calls):
+    refused, plan = calls["refused"], calls["plan"]
+    assert refused.returncode != 0 and not refused.records
+    assert "nowhere" in refused.said
+    outdated = {name for name in RUNS if name.endswith("soft.nc")}
+    assert {name for name in refused.results if name.startswith("runs/")} == RUNS - outdated
+    assert plan.returncode == 0 and f"run {len(outdated)}" in " ".join(plan.stdout.split())
+
+
+def test_nothing_is_left_behind():
+    slurm_is_needed()
+    with single_node() as node:
+        folder = node.folder
+        job = node.command("sbatch", "--parsable", "--output=/dev/null", "--chdir=/", "--wrap=sleep 600").strip()
+        assert node.active_jobs() == [job]
+    assert not folder.exists() and not os.path.lexists(SYSTEM_CONFIGURATION)
+    left = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if str(folder).encode() in (process / "environ").read_bytes() + (process / "cmdline").read_bytes():
+                left.append((process / "cmdline").read_bytes())
+        except OSError:
+            continue  # ended meanwhile
+    assert left == []
+
+
+def test_a_slurm_of_the_machine_is_left_alone(monkeypatch, tmp_path):
+    monkeypatch.setattr("os.geteuid", lambda: 0)
+    monkeypatch.setattr("shutil.which", lambda name: f"/usr/sbin/{name}")
+    monkeypatch.delenv("SLURM_CONF", raising=False)
+    theirs = tmp_path / "slurm.conf"
+    monkeypatch.setattr("slurm.single_node.SYSTEM_CONFIGURATION", theirs)
+    assert why_not() is None
+    theirs.write_text("ClusterName=theirs\n")
+    assert "belongs to a Slurm" in why_not()
+    with pytest.raises(RuntimeError, match="belongs to a Slurm"), single_node():
+        pass
+    assert theirs.read_text() == "ClusterName=theirs\n"
+    # What a killed test left is no Slurm of the machine.
+    theirs.unlink()
+    theirs.symlink_to(f"/tmp/{FOLDER}gone/slurm.conf")
+    assert why_not() is None
+    monkeypatch.setenv("SLURM_CONF", "/etc/theirs.conf")
+    assert "belongs to a Slurm" in why_not()
+
+
+def test_the_profile_names_rules_that_there_are():
+    profile = yaml.safe_load((REPOSITORY / "profiles/slurm/config.yaml").read_text())
+    rules = " ".join(file.read_text() for file in (REPOSITORY / "workflow/rules").glob("*.smk"))
+    assert all(f"rule {name}:" in rules for name in profile["groups"])
+    assert set(profile["group-components"]) == set(profile["groups"].values())
+    default = yaml.safe_load((REPOSITORY / "profiles/default/config.yaml").read_text())
+    for key in ("scheduler", "keep-going", "rerun-incomplete", "show-failed-logs", "rerun-triggers", "nolock"):
+        assert profile[key] == default[key]
