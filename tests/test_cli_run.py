@@ -1,0 +1,110 @@
+"""`icha run` for real, on a very small campaign: what fails, what is stopped, and what is said of it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from conftest import REPOSITORY, copy_project
+
+CAMPAIGN = """
+name: tiny
+title: Tiny
+summary: For tests.
+license: CC0-1.0
+surfaces:
+  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 50 um, short_wavelength: 20 um, hurst: 0.8, grid: 32}
+materials:
+  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
+  sticky: {contact_modulus: 10 kPa, surface_energy: 500 mJ/m^2, interaction_range: 2 nm}
+studies:
+  load:
+    surfaces: [rough]
+    seeds: [1]
+    rms_slopes: [1.0]
+    materials: [bare, sticky]
+    targets: {reduced_pressures: [1.0e-3, 1.0e-2]}
+"""
+# At the start of `run_sweep`: a bug, as far as users can tell.
+CRASH = '    if material["surface_energy"] == 0:\n        raise RuntimeError("a bug in the program")\n'
+
+
+def command(project, *arguments):
+    program = [sys.executable, "-c", "from icha.cli import main; main()", "run", "tiny", *arguments]
+    environment = os.environ | {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"}
+    return program, {"cwd": project, "env": environment, "stdout": subprocess.PIPE, "text": True}
+
+
+def run(project, *arguments):
+    program, how = command(project, *arguments)
+    return subprocess.run(program, stderr=subprocess.STDOUT, **how)
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    folder = copy_project(REPOSITORY, tmp_path_factory.mktemp("cli") / "project")
+    (folder / "config/campaigns/tiny.yaml").write_text(CAMPAIGN)
+    return folder
+
+
+def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
+    script = project / "workflow/scripts/run_sweep.py"
+    whole = script.read_text()
+    begin = "    scaled = read_surface"
+    assert whole.count(begin) == 1
+    script.write_text(whole.replace(begin, CRASH + begin))
+    try:
+        done = run(project, "dataset")
+    finally:
+        script.write_text(whole)
+    assert done.returncode == 1, done.stdout
+    assert "1 job failed:\n  Sweep load: rough, seed 1, slope 1, bare" in done.stdout
+    assert "RuntimeError('a bug in the program')" in done.stdout
+    assert "log: results/tiny/logs/runs/load/rough/seed1/slope1/bare.log" in done.stdout
+    assert "not done, for want of what failed" in done.stdout and "Traceback" not in done.stdout
+    assert (project / "results/tiny/runs/load/rough/seed1/slope1/sticky.nc").is_file()
+    assert not (project / "results/tiny/dataset/tiny.nc").exists()
+    # All that Snakemake said is kept, and it is told where.
+    log = project / done.stdout.splitlines()[-1].removeprefix("log:").strip()
+    assert "Error in rule run" in log.read_text()
+
+
+def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project):
+    done = run(project, "dataset")
+    assert done.returncode == 1, done.stdout
+    assert "1 run could not be computed to the end:\n  load/rough/seed1/slope1/sticky\n    the path ends" in done.stdout
+    assert "Verdict on the checks" in done.stdout
+    assert "dataset: results/tiny/dataset/tiny.nc" in done.stdout and "Traceback" not in done.stdout
+    lines = [line for line in done.stdout.splitlines() if line.startswith("[")]
+    assert len(lines) >= 4 and " left] " in lines[0]
+    # A second call tries only the verdict again.
+    again = run(project, "runs")
+    assert again.returncode == 0 and "Nothing to do" in again.stdout
+
+
+def test_it_goes_on_after_it_was_stopped(project):
+    program, how = command(project, "runs", "--", "--forceall")
+    process = subprocess.Popen(program, stderr=subprocess.STDOUT, start_new_session=True, **how)
+    said = process.stdout.readline()
+    assert said.startswith("["), said
+    process.send_signal(signal.SIGINT)
+    rest = process.communicate(timeout=60)[0]
+    assert process.returncode == 1
+    assert "Stopped before the end. The same command goes on from here." in rest and "Traceback" not in rest
+    assert "failed:" not in rest
+    for _ in range(50):  # nothing is left running
+        left = subprocess.run(["pgrep", "-f", f"snakemake.*{project}"], capture_output=True, text=True).stdout
+        if not left:
+            break
+        time.sleep(0.1)
+    assert not left
+    done = run(project, "runs")
+    assert done.returncode == 0, done.stdout
+
+
+def test_wrong_options_of_snakemake_are_its_own_words(project):
+    refused = run(project, "--", "--no-such-option")
+    assert refused.returncode == 1
+    assert "Snakemake could not start:" in refused.stdout and "--no-such-option" in refused.stdout
