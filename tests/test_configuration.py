@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 import icha
+import icha.topography
 from icha.configuration import model
 from icha.configuration.design import value_label
 from icha.configuration.expansion import (
@@ -757,6 +758,93 @@ def test_what_names_a_varied_surface_means_its_variants(load):
 )
 def test_names_of_variants_are_read_by_people(value, label, load):
     assert value_label(load().campaign.surfaces["rough"].model_copy(update={"period": value}), "period") == label
+
+
+def _measured_surface(**changes):
+    scan = REPOSITORY / "config/topographies/synthetic_scan.txt"
+    section = {"kind": "measured", "path": str(scan), "height_unit": "nm", "size": ["72 um", "64 um"]}
+    return section | {"missing": "fill", "boundary": "window"} | changes
+
+
+def test_a_measured_surface_at_its_own_slope(load):
+    campaign = load({"surfaces.rough": _measured_surface(), "studies.one.rms_slopes": "measured"}).campaign
+    (case,) = run_cases(campaign)
+    topography = campaign.topography("rough")
+    assert (case.seed, case.rms_slope) == (0, topography.rms_slope)
+    assert (topography.grid, topography.period, topography.boundary) == (128, 64e-6, "periodic")
+    assert icha.topography.prepared_topography(
+        campaign.surfaces["rough"].path, surface_settings_of_file(campaign, "rough")
+    ).rms_slope == pytest.approx(case.rms_slope, rel=1e-5)
+
+
+def surface_settings_of_file(campaign, name):
+    return {key: value for key, value in surface_settings(campaign, name).items() if key != "kind"}
+
+
+def test_the_preparation_of_a_measured_surface_is_varied(load):
+    changes = {
+        "surfaces.rough": _measured_surface(),
+        "studies.one.rms_slopes": "measured",
+        "studies.one.vary": {"detrend": ["tilt", "curvature"], "boundary": ["mirror", "free"]},
+    }
+    cases = run_cases(load(changes).campaign)
+    assert [case.surface for case in cases] == [
+        f"rough-detrend{detrend}-boundary{boundary}"
+        for detrend in ("tilt", "curvature")
+        for boundary in ("mirror", "free")
+    ]
+    # A mirror image has the slope of what it is of; a plane is part of a slope, and a paraboloid of another.
+    assert len({case.rms_slope for case in cases}) > 1
+
+
+def test_another_file_of_the_same_name_is_another_run(load, tmp_path):
+    def checksum():
+        campaign = load({"surfaces.rough": _file_surface("own.npy")}).campaign
+        return run_sha256(campaign, run_cases(campaign)[0])
+
+    heights = np.random.default_rng(1).random((16, 16))
+    np.save(tmp_path / "own.npy", heights)
+    first = checksum()
+    np.save(tmp_path / "own.npy", heights)
+    assert checksum() == first
+    np.save(tmp_path / "own.npy", heights + 1)
+    assert checksum() != first
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"path": "none.txt"}, "surfaces.rough.path: "),
+        ({"boundary": "reflecting"}, "surfaces.rough.boundary: 'reflecting' is not a choice; allowed: 'periodic'"),
+        ({"boundary": None}, "surfaces.rough.boundary: the key is missing; needed: What lies beyond the edges"),
+        ({"missing": "refuse"}, "surfaces.rough.missing: 'refuse'"),
+        ({"height_unit": None}, "surfaces.rough.height_unit: "),
+        ({"height_unit": "kg"}, "surfaces.rough.height_unit: 'kg'"),
+        ({"size": ["1 mm"]}, "surfaces.rough.size: ['1 mm'] has 1 entries; allowed: one length"),
+        ({"crop": {"x": "0 um", "y": "0 um", "side": "1 mm"}}, "surfaces.rough.crop: "),
+        ({"crop": {"x": "0 um", "z": "0 um"}}, "surfaces.rough.crop.z: unknown key"),
+        ({"taper": 0.7}, "surfaces.rough.taper: 0.7 is out of range; allowed: a number in (0, 0.5]"),
+        ({"boundary": "mirror", "taper": 0.2}, "taper: is for boundary window, this one is mirror; allowed"),
+        ({"boundary": "periodic", "detrend": "tilt"}, "detrend: 'tilt' would break the periodicity; allowed"),
+        ({"format": "xyz"}, "surfaces.rough.path: "),
+        ({"hurst": 0.8}, "surfaces.rough.hurst: unknown key"),
+    ],
+)
+def test_mistakes_about_measured_surfaces(changes, message, load, tmp_path):
+    section = {key: value for key, value in _measured_surface(**changes).items() if value is not None}
+    with pytest.raises(ConfigurationError) as error:
+        load({"surfaces.rough": section})
+    lines = str(error.value).splitlines()
+    assert any(message in line and line.startswith(f"{tmp_path}/campaign.yaml: ") for line in lines), lines
+    assert all("allowed: " in line or "needed: " in line for line in lines), lines
+
+
+def test_boundary_elements_are_periodic(load):
+    changes = {"surfaces.rough": _measured_surface(boundary="free"), "boundary_elements": {"truth": TRUTH}}
+    with pytest.raises(
+        ConfigurationError, match=r"boundary_elements\.truth\.study: 'one' has a surface without periods"
+    ):
+        load({**changes, "materials.soft.surface_energy": "0 J/m^2"})
 
 
 @pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))

@@ -7,7 +7,9 @@ named after it: `rough-hurst0.6`.
 
 from __future__ import annotations
 
+import hashlib
 import itertools
+import re
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from typing import Any
@@ -40,7 +42,7 @@ def designed(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Probl
     Returns
     -------
     The campaign and an empty list; or the campaign as it was and all problems. Slopes that are `measured` remain to be
-    replaced (`with_measured_slopes`).
+    replaced (`Campaign.with_topographies`).
     """
     found = [
         problem for label, study in campaign.studies.items() for problem in _study_problems(campaign, label, study)
@@ -59,19 +61,9 @@ def designed(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Probl
             "materials": dict(campaign.materials) | variants.derived["materials"],
         }
     )
-    return _with_variants_for_their_origin(grown.with_contacts(contacts), variants.origin), []
-
-
-def with_measured_slopes(campaign: Campaign, slopes: Mapping[str, float]) -> Campaign:
-    """The campaign with the slopes of its topographies, by surface, in the place of `measured`."""
-    contacts = {
-        label: [
-            each._replace(rms_slope=slopes[each.surface]) if each.rms_slope == MEASURED else each
-            for each in campaign.contacts(label)
-        ]
-        for label in campaign.studies
-    }
-    return campaign.with_contacts(contacts)
+    grown = grown.with_contacts(contacts)
+    grown._origins = variants.origin
+    return _with_variants_for_their_origin(grown, variants.origin), []
 
 
 def _lists(label: str, study: Study) -> dict[str, list[_Placed]]:
@@ -250,7 +242,9 @@ def value_label(section, name: str) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if not isinstance(value, float):
-        return str(value)
+        text = str(value)
+        # Text of all kinds, the name of a channel for one, is no name of a file.
+        return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
     unit = next((each.si for each in type(section).model_fields[name].metadata if isinstance(each, Unit)), None)
     if unit is None:
         return number_label(value)

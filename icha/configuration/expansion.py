@@ -6,7 +6,8 @@ import hashlib
 import itertools
 import json
 
-from icha.configuration.model import BesideStudy, Campaign, RunFigure, SelfAffineSurface
+from icha.configuration.model import BesideStudy, Campaign, RunFigure
+from icha.configuration.topography import MeasuredSurface
 from icha.labels import ContactLabels, RunLabels, SolutionLabels, number_label
 
 
@@ -124,8 +125,10 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
 def surface_settings(campaign: Campaign, name: str) -> dict:
     """Everything that determines a topography but its seed and its file, in SI units."""
     surface = campaign.surfaces[name]
-    if isinstance(surface, SelfAffineSurface):
+    if surface.random:
         return surface.model_dump()
+    if isinstance(surface, MeasuredSurface):
+        return {"kind": surface.kind} | surface.preparation
     return {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.metres_per_unit}
 
 
@@ -154,7 +157,9 @@ def _load_unit(campaign, measurement) -> float:
 
 def run_sha256(campaign: Campaign, case: RunLabels) -> str:
     """Checksum of everything that determines a run."""
-    return _sha256([run_settings(campaign, case), surface_settings(campaign, case.surface)])
+    topography = campaign.topography(case.surface)
+    file = [topography.sha256] if topography else []
+    return _sha256([run_settings(campaign, case), surface_settings(campaign, case.surface), *file])
 
 
 def campaign_sha256(campaign: Campaign) -> str:

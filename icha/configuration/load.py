@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 import os
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
@@ -13,11 +14,12 @@ from typing import Any, get_args
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from icha.configuration.design import designed, with_measured_slopes
+from icha.configuration.design import designed
 from icha.configuration.height_map import read_height_map
 from icha.configuration.measurement import read_columns
-from icha.configuration.model import BESIDE_STUDIES, SURFACE_KINDS, Campaign, Defaults
-from icha.configuration.problems import Problem, problems, unresolved
+from icha.configuration.model import SURFACE_KINDS, Campaign, Defaults, Topography
+from icha.configuration.problems import Problem, problems
+from icha.configuration.topography import Crop, MeasuredSurface
 from icha.configuration.values import MEASURED, NAME_PATTERN, NOTHING
 from icha.surface import Surface
 
@@ -70,9 +72,8 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     fail(design_problems)
     topographies, unread = _topographies(campaign)
     fail(unread)
-    campaign = with_measured_slopes(campaign, {name: slope for name, (_, slope) in topographies.items()})
-    fail(problems(campaign))
-    fail(_problems_of_files(campaign, topographies))
+    campaign = campaign.with_topographies(topographies)
+    fail([*problems(campaign), *_problems_of_measurements(campaign)])
     return Configuration(campaign, yaml.safe_dump(written, sort_keys=False, allow_unicode=True, width=110))
 
 
@@ -256,6 +257,8 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
         return Defaults
     if location[0] == "surfaces" and len(location) == 2:
         return SURFACE_KINDS.get(content["surfaces"][location[1]].get("kind"), model.SelfAffineSurface)
+    if location[0] == "surfaces":
+        return Crop
     if location == ("figures",):
         return model.Figures
     if location == ("one_asperity",):
@@ -282,9 +285,8 @@ def _keys(location: tuple, content: Any) -> list[str]:
     return list(section.model_fields) if section else []
 
 
-def _topographies(campaign: Campaign) -> tuple[dict[str, tuple[int, float | None]], list[Problem]]:
-    """Nodes along a side, and the slope where a study asks for it, of every topography that is pressed and comes from
-    a file; and what is wrong with the files."""
+def _topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
+    """What there is to know of every topography that is pressed and comes from a file; what is wrong with them."""
     contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
     asking = {each.surface for each in contacts if each.rms_slope == MEASURED}
     found, wrong = {}, []
@@ -293,21 +295,33 @@ def _topographies(campaign: Campaign) -> tuple[dict[str, tuple[int, float | None
         if surface.random:
             continue
         try:
-            heights = read_height_map(surface.path, surface.metres_per_unit)
+            grid, period, boundary, slope = _facts(surface, name in asking)
         except ValueError as error:
-            wrong.append((("surfaces", name, "path"), surface.path, str(error)))
+            key = getattr(error, "key", "path")
+            origin = campaign.origin("surfaces", name)
+            variant = "" if origin == name else f"of variant {name!r}: "
+            wrong.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
             continue
-        slope = Surface(heights, surface.period).rms_slope if name in asking else None
+        with open(surface.path, "rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
         # Six digits name the files, and are more than any instrument has.
-        found[name] = len(heights), None if slope is None else float(f"{slope:.6g}")
+        found[name] = Topography(grid, period, boundary, None if slope is None else float(f"{slope:.6g}"), digest)
     return found, wrong
 
 
-def _problems_of_files(campaign: Campaign, topographies: Mapping[str, tuple[int, float | None]]) -> Iterable[Problem]:
-    for name, (grid, _) in topographies.items():
-        for section in BESIDE_STUDIES:
-            for label in getattr(campaign, section):
-                yield from unresolved(campaign, section, label, name, grid)
+def _facts(surface, with_slope: bool) -> tuple[int, float, str, float | None]:
+    if isinstance(surface, MeasuredSurface):
+        # Slow to import, and not for every campaign.
+        from icha.topography import topography_facts
+
+        facts = topography_facts(surface.path, surface.preparation)
+        return facts.grid, facts.period, facts.boundary, facts.rms_slope if with_slope else None
+    heights = read_height_map(surface.path, surface.metres_per_unit)
+    slope = Surface(heights, surface.period).rms_slope if with_slope else None
+    return len(heights), surface.period, "periodic", slope
+
+
+def _problems_of_measurements(campaign: Campaign) -> Iterable[Problem]:
     for name, measurement in campaign.measurements.items():
         try:
             read_columns(measurement.path, measurement.columns)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path as FilePath
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
@@ -21,9 +21,11 @@ from pydantic import (
     model_validator,
 )
 
+from icha.configuration.topography import MeasuredSurface
 from icha.configuration.units import conversion_factor
 from icha.configuration.values import (
     MAX_GRID,
+    MEASURED,
     ROUNDING,
     AreaFraction,
     Flag,
@@ -146,8 +148,8 @@ class FileSurface(Section):
 
 
 # By the value of their key `kind`.
-SURFACE_KINDS = {"self_affine": SelfAffineSurface, "file": FileSurface}
-AnySurface = Annotated[SelfAffineSurface | FileSurface, Field(discriminator="kind")]
+SURFACE_KINDS = {"self_affine": SelfAffineSurface, "file": FileSurface, "measured": MeasuredSurface}
+AnySurface = Annotated[SelfAffineSurface | FileSurface | MeasuredSurface, Field(discriminator="kind")]
 
 
 class Material(Section):
@@ -226,8 +228,9 @@ def _scalars(*sections: type[Section]) -> dict[str, str]:
     found: dict[str, str] = {}
     for section in sections:
         for name, field in section.model_fields.items():
-            inner = get_args(field.annotation) or (field.annotation,)
-            if name not in ("kind", "path") and not any(isinstance(t, type) and issubclass(t, Section) for t in inner):
+            kinds = get_args(field.annotation) or (field.annotation,)
+            whole = any(get_origin(kind) is tuple or isinstance(kind, type(Section)) for kind in kinds)
+            if name not in ("kind", "path") and not whole:
                 found.setdefault(name, field.description)
     return found
 
@@ -664,6 +667,16 @@ class Contact(NamedTuple):
     material: str
 
 
+class Topography(NamedTuple):
+    """What the plan of a campaign needs to know of a topography from a file."""
+
+    grid: int
+    period: float  # m
+    boundary: str
+    rms_slope: float | None  # None where no study asks for it
+    sha256: str
+
+
 class Author(Section):
     """A person who answers for the campaign."""
 
@@ -696,7 +709,7 @@ class Campaign(Section):
         default=Defaults(), description="Values for all surfaces, materials or studies that do not give their own."
     )
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)] = Field(
-        description="Surfaces by name: `kind: self_affine` or `kind: file`."
+        description="Surfaces by name: `kind: self_affine`, `kind: measured` or `kind: file`."
     )
     materials: Annotated[dict[Name, Material], Field(min_length=1)] = Field(description="Materials by name.")
     studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
@@ -718,6 +731,8 @@ class Campaign(Section):
     figures: Figures = Field(default=Figures(), description="Figures and what they show.")
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
+    _topographies: dict[str, Topography] = PrivateAttr(default={})
+    _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
 
     def loop_load(self, entry: BoundaryElementLoops) -> float:
         """The reduced pressure at which boundary elements both ways turn: the last one of their study."""
@@ -739,6 +754,42 @@ class Campaign(Section):
         campaign = self.model_copy(update={"studies": studies})
         campaign._contacts = contacts
         return campaign
+
+    def with_topographies(self, topographies: Mapping[str, Topography]) -> Campaign:
+        """The same campaign with what was read of its topographies, whose slopes stand in the place of `measured`."""
+        contacts = {
+            study: [
+                each._replace(rms_slope=topographies[each.surface].rms_slope) if each.rms_slope == MEASURED else each
+                for each in runs
+            ]
+            for study, runs in self._contacts.items()
+        }
+        campaign = self.with_contacts(contacts)
+        campaign._topographies = dict(topographies)
+        return campaign
+
+    def topography(self, surface: str) -> Topography | None:
+        """What was read of a topography from a file; None of a random one."""
+        return self._topographies.get(surface)
+
+    def origin(self, section: str, name: str) -> str:
+        """The entry of a section (surfaces, materials) of which `name` is a variant, or itself."""
+        return self._origins.get((section, name), name)
+
+    def boundary(self, surface: str) -> str:
+        """What lies beyond the edges of a surface: `periodic` or `free`."""
+        topography = self.topography(surface)
+        return topography.boundary if topography else "periodic"
+
+    def grid(self, surface: str) -> int:
+        """Nodes along a side of a surface."""
+        topography = self.topography(surface)
+        return topography.grid if topography else self.surfaces[surface].grid
+
+    def period(self, surface: str) -> float:
+        """Side of a surface, m."""
+        topography = self.topography(surface)
+        return topography.period if topography else self.surfaces[surface].period
 
     def surface_seeds(self, study: str, surface: str) -> list[int]:
         """Seeds of a surface in a study; a surface that is read from a file has one realisation, numbered 0."""
@@ -779,7 +830,7 @@ class Campaign(Section):
 
         return self.model_copy(
             update={
-                "surfaces": {n: placed(s) if isinstance(s, FileSurface) else s for n, s in self.surfaces.items()},
+                "surfaces": {n: s if s.random else placed(s) for n, s in self.surfaces.items()},
                 "measurements": {name: placed(m) for name, m in self.measurements.items()},
             }
         )

@@ -138,23 +138,27 @@ def _solution_problems(campaign: Campaign, location, entry):
     if not contacts:
         yield location, entry.study, "has no run with all that is asked for; allowed: combinations that the study has"
     for name in dict.fromkeys(each.surface for each in contacts):
-        surface = campaign.surfaces[name]
-        if not surface.random:
-            continue  # only its file knows its grid
-        yield from unresolved(campaign, *location, name, surface.grid)
-        if surface.grid * entry.refinement > MAX_GRID:
-            reason = f"gives {surface.grid * entry.refinement} nodes a side on {name!r}; allowed: {MAX_GRID} at most"
-            yield (*location, "refinement"), entry.refinement, reason
+        if campaign.boundary(name) != "periodic":
+            reason = "has a surface without periods; allowed: studies of periodic surfaces, as boundary elements are"
+            yield (*location, "study"), entry.study, f"{reason} ({name!r} is not)"
+            continue
+        yield from _unresolved(campaign, location, entry, name)
+        nodes = campaign.grid(name) * entry.refinement
+        if nodes > MAX_GRID:
+            yield (
+                (*location, "refinement"),
+                entry.refinement,
+                f"gives {nodes} nodes a side on {name!r}; allowed: {MAX_GRID} at most",
+            )
 
 
-def unresolved(campaign: Campaign, section: str, entry: str, surface: str, grid: int) -> Iterator[Problem]:
+def _unresolved(campaign: Campaign, location, entry, surface: str) -> Iterator[Problem]:
     """Materials of an entry beside a study whose attraction the grid of a surface does not resolve."""
-    asked = getattr(campaign, section)[entry]
-    spacing = campaign.surfaces[surface].period / (grid * asked.coarsest)
-    for label in dict.fromkeys(each.material for each in campaign.solved(asked) if each.surface == surface):
+    spacing = campaign.period(surface) / (campaign.grid(surface) * entry.coarsest)
+    for label in dict.fromkeys(each.material for each in campaign.solved(entry) if each.surface == surface):
         material = Interface(**campaign.materials[label].model_dump())
         if problem := resolution_problem(material, spacing):
-            yield (section, entry, "materials"), label, f"on surface {surface!r}: {problem}"
+            yield (*location, "materials"), label, f"on surface {surface!r}: {problem}"
 
 
 def _sources_problems(campaign: Campaign, location, name):

@@ -37,6 +37,8 @@ _HEADINGS = {
     "Campaign": "Top level",
     "Defaults": "`defaults`",
     "SelfAffineSurface": "`surfaces.<name>` with `kind: self_affine`",
+    "MeasuredSurface": "`surfaces.<name>` with `kind: measured`",
+    "Crop": "`surfaces.<name>.crop`",
     "FileSurface": "`surfaces.<name>` with `kind: file`",
     "Material": "`materials.<name>`",
     "Study": "`studies.<name>`",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
@@ -70,6 +70,8 @@ class Crop(Section):
 
 class MeasuredSurface(Section):
     """A measured topography, prepared as the keys say. The mean height is always removed."""
+
+    random: ClassVar[bool] = False
 
     kind: Literal["measured"] = Field(description="Topography from a measurement.")
     path: Text = Field(description="File of the topography. Relative to the configuration file.")

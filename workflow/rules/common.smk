@@ -83,14 +83,14 @@ def code_of(script, *modules):
 
 
 def height_map(wildcards):
-    """The file of a surface of `kind: file`."""
+    """The file of a surface that is not made at random."""
     surface = CAMPAIGN.surfaces[wildcards.surface]
-    return {"height_map": surface.path} if surface.kind == "file" else {}
+    return {} if surface.random else {"height_map": surface.path}
 
 
 def points_of(surface):
-    """Nodes of a surface's grid; a guess where only its file knows."""
-    return getattr(CAMPAIGN.surfaces[surface], "grid", 2048) ** 2
+    """Nodes of a surface's grid."""
+    return CAMPAIGN.grid(surface) ** 2
 
 
 def memory_of(surface):
@@ -106,7 +106,7 @@ def threads_of(surface):
 def figure_memory(name):
     """Megabytes that a figure needs: the map holds a topography."""
     return 2000 + (
-        16 * max(map(points_of, CAMPAIGN.surfaces)) // 10**6 if name in ("fig4_contact_map", "fig16_snap_map") else 0
+        16 * max(points_of(name) for name, _ in surface_cases(CAMPAIGN)) // 10**6 if name in ("fig4_contact_map", "fig16_snap_map") else 0
     )
 
 
