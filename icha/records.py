@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import contextmanager
 
 import netCDF4
 import numpy as np
@@ -34,15 +35,21 @@ _COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN = range(4)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design")
+STATUS_ATTRIBUTES = {
+    "units": "1",
+    "long_name": "status of the run",
+    "flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8),
+    "flag_meanings": " ".join(STATUS_MEANINGS),
+    "comment": "values that a run does not have are filled with _FillValue",
+}
+
+# Dimensions and values of variables by name; texts are characters, along a last dimension without a name.
+Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
 def status_variable(dims: tuple[str, ...], values: np.ndarray) -> xr.Variable:
     """What became of every run, as positions in `STATUS_MEANINGS`. Those that are not complete may lack values."""
-    flags = {"flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8), "flag_meanings": " ".join(STATUS_MEANINGS)}
-    attrs = {"units": "1", "long_name": "status of the run"} | flags
-    return xr.Variable(
-        dims, values.astype(np.int8), attrs | {"comment": "values that a run does not have are filled with _FillValue"}
-    )
+    return xr.Variable(dims, values.astype(np.int8), STATUS_ATTRIBUTES)
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
@@ -139,8 +146,15 @@ def read_campaign(path: str | os.PathLike) -> xr.DataTree:
 
 
 def _read(load, path):
-    try:
+    with _readable(path):
         return load(path, engine="netcdf4")
+
+
+@contextmanager
+def _readable(path):
+    """Name the file that cannot be read."""
+    try:
+        yield
     except FileNotFoundError:
         raise ValueError(f"{path}: no such file") from None
     except (OSError, RuntimeError) as error:
@@ -156,10 +170,33 @@ def read_run(path: str | os.PathLike) -> xr.Dataset:
         If the file cannot be read or is not a run dataset.
     """
     run = read_dataset(path)
-    for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
-        if name not in run:
-            raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")
+    _check_is_run(run.variables, path)
     return run
+
+
+def read_run_values(path: str | os.PathLike) -> tuple[Values, dict]:
+    """Read the values of a run dataset and its attributes, without those of its variables: quickly.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or is not a run dataset.
+    """
+    with _readable(path), netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        file.set_auto_chartostring(False)
+        _check_is_run(file.variables, path)
+        values = {
+            name: (variable.dimensions[: -1 if variable.dtype == "S1" else None], variable[...])
+            for name, variable in file.variables.items()
+        }
+        return values, {name: file.getncattr(name) for name in file.ncattrs()}
+
+
+def _check_is_run(variables, path):
+    for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
+        if name not in variables:
+            raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")
 
 
 def write_surface(

@@ -7,8 +7,9 @@ import pytest
 import small_campaign as small
 import xarray as xr
 
-from icha import Surface
+from icha import Surface, campaign_file
 from icha.campaign import campaign_tree, run_labels, select_run
+from icha.campaign_file import write_campaign
 from icha.records import read_campaign, read_dataset, read_run, read_surface, write_dataset, write_surface
 
 
@@ -233,12 +234,64 @@ def test_combinations_that_nobody_asked_for_are_not_in_the_design(tmp_path):
     np.testing.assert_array_equal(kept["spot_force"].values, asked[steep]["spot_force"].values)
 
 
+@pytest.mark.parametrize("runs", [1, 2, 3], ids=lambda n: f"{n} in a block")
+def test_blocks_of_runs_leave_no_seams(tmp_path, monkeypatch, runs):
+    """Also where a block is cut short, or holds runs that are not in the design."""
+    members = {**cyclic.runs(), **dict(small.runs())}
+    del members[next(iter(cyclic.runs()))]
+    write_campaign(members.items(), tmp_path / "whole.nc")
+    monkeypatch.setattr(campaign_file, "_RUNS_IN_BLOCK", runs)
+    monkeypatch.setattr(campaign_file, "_VALUES_IN_BLOCK", 2000)
+    write_campaign(members.items(), tmp_path / "blocks.nc")
+    xr.testing.assert_identical(read_campaign(tmp_path / "blocks.nc"), read_campaign(tmp_path / "whole.nc"))
+
+
+def test_runs_may_come_as_files_in_any_order(tmp_path):
+    pairs = []
+    for k, (labels, run) in enumerate(small.runs()):
+        write_dataset(run, tmp_path / f"{k}.nc")
+        pairs.append((labels, tmp_path / f"{k}.nc"))
+    design = [labels for labels, _ in pairs]
+    for name, given in (("one.nc", pairs), ("two.nc", reversed(pairs)), ("three.nc", iter(small.runs()))):
+        write_campaign(given, tmp_path / name, design=design)
+        xr.testing.assert_identical(read_campaign(tmp_path / name), campaign_tree(small.runs()))
+    assert len({(tmp_path / name).read_bytes() for name in ("one.nc", "two.nc", "three.nc")}) == 1
+
+
+def test_a_campaign_that_cannot_be_written_leaves_nothing(tmp_path):
+    labels, run = small.runs()[0]
+    (tmp_path / "damaged.nc").write_bytes(b"nonsense")
+    with pytest.raises(ValueError, match=r"damaged\.nc: not a readable"):
+        write_campaign([(labels, run), (labels._replace(seed=2), tmp_path / "damaged.nc")], tmp_path / "a" / "c.nc")
+    write_dataset(simple(), tmp_path / "other.nc")
+    with pytest.raises(ValueError, match=r"other\.nc: not a run dataset"):
+        write_campaign([(labels, tmp_path / "other.nc")], tmp_path / "a" / "c.nc")
+    odd = run.assign(contact_modulus=run["contact_modulus"] * 2, seed=run["seed"] + 1)
+    with pytest.raises(ValueError, match="contact_modulus differs"):
+        write_campaign([(labels, run), (labels._replace(seed=2), odd)], tmp_path / "a" / "c.nc")
+    assert list((tmp_path / "a").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["gap_bin_edges", "pressure_bin_edges"])
+def test_bins_that_differ_between_runs_that_share_them_are_refused(name):
+    # The materials share the gaps' bins, the seeds the pressures'.
+    (one, first), (two, second) = (
+        [pair for pair in small.runs() if pair[0].study == "single"]
+        if name == "pressure_bin_edges"
+        else [pair for pair in small.runs() if pair[0].study == "slopes"][:2]
+    )
+    with pytest.raises(ValueError, match=f"{name} differs between runs that share"):
+        campaign_tree([(one, first), (two, second.assign({name: second[name] * 1.001}))])
+
+
 def test_what_does_not_fit_the_design_is_refused():
     (labels, run), *_ = small.runs()
     with pytest.raises(ValueError, match=r"slopes/.*/soft: this run is not in the design"):
         campaign_tree([(labels, run)], design=[labels._replace(material="hertz")])
     with pytest.raises(ValueError, match="study single: there is no run of it"):
         campaign_tree([(labels, run)], design=[labels, labels._replace(study="single")])
+    with pytest.raises(ValueError, match=r"slopes/.*/soft: this run is not in the design"):
+        campaign_tree([(labels, run)], design=[labels._replace(study="single")])
 
 
 def test_runs_that_end_early_keep_what_they_have(tmp_path):
@@ -246,18 +299,19 @@ def test_runs_that_end_early_keep_what_they_have(tmp_path):
     short = run.isel(step=slice(0, 3), snapshot=slice(0, 1), spot=np.flatnonzero(run["spot_snapshot"] == 0))
     write_dataset(campaign_tree([(labels, short), *others]), tmp_path / "c.nc")
     taken = select_run(read_campaign(tmp_path / "c.nc"), labels)
-    assert taken.attrs["incomplete"] == "1 of 2 along snapshot"
+    assert taken.attrs["incomplete"] == "1 of 2 snapshots"
     assert taken.sizes["step"] == 3 and taken.sizes["snapshot"] == 1
     np.testing.assert_array_equal(taken["nominal_pressure"].values, short["nominal_pressure"].values)
 
 
-def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing(tmp_path):
+def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
     holed = runs[0][1].copy(deep=True)
     holed["contact_area_fraction"][1] = np.nan
-    tree = campaign_tree([(runs[0][0], holed), *runs[1:]])
-    with pytest.raises(ValueError, match="contact_area_fraction"):
-        write_dataset(tree, tmp_path / "c.nc")
+    with pytest.raises(
+        ValueError, match=r"slopes/rough/seed1/slope1/soft: .*'contact_area_fraction' holds 1 of .*step=1"
+    ):
+        campaign_tree([(runs[0][0], holed), *runs[1:]])
 
 
 def same(taken, run, labels):
