@@ -38,6 +38,7 @@ SWEEPS = (
     ("tamaas", 2, True, "gap"),
 )
 CODES = tuple(dict.fromkeys(code for code, *_ in SWEEPS))
+PARTS = ("sweep", "scaling", "stages", "campaigns")
 # Patches along a side of the surfaces of the scaling; a patch has some 470 spots at the end of the sweep.
 PATCHES = (1, 2, 3, 5, 8, 15)
 
@@ -121,6 +122,65 @@ def stages(scratch: Path, limit: float) -> None:
         run(name, command, scratch / f"{name}.json", threads, limit, {"surface": surface, "adhesion": adhesion})
 
 
+# Small runs, of 7 loads with adhesion, that differ in seed and surface energy.
+CAMPAIGN = """
+name: many
+title: Many small runs
+summary: A benchmark of the workflow.
+license: CC-BY-4.0
+surfaces:
+  rough: {{kind: self_affine, period: 100 um, rolloff_wavelength: 50 um, short_wavelength: 6.25 um, hurst: 0.8,
+          grid: 128}}
+materials:
+  soft: {{contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 2 nm}}
+studies:
+  many:
+    surfaces: [rough]
+    seeds: 1..{seeds}
+    rms_slopes: [1.0]
+    materials: [soft]
+    vary: {{surface_energy: [0 J/m^2, 5 mJ/m^2, 10 mJ/m^2, 20 mJ/m^2, 50 mJ/m^2]}}
+    targets: {{reduced_pressures: [1.0e-3, 2.15e-3, 4.64e-3, 1.0e-2, 2.15e-2, 4.64e-2, 0.1]}}
+figures:
+  fig2_area_and_gap: {{study: many}}
+"""
+
+
+def campaigns(scratch: Path, limit: float) -> None:
+    """The workflow itself: the plan of 10 000 runs, and 1 000 small runs from surfaces to report."""
+    cores = min(2, os.cpu_count())
+
+    def snakemake(seeds: int, *options: str) -> tuple[Path, Path, list[str]]:
+        folder = scratch / f"campaign-{seeds}"
+        folder.mkdir()
+        file = folder / "campaign.yaml"
+        file.write_text(CAMPAIGN.format(seeds=seeds))
+        command = [sys.executable, "-m", "snakemake", "--snakefile", str(HERE.parent / "Snakefile")]
+        return (
+            folder,
+            file,
+            [*command, "--directory", str(folder), "--configfile", str(file), "--quiet", "all", *options],
+        )
+
+    _, _, command = snakemake(2000, "--dry-run")
+    print("campaign-plan ...", end=" ", flush=True)
+    planned = measure(command, cores, limit)
+    keep("campaign-plan", {"runs": 10000} | asdict(planned))
+    print(f"{planned.outcome}, {planned.wall:.1f} s, {planned.peak / 2**20:.0f} MiB", flush=True)
+
+    folder, file, command = snakemake(200, "--cores", str(cores))
+    print("campaign-runs ...", end=" ", flush=True)
+    # The number of threads of a job is its rule's; Snakemake sets it.
+    whole = measure(command, cores, limit)
+    print(f"{whole.outcome}, {whole.wall:.1f} s", flush=True)
+    if whole.outcome == "complete":
+        sample = [sys.executable, script("solve_small"), str(file), str(folder / "results/many"), "100"]
+        about = {"whole": asdict(whole), "cores": cores}
+        found = run("campaign-runs", sample, folder / "sample.json", cores, limit, about)
+        share = found["seconds_a_run"] * found["runs"] / (cores * whole.wall)
+        print(f"{share:.0%} of {cores} x {whole.wall:.0f} s is the contact solver's", flush=True)
+
+
 def machine() -> dict:
     """What the numbers were taken on, without names."""
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
@@ -138,9 +198,7 @@ def machine() -> dict:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", choices=CODES, default=CODES, metavar="CODE", help=", ".join(CODES))
-    parser.add_argument(
-        "--parts", nargs="+", choices=("sweep", "scaling", "stages"), default=["sweep", "scaling", "stages"]
-    )
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--grids", nargs="+", type=int, default=[256, 512, 1024])
     parser.add_argument("--threads", type=int, default=2, help="leave out sweeps with more threads than this")
     parser.add_argument("--limit", type=float, default=1200.0, help="seconds that one process may take")
@@ -155,6 +213,8 @@ def main() -> None:
             scaling(scratch, options.limit)
         if "icha" in options.only and "stages" in options.parts:
             stages(scratch, options.limit)
+        if "icha" in options.only and "campaigns" in options.parts:
+            campaigns(scratch, options.limit)
 
 
 if __name__ == "__main__":
