@@ -382,6 +382,19 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
         prepared(holey, boundary="free", missing="fill")
 
 
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_filling_is_that_of_surface_topography(prepared, boundary):
+    """Also at edges and corners, where a point has fewer neighbours, or those on the other side."""
+    from SurfaceTopography import Topography
+
+    rng = np.random.default_rng(9)
+    heights, holes = rng.normal(size=(14, 14)), rng.random((14, 14)) < 0.3
+    holes[0, :4] = holes[10:, 0] = holes[-1, -1] = True
+    theirs = Topography(np.ma.masked_array(heights, holes), (7.0, 7.0), periodic=boundary == "periodic")
+    ours = prepared(np.where(holes, np.nan, heights), boundary=boundary, missing="fill").surface.heights
+    np.testing.assert_allclose(ours, centred(theirs.interpolate_undefined_data("harmonic").heights()), atol=1e-12)
+
+
 def test_mirror_is_periodic_and_twice_as_wide(prepared):
     heights = np.random.default_rng(4).normal(size=(9, 9))
     surface = prepared(heights, boundary="mirror").surface
