@@ -1,11 +1,11 @@
 """What computing costs: seconds on one core, memory and disk of surfaces, runs and boundary elements, beforehand.
 
 The formulas say how costs grow: with the nodes of a grid, with the number of summits, with the load. Their constants
-were fitted by eye to what `benchmarks/costs.py` measures, on one core of an Intel Xeon of 2023 at about 2.1 GHz shared
-with others (processor time), grids of 64 to 1024 nodes a side, and to the scaling and the full challenge surface of
-docs/benchmarks.md. `make costs` prints predicted over measured for surfaces and loads that were not part of the fit.
-Expect a factor of two either way, more where nothing is known beforehand of how a path will go; `correction` brings in
-what a campaign's own jobs took.
+were fitted by eye to processor times on one core of an Intel Xeon: of about a hundred runs on grids of 64 to 1024 nodes
+a side like those of group `fitted` of `benchmarks/costs.py`, of boundary elements on 32 to 512 nodes a side, and of the
+scaling and the full challenge surface in docs/benchmarks.md. That benchmark prints predicted over measured, also for
+surfaces and loads that were not part of the fit. Expect a factor of two either way, more where nothing can be known
+beforehand of how a path will go; `correction` brings in what a campaign's own jobs took.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ _MiB = 2**20
 JOB_SECONDS = 0.4
 _PROGRAM = 140 * _MiB
 _DOUBLE = 8
+# Seconds for the labelled dataset of a run, and for that of boundary elements.
+_DATASET, _SOLUTION = 0.2, 0.15
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ def surface_cost(grid: int) -> Cost:
     heights = _DOUBLE * grid**2
     # Heights of grids between 64 and 2048 nodes are compressed, by about a sixth.
     compression = 0.84 if 64 <= grid < 2048 else 1.0
-    return Cost(JOB_SECONDS + 1.2e-7 * grid**2, _PROGRAM + 2.7 * heights, 12e3 + compression * heights)
+    return Cost(JOB_SECONDS + 1.2e-7 * grid**2, _PROGRAM + 2.7 * heights, 18e3 + compression * heights)
 
 
 def sweep_cost(grid: int, summits: float, sweep: Sweep) -> Cost:
@@ -112,17 +114,14 @@ def sweep_cost(grid: int, summits: float, sweep: Sweep) -> Cost:
     fields = (1e-7 + 2e-7 * sweep.snapshots) * grid**2
     # Loading solves at jumps and unions, whose number is that of the spots, more than at the stops that are asked for.
     effort = 1 + 0.008 * (sweep.stops + 2 / sweep.max_step)
-    equilibrium = _PER_SUMMIT * (summits + _FEW_SUMMITS) ** _EXPONENT
-    seconds = JOB_SECONDS + fields + 1.1 * loaded * equilibrium * effort
+    loading = 6.3e-4 * summits * (1 + (summits / 1.5e5) ** 0.6)
+    seconds = JOB_SECONDS + _DATASET + fields + loaded * loading * effort
     steps = sweep.stops
     if sweep.legs:
         steps += cyclic_steps(spots, sweep)
         seconds += steps * ((0.0135 if sweep.adhesive else 0.0095) + 1e-5 * summits)
     disk = 58e3 + 57 * spots * max(sweep.snapshots + bool(sweep.legs), 1) + 160 * steps + 20e3 * bool(sweep.legs)
     return Cost(seconds, _PROGRAM + _DOUBLE * grid**2 + 9 * 1024 * summits, disk)
-
-
-_PER_SUMMIT, _FEW_SUMMITS, _EXPONENT = 2.2e-4, 60, 1.2
 
 
 def cyclic_steps(spots: float, sweep: Sweep) -> float:
@@ -134,25 +133,27 @@ def cyclic_steps(spots: float, sweep: Sweep) -> float:
 
 def solution_cost(nodes: int, reduced_pressure: float, *, adhesive: bool) -> Cost:
     """Boundary elements of `nodes` a side at one load; with adhesion the mean gap that carries it is searched for."""
+    seconds = JOB_SECONDS + _SOLUTION + _solver(nodes, reduced_pressure, adhesive)
+    return Cost(seconds, _PROGRAM + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
+
+
+def _solver(nodes, reduced_pressure, adhesive):
     if adhesive:
-        seconds = 2.0 * (nodes / 256) ** 3
-    else:
-        seconds = 1.5 * (nodes / 512) ** 3.1 * (reduced_pressure / 0.01) ** 0.2
-    return Cost(JOB_SECONDS + seconds, _PROGRAM + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
+        return 2.6 * (nodes / 256) ** 3
+    return 2.2 * (nodes / 512) ** 3.1 * (reduced_pressure / 0.01) ** 0.3
 
 
 def loop_cost(nodes: int, separation_step: float, *, adhesive: bool) -> Cost:
     """Boundary elements both ways in steps of `separation_step` (in h_rms), which are divided where spots jump."""
-    single = solution_cost(nodes, 0.01, adhesive=adhesive)
     steps = 7 / separation_step + (35 if adhesive else 0)
-    return Cost(JOB_SECONDS + 1.6 * steps * (single.seconds - JOB_SECONDS), single.memory, 33e3)
+    seconds = JOB_SECONDS + _SOLUTION + 1.2 * steps * _solver(nodes, 0.01, adhesive)
+    return Cost(seconds, _PROGRAM + 20 * _DOUBLE * nodes**2, 33e3)
 
 
 def sources_cost(nodes: int, reduced_pressures: Sequence[float], *, adhesive: bool) -> Cost:
     """Sources of the model's error: some variants of the model and of boundary elements at every load."""
-    finest = [solution_cost(nodes, pressure, adhesive=adhesive) for pressure in reduced_pressures]
-    seconds = 1.0 + sum(0.3 + 4 * (cost.seconds - JOB_SECONDS) for cost in finest)
-    return Cost(JOB_SECONDS + seconds, finest[0].memory + 25 * _MiB, 28e3)
+    seconds = JOB_SECONDS + 0.7 + sum(0.2 + 2.5 * _solver(nodes, load, adhesive) for load in reduced_pressures)
+    return Cost(seconds, _PROGRAM + 25 * _MiB + 20 * _DOUBLE * nodes**2, 28e3)
 
 
 def one_asperity_cost(tabor_parameter: float | None) -> Cost:

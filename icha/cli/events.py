@@ -50,7 +50,7 @@ class Watch:
     running: dict[int, Job] = field(default_factory=dict)
     done: list[Job] = field(default_factory=list)
     failed: list[Job] = field(default_factory=list)
-    cores: int = 1
+    cores: int = 1  # of a cluster: jobs at a time
     started: float | None = None
     lock: threading.RLock = field(default_factory=threading.RLock)
 
@@ -65,8 +65,8 @@ class Watch:
                 counts = {rule: count for rule, count in event["stats"].items() if rule not in (*_TARGETS, "total")}
                 self.total = dict(counts)
                 self.started = self.clock() if self.started is None else self.started
-            case "resources_info" if event["cores"]:
-                self.cores = int(event["cores"])
+            case "resources_info" if event.get("cores") or event.get("nodes"):
+                self.cores = int(event.get("cores") or event["nodes"])
             case "job_info" if event["rule_name"] not in _TARGETS:
                 job = Job(
                     event["rule_name"],

@@ -23,8 +23,6 @@ from icha.configuration.expansion import (
 from icha.configuration.model import Campaign, SelfAffineSurface
 
 DONE, TO_DO, CHANGED, FAILED = "done", "to do", "changed", "failed"
-# A grid is a guess where only its file knows it, as in the workflow.
-_UNKNOWN_GRID = 2048
 # From so many nodes on, a side, a job takes two cores, as in the workflow.
 _TWO_CORES = 2048
 # So many of the files that are there are compared with what was expected of them.
@@ -71,12 +69,11 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
 
 
 def _items(campaign, results) -> Iterator[Item]:
-    def grid(surface):
-        return getattr(campaign.surfaces[surface], "grid", None) or _UNKNOWN_GRID
+    grid = campaign.grid
 
     @cache
     def asperities(surface):
-        return _asperities(campaign.surfaces[surface], results / "surfaces" / surface)
+        return _asperities(campaign, surface, results / "surfaces" / surface)
 
     def there(part, path, cost, threads=1):
         return Item(part, path, DONE if (results / path).is_file() else TO_DO, cost, threads)
@@ -151,8 +148,9 @@ def _largest_load(path, snapshots, rms_slope):
     return max((loads[kind](value) for kind, value in states), default=0.05)
 
 
-def _asperities(surface, folder: Path) -> float:
-    """Expected number of summits: from the spectrum's parameters, or else from the moments of a file that is there."""
+def _asperities(campaign: Campaign, name: str, folder: Path) -> float:
+    """Expected number of summits: from the spectrum, or else from the moments of a surface file that is there."""
+    surface = campaign.surfaces[name]
     if isinstance(surface, SelfAffineSurface):
         return costs.self_affine_summits(
             surface.period, surface.rolloff_wavelength, surface.short_wavelength, surface.hurst
@@ -164,8 +162,8 @@ def _asperities(surface, folder: Path) -> float:
             moments = read_spectral_moments(file)
         except ValueError:
             continue
-        return costs.gaussian_summits(surface.period, moments.m2, moments.m4) if surface.period else 0
-    return costs.summits_of_grid(getattr(surface, "grid", None) or _UNKNOWN_GRID)
+        return costs.gaussian_summits(campaign.period(name), moments.m2, moments.m4)
+    return costs.summits_of_grid(campaign.grid(name))
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
@@ -283,4 +281,8 @@ def time_on(items: Iterable[Item], cores: int) -> float:
 
 def memory_on(items: Iterable[Item], cores: int) -> float:
     """Bytes that the largest jobs to be done take, as many as run side by side."""
-    return sum(sorted((item.cost.memory for item in items if item.to_do), reverse=True)[:cores])
+    memory, free = 0.0, cores
+    for item in sorted((item for item in items if item.to_do), key=lambda item: -item.cost.memory):
+        if item.threads <= free or free == cores:
+            memory, free = memory + item.cost.memory, free - item.threads
+    return memory

@@ -83,5 +83,5 @@ def _surface(surface: xr.Dataset) -> Figure:
         q, power = surface["psd_wavevector"].values, surface["power_spectrum"].values
         axes[1].loglog(q[power > 0], power[power > 0], color=COLOURS[0])
         axes[1].set_xlabel("wave vector q (rad/m)")
-        axes[1].set_ylabel("C(q) (m⁴)")
+        axes[1].set_ylabel(r"C(q) (m$^4$)")
     return figure

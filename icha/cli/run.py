@@ -74,7 +74,8 @@ def run(
         *("--snakefile", str(home / "Snakefile"), "--directory", str(folder)),
         *(["--configfile", str(path.resolve())] if path.resolve() != (home / DEFAULT).resolve() else []),
         *(["--cores", cores] if cores else []),
-        *(["--profile", str(_profile(profile, home))] if profile else []),
+        # In the place of profiles/default, which would be found by itself.
+        *(["--workflow-profile", str(_profile(profile, home))] if profile else []),
     ]
     if dry_run:
         raise typer.Exit(subprocess.run([*command, "--dry-run"], cwd=home).returncode and FAILED)

@@ -11,7 +11,7 @@ from snakemake_interface_logger_plugins.base import LogHandlerBase
 
 _FIELDS = {
     "run_info": ("stats",),
-    "resources_info": ("cores",),
+    "resources_info": ("cores", "nodes"),
     "job_info": ("jobid", "rule_name", "rule_msg", "output", "log"),
     "job_finished": ("job_id",),
     "job_error": ("jobid", "rule_name", "output", "log"),
