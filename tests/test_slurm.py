@@ -159,11 +159,13 @@ def test_a_run_that_fails_is_reported_and_stops_no_other(calls):
     states = [record["JobState"] for record in call.records]
     assert sorted(states) == ["COMPLETED", "COMPLETED", "COMPLETED", "FAILED"]
     failed = next(record["JobId"] for record in call.records if record["JobState"] == "FAILED")
-    assert f"SLURM-job '{failed}' failed" in call.said
-    # The reason stands in the log of the run, which is shown.
-    assert "Error in group runs" in call.said
-    assert f"logs/{Path(SPOILT).with_suffix('.log')}" in call.said
-    assert ".hertz.nc.part" in call.said
+    assert call.comments[failed] == "rule_runs_run"
+    # At the end, that run alone is reported, with its log, which says why; and before it, the log of its batch.
+    *_, reported = call.said.split(f"SLURM-job '{failed}' failed")
+    assert reported.count("Error in rule") == 1
+    assert f"logs/{Path(SPOILT).with_suffix('.log')}" in reported
+    assert "Error: [Errno 21] Is a directory" in reported and ".hertz.nc.part" in reported
+    assert call.said.count(f"/{failed}.log") >= 1
 
 
 def test_the_next_call_computes_what_is_missing_and_nothing_else(calls):

@@ -5,6 +5,7 @@ run as children of this process, with a configuration, a key, a socket and a spo
 `with` block. A Slurm that is already set up on the machine is never touched: `why_not` then says so.
 """
 
+import ctypes
 import fcntl
 import os
 import secrets
@@ -21,6 +22,7 @@ from pathlib import Path
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "srun", "squeue", "sinfo", "scancel")
 PACKAGES = "slurmctld slurmd slurm-client munge"
 FOLDER = "icha-slurm-"
+PR_SET_PDEATHSIG = 1  # of prctl(2), Linux
 # Job steps lose the variable SLURM_CONF on their way through the executor, and look here.
 SYSTEM_CONFIGURATION = Path("/etc/slurm/slurm.conf")
 
@@ -156,6 +158,7 @@ def single_node(cores: int = 4, memory: int = 8000):
                 stdout=said,
                 stderr=said,
                 start_new_session=True,
+                preexec_fn=_end_with_parent,
             )
             stack.callback(_end, daemon)
             if name == "munged":
@@ -163,6 +166,11 @@ def single_node(cores: int = 4, memory: int = 8000):
         _wait_for(lambda: "idle" in node.command("sinfo", "--noheader", "--format=%t"), daemon, folder)
         stack.callback(_cancel_all, node)
         yield node
+
+
+def _end_with_parent() -> None:
+    """In a new process: have the kernel end it when its parent ends, even if that is killed."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _ours(path: Path) -> bool:
