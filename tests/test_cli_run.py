@@ -90,7 +90,7 @@ def test_it_goes_on_after_it_was_stopped(project):
     said = process.stdout.readline()
     assert said.startswith("["), said
     process.send_signal(signal.SIGINT)
-    rest = process.communicate(timeout=60)[0]
+    rest = process.communicate(timeout=200)[0]
     assert process.returncode == 1
     assert "Stopped before the end. The same command goes on from here." in rest and "Traceback" not in rest
     assert "failed:" not in rest
