@@ -66,41 +66,56 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     labels = RunLabels(*labels)
     if labels.study not in tree.children:
         raise ValueError(f"no study {labels.study!r}; there are {', '.join(tree.children)}")
-    dataset = tree[labels.study].to_dataset()
-    index = {}
-    for label in LABELS:
-        values = dataset[label].values
-        wanted = getattr(labels, label)
-        at = np.flatnonzero(np.isclose(values, wanted, rtol=1e-9) if label == "rms_slope" else values == wanted)
-        if not len(at):
-            there = ", ".join(f"{value:g}" if label == "rms_slope" else str(value) for value in values)
-            raise ValueError(f"study {labels.study}: no {label} {wanted!r}; there are {there}")
-        index[label] = int(at[0])
-    status = int(dataset["status"].isel(index))
-    if status in (MISSING, NOT_IN_DESIGN):
-        raise ValueError(f"{labels}: this run is {'missing' if status == MISSING else 'not in the design'}")
-    failure = dataset["failure"].isel(index).item()
-    run = dataset.isel(index).drop_vars(["status", "failure", "step_count"])
-    if "step" in run.dims:
-        run = run.isel(step=slice(0, int(dataset["step_count"].isel(index))))
-    for dim in (dim for dim in RAGGED if dim in dataset.dims):
-        own = np.all([dataset[f"{dim}_{label}"].values == i for label, i in index.items()], axis=0)
-        run = run.isel({dim: np.flatnonzero(own)}).drop_vars([f"{dim}_{label}" for label in LABELS])
-    if status == INCOMPLETE:
-        run = run.assign_attrs(incomplete=failure).isel(snapshot=np.isfinite(run["overlap_fraction"].values))
-        run = run.drop_vars([name for name, variable in run.data_vars.items() if _unknown(variable)])
-    integers = [name for name, variable in run.variables.items() if _filled_integer(variable)]
-    return run.assign({name: run[name].astype(np.int32) for name in integers}).reset_coords(list(LABELS))
+    study = tree.children[labels.study].dataset
+    index = {label: _position(study, labels, label) for label in LABELS}
+    place = tuple(index.values())
+    status, steps, failure = (study.variables[name].transpose(*LABELS)[place] for name in _OF_THE_CAMPAIGN)
+    if int(status) in (MISSING, NOT_IN_DESIGN):
+        raise ValueError(f"{labels}: this run is {'missing' if int(status) == MISSING else 'not in the design'}")
+    part = (
+        index | {"step": slice(0, int(steps))} | {dim: _own(study, dim, place) for dim in RAGGED if dim in study.dims}
+    )
+    incomplete = int(status) == INCOMPLETE
+    if incomplete:
+        there = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
+        part["snapshot"] = np.flatnonzero(np.isfinite(there))
+    left_out = {*_OF_THE_CAMPAIGN, *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
+    variables = {}
+    for name, variable in study.variables.items():
+        if name in left_out:
+            continue
+        own = variable[tuple(part.get(dim, slice(None)) for dim in variable.dims)].load()
+        if incomplete and own.ndim == 0 and own.dtype.kind == "f" and np.isnan(own.values):
+            continue  # not known of a run that ended early
+        if own.dtype.kind == "f" and own.encoding.get("dtype") == np.dtype("int32"):
+            own = xr.Variable(own.dims, own.values.astype(np.int32), own.attrs)  # a float for other runs that lack it
+        variables[name] = own
+    coords = {name: variables.pop(name) for name in study.coords if name not in LABELS}
+    attrs = study.attrs | ({"incomplete": failure.item()} if incomplete else {})
+    return xr.Dataset(variables, coords, attrs)
 
 
-def _unknown(variable):
-    """Whether a variable of a run that ended early has no value."""
-    return variable.dtype.kind == "f" and not variable.dims and np.isnan(variable.values)
+# What the dataset of a campaign says of a run.
+_OF_THE_CAMPAIGN = ("status", "step_count", "failure")
 
 
-def _filled_integer(variable):
-    """Whether a variable holds integers that are floats for others that are missing."""
-    return variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32")
+def _position(study, labels, label):
+    """Where a run stands along a label."""
+    values, wanted = study.variables[label].values, getattr(labels, label)
+    at = np.flatnonzero(np.isclose(values, wanted, rtol=1e-9) if label == "rms_slope" else values == wanted)
+    if not len(at):
+        there = ", ".join(f"{value:g}" if label == "rms_slope" else str(value) for value in values)
+        raise ValueError(f"study {labels.study}: no {label} {wanted!r}; there are {there}")
+    return int(at[0])
+
+
+def _own(study, dim, place):
+    """Where a run's spots or events are: all runs' follow each other in the order of the labels."""
+    begin, end = 0, study.sizes[dim]
+    for label, k in zip(LABELS, place, strict=True):
+        column = study.variables[f"{dim}_{label}"].values[begin:end]
+        begin, end = begin + np.searchsorted(column, k, "left"), begin + np.searchsorted(column, k, "right")
+    return slice(int(begin), int(end))
 
 
 def loading_stops(data: xr.Dataset) -> xr.DataArray:

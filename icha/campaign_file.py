@@ -579,6 +579,7 @@ class _Ragged:
 
     def _empty(self):
         self.parts = {dim: {name: [] for name in variables} for dim, variables in self.variables.items()}
+        self.taken = 0
 
     def add(self, position: tuple[int, ...], values: dict[str, np.ndarray], at: list[int]) -> None:
         """Take what a run has; `at` is where its snapshots stand, in whose order its spots are put."""
@@ -592,7 +593,8 @@ class _Ragged:
             own |= {f"{dim}_{label}": np.full(count, k) for label, k in zip(LABELS, position, strict=True)}
             for name, v in own.items():
                 parts[name].append(v)
-        if sum(len(v) for parts in self.parts.values() for each in parts.values() for v in each) > _VALUES_IN_BLOCK:
+                self.taken += count
+        if self.taken > _VALUES_IN_BLOCK:
             self.flush()
 
     def flush(self) -> None:

@@ -32,6 +32,8 @@ from icha.surface import PERIODIC, Surface
 
 # Larger arrays are heights: a fifth less space would take half a minute for 8192 nodes a side.
 _COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
+# Bytes of an array from which on it is not read as a whole.
+_LEFT_IN_FILE = 2**26
 
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN = range(4)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design")
@@ -141,8 +143,23 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
 
 
 def read_campaign(path: str | os.PathLike) -> xr.DataTree:
-    """Read a campaign dataset into memory; errors as `read_dataset`."""
-    return _read(xr.load_datatree, path)
+    """Read a campaign dataset into memory, but for large arrays; errors as `read_dataset`.
+
+    What takes more than 64 MB, as distributions of thousands of runs do, stays in the file until it is used; of a
+    single run (`icha.campaign.select_run`) only its own part is then read.
+    """
+    return _read(_load_small, path)
+
+
+def _load_small(path, engine):
+    tree = xr.open_datatree(path, engine=engine)
+    variables = [variable for node in tree.subtree for variable in node.variables.values()]
+    for variable in variables:
+        if variable.nbytes <= _LEFT_IN_FILE:
+            variable.load()
+    if all(variable.nbytes <= _LEFT_IN_FILE for variable in variables):
+        tree.close()
+    return tree
 
 
 def _read(load, path):

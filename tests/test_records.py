@@ -7,7 +7,7 @@ import pytest
 import small_campaign as small
 import xarray as xr
 
-from icha import Surface, campaign_file
+from icha import Surface, campaign_file, records
 from icha.campaign import campaign_tree, run_labels, select_run
 from icha.campaign_file import write_campaign
 from icha.records import read_campaign, read_dataset, read_run, read_surface, write_dataset, write_surface
@@ -325,12 +325,14 @@ def same(taken, run, labels):
         np.testing.assert_array_equal(taken[name].values, variable.values, err_msg=where)
 
 
-@pytest.mark.parametrize("kept", [False, True], ids=["in memory", "from its file"])
-def test_runs_of_different_lengths_are_taken_out_unchanged(tmp_path, kept):
+@pytest.mark.parametrize("kept", ["in memory", "from its file", "left in its file"])
+def test_runs_of_different_lengths_are_taken_out_unchanged(tmp_path, monkeypatch, kept):
     tree = cyclic.tree()
-    if kept:
-        write_dataset(tree, tmp_path / "c.nc")
+    if kept != "in memory":
+        write_campaign(cyclic.runs().items(), tmp_path / "c.nc")
+        monkeypatch.setattr(records, "_LEFT_IN_FILE", 0 if kept == "left in its file" else 2**30)
         tree = read_campaign(tmp_path / "c.nc")
+        assert tree["loops"].variables["work"]._in_memory == (kept == "from its file")
     lengths = set()
     for labels, run in cyclic.runs().items():
         # The slope is known by its label, which the surface has but for rounding.
