@@ -205,7 +205,7 @@ def main():
                 f"{group}, {name}: median {2 ** statistics.median(logs):.2f}, off by a factor of "
                 f"{2**spread:.2f} on average, {within} of {len(logs)} within a factor of two"
             )
-    RESULT.write_text(json.dumps(results, indent=1) + "\n")
+    RESULT.write_text(json.dumps({"cases": results}, indent=1) + "\n")
     return 0
 
 
