@@ -100,7 +100,7 @@ def call_with_profile(node, project, *arguments):
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=500,
+        timeout=900,
     )  # fmt: skip
     records = node.finished_jobs()[before:]
     known = dict(
