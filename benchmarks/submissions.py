@@ -1,6 +1,6 @@
 """What a submission costs: a campaign of small runs on one machine, on a Slurm of one node, in batches and run by run.
 
-    make slurm-environment && .venv/bin/python benchmarks/slurm.py [RUNS]
+    make slurm-environment && .venv/bin/python benchmarks/submissions.py [RUNS]
 
 Needs root and Debian's packages, see tests/slurm/single_node.py. Prints the table of docs/howto/cluster.md; the node
 is this machine and answers at once, so there is no waiting for other people's jobs in it.
