@@ -20,6 +20,7 @@ import icha
 from icha.campaign import campaign_tree
 from icha.configuration.expansion import run_cases
 from icha.configuration.load import load_configuration
+from icha.configuration.model import Campaign
 from icha.records import write_dataset
 
 ROOT = Path(__file__).parent.parent
@@ -62,8 +63,8 @@ def campaigns(page):
     current = yaml.safe_load(tutorial_campaign())
     for line, block in blocks(page, "yaml"):
         part = yaml.safe_load(block)
-        if part is None:
-            continue  # a comment
+        if part is None or not set(part) & set(Campaign.model_fields):
+            continue  # a comment, or part of another file
         current = dict(part) if "name" in part else with_part(current, part)
         yield line, current
 
@@ -135,6 +136,14 @@ def test_every_configuration_is_a_valid_one(page, folder):
             assert run_cases(loaded(folder, campaign))
         except ValueError as error:
             pytest.fail(f"{page.name}, block at line {line}: {error}")
+
+
+def test_settings_of_a_cluster_are_those_of_the_profile():
+    profile = (ROOT / "profiles/slurm/config.yaml").read_text(encoding="utf-8")
+    for line, block in blocks(DOCS / "howto/cluster.md", "yaml"):
+        settings = yaml.safe_load(block)
+        for key in {*settings, *settings.get("default-resources", ()), *settings.get("set-resources", ())}:
+            assert re.search(rf"^[# ]*{key}:", profile, re.MULTILINE), f"block at line {line}: {key}"
 
 
 def test_studies_have_the_runs_that_the_page_counts(folder):
@@ -270,6 +279,7 @@ def test_every_command_exists(page):
     known = {"git", "cd", "source", "cp", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
     for line, (program, *arguments) in commands(page):
         where = f"{page.name}, block at line {line}: {program} {shlex.join(arguments)}"
+        program = Path(program).name
         if program == "icha":
             check_icha(arguments)
         elif program == "make":
