@@ -30,7 +30,7 @@ def new(
     from icha.configuration.values import NAME_PATTERN
 
     folder = project()
-    if not re.fullmatch(NAME_PATTERN, name):
+    if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
         raise Mistake(f"{name!r} is not a name; allowed: lower-case letters, digits, '_' and '-'")
     file = folder / CAMPAIGNS / f"{name}.yaml"
     if file.exists():

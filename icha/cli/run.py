@@ -200,7 +200,10 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
             logs = ", ".join(str(shown(folder / name)) for name in job.logs)
             # The verdict repeats the runs that were just listed.
             reason = [line for line in reason_of(job, folder) if not any(line.startswith(path) for path in incomplete)]
-            _reason(job.title, reason or [f"it ended without a word; see {logs or log}"])
+            _reason(
+                job.title,
+                reason or [f"it ended without a word, killed perhaps (for want of memory?); see {logs or log}"],
+            )
             if logs:
                 typer.echo(f"    log: {logs}")
     kept_back = watch.job_count - ended
