@@ -364,7 +364,8 @@ class _Group:
         names = [name for name in model.variables if name not in LABELS]
         dims = {name: sum(study.dims_of(name), ()) for name in names} | {label: (label,) for label in LABELS}
         coordinates = coordinates_of(dims, {*model.coords, *LABELS})
-        largest = max(math.prod(self._shape((), study.dims_of(name)[1])) for name in names if name not in self.sizes)
+        varying = [own for along, own in map(study.dims_of, names) if along == LABELS]
+        largest = max(math.prod(self._shape((), own)) for own in varying)
         self.block = self._block(LABELS, largest)
         self.columns = {
             name: self._define(
