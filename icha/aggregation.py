@@ -178,9 +178,10 @@ def mean_curve(curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: 
 
 
 def mean_way(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, Ensemble]]:
-    """Mean over seeds of reduced pressure and contact area on one leg of a path, at common mean separations.
+    """Mean over seeds of reduced pressure and contact area on one leg of a path, at common displacements.
 
-    Where a member is separated, pressure and area are zero; the way ends at the smallest separation that all reach.
+    They are counted from where the leg is loaded most, so that legs that meet there meet in the mean as well. Where a
+    member is separated, pressure and area are zero; ways that end in contact end where the first of them does.
 
     Parameters
     ----------
@@ -188,22 +189,24 @@ def mean_way(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, Ensemble
 
     Returns
     -------
-    Mean separations over the rms height, in the order of the leg, and the statistics of `reduced_pressure` and
-    `contact_area_fraction` at them.
+    Means of the mean separations over the rms height, in the order of the leg, and the statistics of
+    `reduced_pressure` and `contact_area_fraction` at them.
     """
     separations = [way["reduced_separation"].values for way in ways]
+    closest = [float(separation.min()) for separation in separations]
     falling = separations[0][-1] < separations[0][0]
     apart = all(float(way["contact_area_fraction"].values[0 if falling else -1]) == 0 for way in ways)
     reach = max if apart else min
-    at = np.linspace(max(map(np.min, separations)), reach(map(np.max, separations)), _WAY_POINTS)
+    at = np.linspace(0, reach(np.ptp(separation) for separation in separations), _WAY_POINTS)
     found = {}
     for name in ("reduced_pressure", "contact_area_fraction"):
         members = []
-        for way, separation in zip(ways, separations, strict=True):
+        for way, separation, least in zip(ways, separations, closest, strict=True):
             order = np.argsort(separation, kind="stable")
             beyond = 0.0 if apart else None
-            members.append(np.interp(at, separation[order], way[name].values[order], right=beyond))
+            members.append(np.interp(least + at, separation[order], way[name].values[order], right=beyond))
         found[name] = ensemble(members)
+    at = at + np.mean(closest)
     if not falling:
         return at, found
     return at[::-1], {name: Ensemble(*(each[::-1] for each in own)) for name, own in found.items()}

@@ -69,23 +69,25 @@ def way(separation, pressure):
     return xr.Dataset({name: ("step", np.asarray(values, float)) for name, values in columns.items()})
 
 
-def test_ways_are_averaged_at_the_same_separation_and_are_zero_when_separated():
-    at, over = mean_way([way([3, 2, 1], [0, 1, 2]), way([4, 2, 0.5], [0, 4, 7])])
-    assert at[0] == 4 and at[-1] == 1
+def test_ways_are_averaged_at_the_same_displacement_and_are_zero_when_separated():
+    at, over = mean_way([way([3, 2, 1], [0, 1, 2]), way([4.5, 3, 0.5], [0, 3, 8])])
+    # From where they are loaded most: at 1 and 0.5, which is 0.75 in the mean.
+    assert (at[0], at[-1]) == pytest.approx((4.75, 0.75))
     pressure = over["reduced_pressure"].mean
-    assert pressure[0] == 0 and pressure[-1] == pytest.approx((2 + 6) / 2)
-    assert np.interp(-3.0, -at, pressure) == pytest.approx(2 / 2, rel=1e-2)
+    assert pressure[0] == 0 and pressure[-1] == (2 + 8) / 2
+    assert np.interp(-1.75, -at, pressure) == pytest.approx((1 + 6) / 2, rel=1e-2)
+    assert np.interp(-3.75, -at, pressure) == pytest.approx((0 + 2) / 2, rel=1e-2)
     # On the way back, in its order; ways that end in contact end where the first of them does.
-    at, _ = mean_way([way([1, 2, 3], [2, 1, 0]), way([0.5, 2, 4], [7, 4, 0])])
-    assert (at[0], at[-1]) == (1, 4)
-    at, _ = mean_way([way([1, 2, 3], [2, 1, 0.5]), way([0.5, 2, 4], [7, 4, 0.5])])
-    assert (at[0], at[-1]) == (1, 3)
+    at, _ = mean_way([way([1, 2, 3], [2, 1, 0]), way([0.5, 3, 4.5], [8, 3, 0])])
+    assert (at[0], at[-1]) == pytest.approx((0.75, 4.75))
+    at, _ = mean_way([way([1, 2, 3], [2, 1, 0.5]), way([0.5, 3, 4.5], [8, 3, 0.5])])
+    assert (at[0], at[-1]) == pytest.approx((0.75, 2.75))
 
 
 def test_the_comparison_has_bands_over_the_complete_seeds():
     runs = [(RunLabels("one", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2, 3)]
     runs.append((RunLabels("one", "rough", 4, 1.0, "soft"), small.run(4).assign_attrs(incomplete="a test")))
-    comparison = compare_runs(campaign_tree(runs, allow_missing=True)["one"].to_dataset())
+    comparison = compare_runs(campaign_tree(runs)["one"].to_dataset())
     areas = comparison["contact_area_fraction"].transpose(*LABELS, ...).values[0, :3, 0, 0]
     expected = ensemble(areas)
     assert comparison["seed_count"].item() == 3

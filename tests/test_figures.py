@@ -538,7 +538,7 @@ def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
     # Too many for a legend: a scale names them.
     assert bar.get_ylabel() == "s" and [text.get_text() for text in bar.get_yticklabels()] == list("012345678")
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert set(names) == {"bars: 95 % confidence of the mean of 3 seeds", "against the energetic area"}
+    assert set(names) == {"means of n = 3 seeds, bars 95 %", "against the energetic area"}
     assert len({container[0].get_color() for container in panels[0].containers}) == 9
 
 
@@ -577,17 +577,17 @@ def test_what_is_not_there_is_named_with_what_is():
 
 def test_incomplete_campaigns_are_drawn_with_what_they_have():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
-    tree = campaign_tree(runs[:-1], allow_missing=True)
+    tree = campaign_tree(runs[:-1])
     assert len(lines(fig5_multi_slope.figure(tree, study="slopes").axes[0])) == 3
 
 
 def test_only_complete_runs_are_drawn():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
     ended = [(labels, run.assign_attrs(incomplete="no equilibrium at the third stop")) for labels, run in runs]
-    tree = campaign_tree([ended[0], *runs[1:]], allow_missing=True)
+    tree = campaign_tree([ended[0], *runs[1:]])
     assert {labels for labels, _ in study_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
     with pytest.raises(NothingToDraw, match="study slopes: no run is complete"):
-        fig5_multi_slope.figure(campaign_tree(ended, allow_missing=True), study="slopes")
+        fig5_multi_slope.figure(campaign_tree(ended), study="slopes")
 
 
 @pytest.mark.parametrize("module", FIGURES + COMPARED, ids=lambda module: module.__name__)
@@ -639,8 +639,11 @@ def test_fig9_points_are_means_over_the_seeds():
     runs = {material: [] for material in ("soft", "hertz")}
     for labels, run in compared.runs().items():
         runs[labels.material].append(float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[0])]))
-    curve, bare = (line for line in left.get_lines() if len(line.get_xdata()))
+    ((curve, _, (bars,)),) = left.containers
     np.testing.assert_allclose(curve.get_ydata(), [np.mean(runs["soft"])])
+    over = ensemble(runs["soft"])
+    np.testing.assert_allclose(bars.get_segments()[0][:, 1], over.mean + over.confidence * np.array([-1, 1]))
+    bare = next(line for line in left.get_lines() if line.is_dashed())
     np.testing.assert_allclose(bare.get_ydata(), np.mean(runs["hertz"]))
 
 
@@ -700,6 +703,6 @@ def test_names_of_a_scale_lose_what_they_share_but_no_digits():
 def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
     runs = [(RunLabels("one", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2)]
     runs[0] = (runs[0][0], runs[0][1].assign_attrs(incomplete="no equilibrium"))
-    tree = campaign_tree(runs, allow_missing=True)
+    tree = campaign_tree(runs)
     with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):
         fig4_contact_map.figure(tree, surface, study="one")

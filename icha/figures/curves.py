@@ -116,7 +116,7 @@ def material_looks(dataset: xr.Dataset, materials: Sequence[str]) -> tuple[list[
     adhesive = [float(dataset["surface_energy"].sel(material=name)) > 0 for name in materials]
     if len(materials) > MOST_COLOURS:
         scale = materials_scale(dataset, materials)
-        return [{"color": colour, "ls": "-", "lw": 0.9} for colour in scale.colours], scale
+        return [{"color": colour, "ls": "-", "lw": 0.9, "marker": "o", "ms": 2} for colour in scale.colours], scale
     return [
         line_look(k, adhesive=adhesive[k]) | {"label": material_label(dataset, name)}
         for k, name in enumerate(materials)
@@ -128,13 +128,19 @@ _MEAN_MARKERS = 8
 
 
 def draw_line(
-    axes: Axes, line: Line, points: Callable[[xr.Dataset], tuple[np.ndarray, np.ndarray]], *, logarithmic: bool
+    axes: Axes,
+    line: Line,
+    points: Callable[[xr.Dataset], tuple[np.ndarray, np.ndarray]],
+    *,
+    logarithmic: bool,
+    lines: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draw the points of a run by markers; of several seeds their mean at common loads by a line with its 95 % band.
 
     Parameters
     ----------
     points : load and value of the steps of a run.
+    lines : number of lines in the panel.
     logarithmic : whether means are interpolated on the logarithm of the values, where runs have not the same loads.
 
     Returns
@@ -145,7 +151,7 @@ def draw_line(
     if len(members) > 1:
         load, over = mean_curve(members, logarithmic=logarithmic)
         if len(load):
-            draw_mean(axes, load, over, line.look)
+            draw_mean(axes, load, over, line.look, lines)
             return load, over.mean
     # Runs without a common load have no mean.
     for k, (load, values) in enumerate(members):
@@ -154,21 +160,23 @@ def draw_line(
     return load, values
 
 
-def draw_mean(axes: Axes, x: np.ndarray, over: Ensemble, look: dict) -> None:
-    """Draw the mean of an ensemble with its band."""
+def draw_mean(axes: Axes, x: np.ndarray, over: Ensemble, look: dict, lines: int = 1) -> None:
+    """Draw the mean of an ensemble with its band, one of so many `lines` of a panel."""
     every = max(1, -(-len(x) // _MEAN_MARKERS))
     axes.plot(x, over.mean, **look | {"ls": "-", "lw": 0.9, "markevery": every})
-    draw_band(axes, x, over, look["color"])
+    draw_band(axes, x, over, look["color"], lines)
 
 
-def draw_band(axes: Axes, x: np.ndarray, over: Ensemble, colour: str) -> None:
-    """Shade the 95 % band of confidence of a mean; it does not widen the panel."""
+def draw_band(axes: Axes, x: np.ndarray, over: Ensemble, colour: str, lines: int = 1) -> None:
+    """Shade the 95 % band of confidence of a mean, the paler the more there are; it does not widen the panel."""
     limits = axes.dataLim.frozen()
-    axes.fill_between(x, over.mean - over.confidence, over.mean + over.confidence, color=colour, **_BAND)
+    look = {"alpha": _SHADE * min(1.0, _FEW_BANDS / lines), "lw": 0, "zorder": 1.5}
+    axes.fill_between(x, over.mean - over.confidence, over.mean + over.confidence, color=colour, **look)
     axes.dataLim.set(limits)
 
 
-_BAND = {"alpha": 0.22, "lw": 0, "zorder": 1.5}
+_SHADE = 0.22
+_FEW_BANDS = 3
 
 
 def band_handle(counts: Iterable[int]) -> Line2D:
@@ -177,6 +185,15 @@ def band_handle(counts: Iterable[int]) -> Line2D:
     words = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
     look = {"color": GREY, "alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
     return Line2D([], [], label=f"mean and 95 % band, n = {words} seeds", **look)
+
+
+def bars_handle(counts: Iterable[int]) -> dict[str, Line2D]:
+    """What the legend says of bars, of points of so many seeds; nothing where there are none."""
+    counts = sorted({int(count) for count in counts if count > 1})
+    if not counts:
+        return {}
+    words = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
+    return {f"means of n = {words} seeds, bars 95 %": Line2D([], [], color=GREY, marker="|", ls="none", ms=8)}
 
 
 def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from icha.ensemble import ensemble
-from icha.figures.curves import PRESSURE_LABEL
+from icha.figures.curves import PRESSURE_LABEL, bars_handle
 from icha.figures.scale import MOST_COLOURS, places_scale
 from icha.figures.select import study_errors
 from icha.figures.style import (
@@ -127,10 +127,7 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
         ax.set_ylim(*quantity.limits)
     if against_other:
         named["against the energetic area"] = Line2D([], [], color=GREY, **_OTHER)
-    if max(counts) > 1:
-        named[f"bars: 95 % confidence of the mean of {' to '.join(map(str, sorted(counts - {0, 1})))} seeds"] = Line2D(
-            [], [], color=GREY, marker="|", ls="none", ms=8
-        )
+    named |= bars_handle(counts)
     if scale:
         scale.draw(fig, panels.ravel().tolist())
         named.pop("", None)

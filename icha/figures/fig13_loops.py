@@ -33,7 +33,7 @@ CAPTION = (
     "share a panel, symbols without it mark where the first way in ends. Insets enlarge the surroundings of zero load "
     "where the tension is small beside the largest load. The energy lost per nominal area is the area between the "
     "ways, of the pressure against the mean separation. Where several seeds are drawn the lines are means at common "
-    "separations, as far as all seeds go, with the 95 % band of confidence of the mean (Student's t), and the marks "
+    "displacements from the turning point, with the 95 % band of confidence of the mean (Student's t), and the marks "
     "means over the seeds. Steps are jumps of single spots or of several. Dots and rings, where given: boundary "
     "elements, an independent code, at some of their states, of the same topography, half-space and range of "
     "attraction, dots on the way in and rings on the way back, with the area corrected by the perimeter of the "
@@ -148,7 +148,7 @@ def figure(
         ]
         for ax, axis in ((left, _LOADS), (right, _AREAS)):
             for loop in drawn:
-                _draw(ax, loop, axis, turn=len(shown) > 1)
+                _draw(ax, loop, axis, turn=len(shown) > 1, lines=len(drawn))
             ax.set_ylabel(axis.y_label)
             ax.xaxis.set_major_locator(MaxNLocator(5))
             panel_label(ax, next(letters))
@@ -174,14 +174,14 @@ _LOADS = _Axis("reduced_separation", "reduced_pressure", SEPARATION_LABEL, PRESS
 _AREAS = _Axis("reduced_pressure", "contact_area_fraction", PRESSURE_LABEL, AREA_LABEL)
 
 
-def _draw(ax, loop, axis, *, turn):
+def _draw(ax, loop, axis, *, turn, lines):
     """Draw a loop, a mark at its pull-off and, if wanted, one where it turns first."""
     colour = loop.marker["mec"]
     for way in loop.ways:
         x, y = (getattr(way, name) for name in (axis.x, axis.y))
         ax.plot(x, y, ls=BRANCH_DASHES[way.branch], color=colour, **_LOOP)
         if axis.y in way.bands:
-            draw_band(ax, x, way.bands[axis.y], colour)
+            draw_band(ax, x, way.bands[axis.y], colour, lines)
     if turn:
         ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in loop.runs]
         ax.plot(*_mean_point(ends, axis), ls="none", zorder=5, **loop.marker)
@@ -220,7 +220,7 @@ def _enlarge(left, right, loops):
     ):
         inset = ax.inset_axes((*corner, 0.46, 0.33 if ax is right else 0.48))
         for loop in loops:
-            _draw(inset, loop, axis, turn=False)
+            _draw(inset, loop, axis, turn=False, lines=len(loops))
         inset.set_xlim(limits[0])
         inset.set_ylim(limits[1])
         inset.axhline(0, color=GREY, lw=0.5, zorder=1)

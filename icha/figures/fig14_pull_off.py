@@ -9,10 +9,10 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from icha.figures.curves import bars_handle
 from icha.figures.hysteresis import (
     Lines,
     averages,
-    bars_handle,
     detached_runs_of,
     draw_averages,
     legend_below,
@@ -120,13 +120,17 @@ def figure(
             panels[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
             panels[1].xaxis.set_major_formatter(lambda value, _: number(value))
             panels[1].xaxis.set_minor_formatter(NullFormatter())
+        elif np.ptp(loads) < 1e-3 * np.abs(loads).max():
+            panels[1].set_xlim(0, 2 * loads.max())
         panels[1].set_ylabel(label)
         panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
         if len(loaded_slopes) == 1:
             panels[1].set_title(slope_label(*loaded_slopes), loc="right")
     if lines.scale:
         lines.scale.draw(fig, list(panels))
-    legend_below(fig, lines.handles(**_LINE) | bars_handle(means), columns=len(panels))
+    legend_below(
+        fig, lines.handles(**_LINE) | bars_handle(np.concatenate([line.counts for line in means])), columns=len(panels)
+    )
     return fig
 
 

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.stats import linregress
 
-from icha.figures.hysteresis import Lines, averages, bars_handle, detached_runs_of, draw_averages, legend_below, several
+from icha.figures.curves import bars_handle
+from icha.figures.hysteresis import Lines, averages, detached_runs_of, draw_averages, legend_below, several
 from icha.figures.select import NothingToDraw
 from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, styled, unit_for
 
@@ -118,7 +119,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
         shown = _draw_parts(parts, sticky, lines)
         panel_label(parts, "b")
         handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
-    handles |= bars_handle(drawn.values())
+    handles |= bars_handle(np.concatenate([line.counts for line in drawn.values()]))
     if lines.scale:
         handles = lines.handles(ls="none") | handles
         lines.scale.draw(fig, [loss])

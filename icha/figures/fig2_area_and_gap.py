@@ -69,10 +69,10 @@ def figure(
     left, right = fig.subplots(1, 2)
     pressures, areas, gaps = [], [], []
     for line in curves.lines:
-        p, area = draw_line(left, line, _areas, logarithmic=True)
+        p, area = draw_line(left, line, _areas, logarithmic=True, lines=len(curves.lines))
         areas.append(area)
         pressures.append(p[p > 0])
-        p, gap = draw_line(right, line, _separations, logarithmic=True)
+        p, gap = draw_line(right, line, _separations, logarithmic=True, lines=len(curves.lines))
         gaps.append(gap)
         draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
     for ax in (left, right):

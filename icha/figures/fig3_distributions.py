@@ -69,14 +69,14 @@ def figure(
         if len(densities) == 1:
             left.plot(u, densities[0], markevery=1 + len(u) // _MOST_MARKERS, **look)
         else:
-            draw_mean(left, u, ensemble(densities), look)
+            draw_mean(left, u, ensemble(densities), look, len(lines))
         floor.append(densities.mean(axis=0).min())
         p, densities = pressure_densities(line.members)
         density = densities.mean(axis=0)
         if len(densities) == 1:
             right.plot(p, density, markevery=3, **look)
         else:
-            draw_mean(right, p, ensemble(densities), look)
+            draw_mean(right, p, ensemble(densities), look, len(lines))
         if len(density):  # before first contact there is no pressure
             shown = density > 1e-3 * density.max()
             lowest, highest = min(lowest, p[shown].min()), max(highest, p[shown].max())

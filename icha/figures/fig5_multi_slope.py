@@ -93,8 +93,8 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
         line = line._replace(look=line.look | {"label": None})
         slope = float(line.runs[0]["rms_slope"])
         draw_ways_back([(left, lambda p, a, _: (p, a)), (right, lambda p, a, _, slope=slope: (p * slope, a))], line)
-        draw_line(left, line, _points, logarithmic=True)
-        draw_line(right, line, _points_at_load, logarithmic=True)
+        draw_line(left, line, _points, logarithmic=True, lines=len(curves.lines))
+        draw_line(right, line, _points_at_load, logarithmic=True, lines=len(curves.lines))
     for ax in (left, right):
         ax.set_xscale("log")
         ax.set_yscale("log")

@@ -42,8 +42,8 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     left, right = fig.subplots(1, 2)
     pressures, stiffnesses = [], []
     for line in curves.lines:
-        p, stiffness = draw_line(left, line, stiffness_points, logarithmic=True)
-        draw_line(right, line, _over_pressure, logarithmic=True)
+        p, stiffness = draw_line(left, line, stiffness_points, logarithmic=True, lines=len(curves.lines))
+        draw_line(right, line, _over_pressure, logarithmic=True, lines=len(curves.lines))
         pressures.append(p)
         stiffnesses.append(stiffness)
     left.set_xscale("log")

@@ -65,7 +65,7 @@ def figure(
             if len(areas) == 1:
                 ax.plot(area, values[0], **own)
             else:
-                draw_mean(ax, area, ensemble(values), own)
+                draw_mean(ax, area, ensemble(values), own, len(lines))
         shown = snapshot_label(run, at)
     for ax in (left, right):
         ax.set_xscale("log")

@@ -7,8 +7,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from icha.campaign import find_snapshot
-from icha.ensemble import Ensemble, ensemble
-from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL, band_handle, draw_band
+from icha.ensemble import ensemble
+from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL, bars_handle
 from icha.figures.scale import MOST_COLOURS, places_scale
 from icha.figures.select import NothingToDraw, snapshot_label, study_runs
 from icha.figures.style import COLOURS, GREY, MARKERS, TWO_COLUMNS, new_figure, panel_label, quantity, styled
@@ -19,7 +19,7 @@ CAPTION = (
     "against the Tabor parameter of the surface, (R_c Δγ²/E*²)^(1/3) over the range of attraction, with R_c = 1/rms "
     "curvature. Runs that differ only in the range are joined by a line: at a given surface energy a longer range "
     "(smaller Tabor parameter) lets asperities jump into contact from farther away. Where there are several seeds the "
-    "points are means over them, with the 95 % band of confidence of the mean (Student's t). Dashed: without "
+    "points are means over them, and the bars the 95 % confidence of that mean (Student's t). Dashed: without "
     "adhesion. Shaded: outside the Tabor parameters for which the jump-in distance was verified; single asperities, "
     "whose radii differ, can lie there for every value of the surface's."
 )
@@ -81,14 +81,15 @@ def figure(
             "label": _name(interface, place, [] if scale else places),
             "lw": 0.8,
             "ms": 4,
+            "elinewidth": 0.6,
+            "capsize": 1.5,
         }
         over = [ensemble(members) for members in points.values()]
         mu = np.array([each.mean[0] for each in over])
         order = np.argsort(mu)
         for k, ax in enumerate(panels, 1):
-            own = Ensemble(*(np.array([each[k] for each in part])[order] for part in zip(*over, strict=True)))
-            ax.plot(mu[order], own.mean, **look)
-            draw_band(ax, mu[order], own, look["color"])
+            mean, confidence = (np.array([getattr(each, name)[k] for each in over])[order] for name in _DRAWN)
+            ax.errorbar(mu[order], mean, confidence if np.isfinite(confidence).any() else None, **look)
         drawn += mu.tolist()
     for place, members in bare.items():
         over = ensemble(members)
@@ -97,8 +98,6 @@ def figure(
             name = "no adhesion" if place == next(iter(bare)) else None
             ax.axhline(over.mean[k], color=colour, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
     counts = [len(members) for points in curves.values() for members in points.values()]
-    if max(counts) > 1:
-        panels[0].add_line(band_handle(counts))
     if scale:
         scale.draw(fig, list(panels))
     smallest, largest = min(drawn), max(drawn)
@@ -118,9 +117,12 @@ def figure(
         ax.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)
         panel_label(ax, letter)
     panels[0].set_title(shown, loc="right")
-    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
+    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True)) | bars_handle(counts)
     panels[0].legend(handles.values(), handles.keys(), loc="best")
     return fig
+
+
+_DRAWN = ("mean", "confidence")
 
 
 def _name(interface, place, places):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -113,15 +113,6 @@ def averages(points: Sequence[Mapping[int, tuple[float, float]]]) -> Averages:
 
 
 _AVERAGED = ("mean", "confidence", "count")
-
-
-def bars_handle(lines: Iterable[Averages]) -> dict[str, Line2D]:
-    """What the legend says of bars, if there are any."""
-    counts = sorted({int(count) for line in lines for count in line.counts} - {1})
-    if not counts:
-        return {}
-    words = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
-    return {f"means of n = {words} seeds, bars 95 %": Line2D([], [], color=GREY, marker="|", ls="none", ms=8)}
 
 
 def draw_averages(axes, line: Averages, **look):
