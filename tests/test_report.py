@@ -244,7 +244,7 @@ def test_times_are_summed_by_kind_of_job(tmp_path):
 
 def test_incomplete_campaigns_are_reported(write):
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
-    tree = campaign_tree(runs[:-1], allow_missing=True, attrs={"title": "Half"})
+    tree = campaign_tree(runs[:-1], design=[labels for labels, _ in runs], attrs={"title": "Half"})
     text = write(campaign=tree, checks=check_campaign(tree), comparison=compare_campaign(tree))
     assert "3 of 4" in text and "1 of" in text and "nan" not in re.sub(r"base64,[^\"]*", "", text).lower().split()
     Page(text)
