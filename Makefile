@@ -49,9 +49,7 @@ environment: .venv/.installed
 slurm-environment: .venv-slurm/.installed
 
 run: environment
-	$(if $(CONFIG),@python -m icha.configuration $(CONFIG))
-	snakemake --cores $(CORES) $(if $(CONFIG),--configfile $(CONFIG))
-	@python workflow/scripts/show_results.py $(CONFIG)
+	@icha run $(CONFIG) --cores $(CORES)
 
 validation hysteresis: environment
 	$(MAKE) run CONFIG=config/campaigns/$@.yaml

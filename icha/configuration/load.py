@@ -184,7 +184,7 @@ def _origin(path: Path, from_file: Mapping, overrides: Mapping, location: tuple)
 
 def _line(origin: str, location: tuple, value: Any, reason: str) -> str:
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
-    shown = "" if value is NOTHING else f" {_short(value)}"
+    shown = "" if value is NOTHING else " (empty)" if value is None else f" {_short(value)}"
     return f"{origin}: {key or 'top level'}:{shown} {reason}"
 
 

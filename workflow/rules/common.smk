@@ -226,6 +226,11 @@ def warm_modules():
     return ["snakemake.logging", "snakemake.iocontainers", *modules, *late, *figures]
 
 
+# On a node of a cluster, where no hooks are called, for the jobs of one batch.
+if workflow.remote_exec:
+    warm.start(warm_modules())
+
+
 onstart:
     hold_lock(f".snakemake/{CAMPAIGN.name}.lock")
     if workflow.local_exec:
