@@ -342,6 +342,11 @@ class _Column(NamedTuple):
             values = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, room)])
         return values
 
+    def places(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:
+        """Where a run's values stand along the own dimensions; its snapshots are those at the positions given."""
+        sizes = zip(self.own, values.shape, strict=False)
+        return tuple(snapshots if dim == "snapshot" else slice(0, size) for dim, size in sizes)
+
 
 class _Group:
     """The group of a study in the file: what is in it, and how it is written."""
@@ -375,14 +380,9 @@ class _Group:
             if name not in self.sizes
         }
         self.whole = list(self._define_whole())
-        self.failure = define_text(
-            group,
-            "failure",
-            LABELS,
-            max(1, *(len(failure.encode()) for failure in study.failures)),
-            {"units": "1", "long_name": "why the run is incomplete; empty where it is not"},
-            **self._storage(LABELS, (), max(1, *(len(failure.encode()) for failure in study.failures))),
-        )
+        width = max(1, *(len(failure.encode()) for failure in study.failures))
+        attrs = {"units": "1", "long_name": "why the run is incomplete; empty where it is not"}
+        self.failure = define_text(group, "failure", LABELS, width, attrs, **self._storage(LABELS, (), width))
         self.places = {
             (dim, label): define_numbers(
                 group,
@@ -489,36 +489,38 @@ class _Group:
             box = tuple(
                 slice(k, min(k + n, size)) for k, n, size in zip(start, self.block, self.study.shape, strict=True)
             )
+            lengths = tuple(s.stop - s.start for s in box)
             block = {
-                name: np.full(
-                    tuple(s.stop - s.start for s in box) + column.variable.shape[4:], column.fill, column.variable.dtype
-                )
+                name: np.full(lengths + column.variable.shape[len(LABELS) :], column.fill, column.variable.dtype)
                 for name, column in self.columns.items()
                 if column.along == LABELS
             }
             for entry, position in members:
-                spool.seek(entry.place)
-                run = pickle.load(spool)
                 at = [self.study.snapshots[each] for each in entry.snapshots]
-                values = {
-                    name: self.columns[name].fitting(*values) for name, values in run.items() if name in self.columns
-                }
+                values = self._taken_back(entry, spool)
+                place = dict(zip(LABELS, position, strict=True))
                 for name, v in values.items():
                     column = self.columns[name]
-                    own = tuple(
-                        at if dim == "snapshot" else slice(0, n) for dim, n in zip(column.own, v.shape, strict=False)
-                    )
+                    own = column.places(at, v)
                     if name in block:
                         block[name][(*np.subtract(position, start), ...)][own] = v
                     elif name in common:
-                        place = tuple(position[LABELS.index(label)] for label in column.along)
-                        common[name].put(entry.labels, place, own, v)
+                        common[name].put(entry.labels, tuple(place[label] for label in column.along), own, v)
                 ragged.add(position, values, at)
             for name, values in block.items():
                 self.columns[name].variable[box] = values
         ragged.flush()
         for each in common.values():
             each.flush()
+
+    def _taken_back(self, entry, spool):
+        """Values of a run's variables, as they fit the file."""
+        spool.seek(entry.place)
+        return {
+            name: self.columns[name].fitting(*values)
+            for name, values in pickle.load(spool).items()
+            if name in self.columns
+        }
 
     def _is_common(self, column):
         return column.along != LABELS and not set(column.own) & set(RAGGED)
@@ -569,7 +571,6 @@ class _Ragged:
 
     def __init__(self, group: _Group):
         """Nothing is written yet."""
-        self.group = group
         self.written = dict.fromkeys(group.counts, 0)
         self.variables = {
             dim: {name: column.variable for name, column in group.columns.items() if column.own == (dim,)}
