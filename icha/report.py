@@ -115,9 +115,9 @@ def write_report(
             "caption": figure.caption,
             "data": base64.b64encode(Path(figure.png).read_bytes()).decode("ascii"),
             "pdf": link(figure.pdf),
-            "studies": figure.studies,
+            "study": study,
         }
-        for number, figure in enumerate(figures, 1)
+        for number, (study, figure) in enumerate(_in_order_of_page(figures, list(campaign.children)), 1)
     ]
     studies = [_study(campaign, name, comparison) for name in campaign.children]
     shown = [_surface(surface) for surface in surfaces[:MOST_ROWS]]
@@ -155,6 +155,13 @@ def write_report(
     )
     with whole_file(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _in_order_of_page(figures, studies):
+    """Study (None: of none or of several) and figure, those of none first and then those of every study."""
+    places = [None, *studies]
+    own = [each.studies[0] if len(each.studies) == 1 and each.studies[0] in studies else None for each in figures]
+    return sorted(zip(own, figures, strict=True), key=lambda pair: places.index(pair[0]))
 
 
 def write_times_page(path: str | os.PathLike, jobs: Sequence[Benchmark]) -> None:
@@ -642,7 +649,8 @@ def _scientific(value: float | None) -> Markup:
         return Markup("–")
     if value == 0:
         return Markup("0")
-    exponent = int(np.floor(np.log10(abs(value))))
+    # A hundredth less a rounding error is a hundredth.
+    exponent = int(np.floor(np.log10(abs(value)) + 1e-9))
     if -3 <= exponent < 4:
         return Markup(escape(f"{value:.{max(0, 2 - exponent)}f}" if exponent < 3 else f"{value:.0f}"))
     return Markup(f"{value / 10.0**exponent:.2f}&thinsp;×&thinsp;10<sup>{str(exponent).replace('-', '−')}</sup>")

@@ -139,7 +139,7 @@ def test_figures_are_enlarged_by_a_click_and_left_again(page):
       document.querySelectorAll("figure button")[1].click(); await pause(); state();
       key("ArrowRight"); await pause(); state();
       viewer.querySelector(".previous").click(); await pause(); state();
-      states.push(viewer.querySelector("p").textContent.startsWith("Figure 2."));
+      states.push(viewer.querySelector(".words").textContent.startsWith("Figure 2."));
       states.push(document.querySelector("figure img").getBoundingClientRect().width);
       image().click(); states.push(viewer.open);
     """ + note("states")

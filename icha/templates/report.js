@@ -1,4 +1,10 @@
 "use strict";
+// Long captions are shown whole by a click.
+document.documentElement.classList.add("script");
+document.querySelectorAll("figcaption p").forEach((words) => {
+  words.addEventListener("click", () => words.classList.toggle("whole"));
+});
+
 // Figures are enlarged by a click; arrow keys and buttons go on to the next, Escape or a click closes.
 const viewer = document.getElementById("viewer");
 const figures = [...document.querySelectorAll("figure")];
@@ -8,8 +14,9 @@ function show(at) {
   const image = viewer.querySelector("img");
   image.src = figures[shown].querySelector("img").src;
   image.alt = figures[shown].querySelector("img").alt;
-  viewer.querySelector("p").replaceChildren(...figures[shown].querySelector("figcaption").cloneNode(true).childNodes);
-  viewer.querySelector("p").scrollTop = 0;
+  const words = viewer.querySelector(".words");
+  words.replaceChildren(...figures[shown].querySelector("figcaption p").cloneNode(true).childNodes);
+  words.scrollTop = 0;
   if (!viewer.open) viewer.showModal();
 }
 figures.forEach((figure, at) => figure.querySelector("button").addEventListener("click", () => show(at)));
