@@ -173,7 +173,7 @@ def test_a_script_runs_its_own_rule_and_what_follows(project):
 
 
 def test_the_configurations_model_runs_nothing(project):
-    for name in ("model", "load", "expansion", "units"):
+    for name in ("model", "load", "expansion", "design", "problems"):
         add_statement(project / f"icha/configuration/{name}.py")
     assert planned(project) == ({}, [])
 

@@ -222,7 +222,7 @@ def test_wrong_values_on_the_command_line_are_a_message(smoke):
     refused = snakemake(smoke, "-n", "--config", "name=My Campaign", "studies={none: {}}")
     assert refused.returncode == 1
     assert "--config: name: 'My Campaign' is not a name" in refused.stdout
-    assert "--config: studies.none.surfaces: the key is missing" in refused.stdout
+    assert "--config: studies.none.targets: the key is missing" in refused.stdout
     assert "Traceback" not in refused.stdout
 
 
