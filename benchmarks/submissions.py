@@ -2,7 +2,7 @@
 
     make slurm-environment && .venv/bin/python benchmarks/submissions.py [RUNS]
 
-Needs root and Debian's packages, see tests/slurm/single_node.py. Prints the table of docs/howto/cluster.md; the node
+Needs root and Debian's packages, see tests/slurm/single_node.py. Prints what docs/howto/cluster.md tells; the node
 is this machine and answers at once, so there is no waiting for other people's jobs in it.
 """
 
@@ -39,7 +39,7 @@ studies:
 figures: {{fig1_jkr: {{}}}}
 """
 WAYS = {
-    "one machine": ("--cores", "4"),
+    "one machine": (),
     "Slurm, in one batch": ("--workflow-profile", "slurm", "--group-components", "surfaces=10", "runs=1000"),
     "Slurm, run by run": ("--workflow-profile", "slurm", "--group-components", "surfaces=1", "runs=1"),
 }
@@ -51,9 +51,9 @@ def seconds_of(record):
 
 def measure(runs: int) -> None:
     """Print a line for each way to compute the same `runs` small runs."""
-    print("| | submissions | wall time | in submissions, core-seconds a run | in the solver, a run |")
+    print("| | submissions | wall time | core-seconds of submissions, a run | script of a run |")
     print("| --- | ---: | ---: | ---: | ---: |")
-    with single_node() as node, tempfile.TemporaryDirectory() as folder:
+    with single_node(cores=os.cpu_count()) as node, tempfile.TemporaryDirectory() as folder:
         for number, (way, arguments) in enumerate(WAYS.items()):
             project = copy_project(REPOSITORY, Path(folder, str(number)))
             slopes = [round(0.2 + 0.8 * i / runs, 4) for i in range(runs)]
@@ -62,7 +62,8 @@ def measure(runs: int) -> None:
             begin = time.monotonic()
             subprocess.run(
                 [REPOSITORY / ".venv-slurm/bin/python", "-m", "snakemake", "runs", *arguments,
-                 "--slurm-batches-init-seconds-before-status-checks", "1", "--configfile", "config/small.yaml"],
+                 "--cores", str(os.cpu_count()), "--slurm-batches-init-seconds-before-status-checks", "1",
+                 "--configfile", "config/small.yaml"],
                 cwd=project,
                 env=node.environment | {"PYTHONPATH": str(project), "OMP_NUM_THREADS": "1"},
                 stdout=subprocess.DEVNULL,
@@ -73,9 +74,9 @@ def measure(runs: int) -> None:
             records = node.finished_jobs()[before:]
             held = sum(seconds_of(record) * int(record["ProcCnt"]) for record in records) / runs
             files = list(project.glob("results/small/benchmarks/runs/**/*.jsonl"))
-            solver = sum(json.loads(file.read_text().splitlines()[0])["s"] for file in files) / runs
+            script = sum(json.loads(file.read_text().splitlines()[0])["s"] for file in files) / runs
             held = f"{held:.1f} s" if records else ""
-            print(f"| {way} | {len(records) or ''} | {wall:.0f} s | {held} | {solver:.1f} s |", flush=True)
+            print(f"| {way} | {len(records) or ''} | {wall:.0f} s | {held} | {script:.1f} s |", flush=True)
 
 
 if __name__ == "__main__":
