@@ -38,13 +38,25 @@ def written(name, value, index=...):
     return damage
 
 
+def risen(*, united):
+    """The surfaces further apart at a step, where spots have united or where nothing has happened."""
+
+    def damage(run):
+        run["jump_in_count"].values[...] = 0
+        run["coalescence_count"].values[...] = [0] * 4 + [united] * (run.sizes["step"] - 4)
+        run["mean_separation"].values[4] *= 1.5
+
+    return damage
+
+
 DAMAGES = {
     "residual": written("residual", 1e-6, 2),
     "converged": written("converged", 0, 1),
     "targets": scaled("step_target", 1 + 1e-6, 3),
     "area rises": scaled("contact_area_fraction", 0.3, 4),
     "pressure rises": scaled("nominal_pressure", 0.1, 4),
-    "separation falls": scaled("mean_separation", 1.5, 4),
+    "separation falls": risen(united=0),
+    "separation falls where spots unite": risen(united=1),
     "area from P(p)": scaled("pressure_density", 1 + 1e-6),
     "load from P(p)": scaled("pressure_bin_mean", 1 + 1e-6),
     "P(u) complete": scaled("gap_density", 1 + 1e-6),
@@ -60,6 +72,17 @@ def test_each_kind_of_damage_is_caught_by_its_check(name):
     run = small.run(material="hertz").copy(deep=True)
     DAMAGES[name](run)
     assert name in failed(run)
+
+
+def test_a_jump_in_may_push_surfaces_apart_that_keep_an_area():
+    run = small.run(material="soft").copy(deep=True)
+    run["mean_separation"].values[4] = 1.1 * run["mean_separation"].values[3]
+    run["step_target"].values[4] = run["mean_separation"].values[4]
+    for name in ("jump_in_count", "coalescence_count"):
+        run[name].values[...] = 0
+    assert "separation falls" in failed(run)
+    run["jump_in_count"].values[4:] = 1
+    assert "separation falls" not in failed(run)
 
 
 @pytest.mark.parametrize("material", ["soft", "hertz"])
