@@ -103,10 +103,20 @@ def threads_of(surface):
     return 2 if points_of(surface) >= 2048**2 else 1
 
 
+def minutes_of(wildcards):
+    """Minutes after which a sweep is taken for stuck: many times what such sweeps have taken."""
+    if points_of(wildcards.surface) >= 2048**2:
+        return 240
+    study = CAMPAIGN.studies[wildcards.study]
+    return 120 if study.unload or study.turning_points else 30
+
+
 def figure_memory(name):
     """Megabytes that a figure needs: the map holds a topography."""
     return 2000 + (
-        16 * max(points_of(name) for name, _ in surface_cases(CAMPAIGN)) // 10**6 if name in ("fig4_contact_map", "fig16_snap_map") else 0
+        16 * max(points_of(name) for name, _ in surface_cases(CAMPAIGN)) // 10**6
+        if name in ("fig4_contact_map", "fig16_snap_map")
+        else 0
     )
 
 

@@ -15,7 +15,7 @@ rule run:
     threads: lambda wildcards: threads_of(wildcards.surface)
     resources:
         mem_mb=lambda wildcards: memory_of(wildcards.surface),
-        runtime=240,
+        runtime=minutes_of,
     params:
         settings=settings_of,
         attributes=lambda wildcards: ATTRIBUTES
