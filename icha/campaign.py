@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -22,18 +21,8 @@ def campaign_tree(
     *,
     design: Iterable[RunLabels | tuple] | None = None,
     attrs: Mapping[str, str] = {},
-    allow_missing: bool = False,
 ) -> xr.DataTree:
     """The campaign dataset of some runs in memory; arguments and errors as `icha.campaign_file.write_campaign`."""
-    if allow_missing:
-        runs = list(runs)
-        design = [
-            labels
-            for study in dict.fromkeys(key[0] for key, _ in runs)
-            for labels in itertools.product(
-                [study], *(dict.fromkeys(key[k] for key, _ in runs if key[0] == study) for k in range(1, 5))
-            )
-        ]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "campaign.nc")
         write_campaign(runs, path, design=design, attrs=attrs)
