@@ -26,7 +26,7 @@ def campaign_tree(
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "campaign.nc")
         write_campaign(runs, path, design=design, attrs=attrs)
-        return read_campaign(path)
+        return read_campaign(path).load()
 
 
 def run_labels(tree: xr.DataTree) -> list[RunLabels]:
