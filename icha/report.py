@@ -45,6 +45,7 @@ MOST_ROWS = 300
 _FOLDED = 30
 # More surfaces than this have a scale of colours, and only some are named.
 _MOST_SPECTRA = 7
+_SHOWS_ON_BLACK = 0.3
 
 
 @dataclass(frozen=True)
@@ -536,7 +537,7 @@ def _spectra(surfaces):
     if not members:
         return None
     many = len(members) > _MOST_SPECTRA
-    scale = Scale(list(members)) if many else None
+    scale = Scale(list(members), darkest=_SHOWS_ON_BLACK) if many else None
     # The last colour is that of the page's text.
     colours = scale.colours if many else [*COLOURS[: _MOST_SPECTRA - 1], "currentColor"]
     named = {0, len(members) // 2, len(members) - 1} if many else set(range(len(members)))

@@ -19,7 +19,7 @@ from icha.figures.style import COLOURS, material_label, unit_for
 MOST_COLOURS = len(COLOURS)
 _MOST_TICKS = 9
 # The brightest colours of the map do not show on white.
-_DARKEST, _BRIGHTEST = 0.0, 0.9
+_BRIGHTEST = 0.9
 _QUANTITIES = (
     ("contact_modulus", r"$E^{\ast}$", "Pa"),
     ("surface_energy", r"$\Delta\gamma$", "J/m²"),
@@ -30,12 +30,15 @@ _QUANTITIES = (
 class Scale:
     """A colour for each of many, in their order, and the bar that tells which is which."""
 
-    def __init__(self, names: Sequence[str], title: str = ""):
-        """Take what is to be told apart; what all names begin with goes into the title."""
+    def __init__(self, names: Sequence[str], title: str = "", *, darkest: float = 0.0):
+        """Take what is to be told apart; what all names begin with goes into the title.
+
+        The darkest colours, in parts of the map from 0 to 0.9, do not show on black.
+        """
         common = "" if title else _beginning(names)
         self.names = [name.removeprefix(common) for name in names]
         self.title = title or common.rstrip("-_ ")
-        places = np.linspace(_DARKEST, _BRIGHTEST, len(names))
+        places = np.linspace(darkest, _BRIGHTEST, len(names))
         self.colours = [to_hex(colour) for colour in mpl.colormaps["viridis"](places)]
 
     def draw(self, figure: Figure, axes: Sequence[Axes]) -> None:
