@@ -561,7 +561,6 @@ _MOST_STUDIES = 8
 
 def _provenance(studies, surfaces, figures, model_error, files, dataset):
     """The graph of what was made of what, with how many there are of each."""
-    names = list(dict.fromkeys(surface.attrs.get("surface", "") for surface in surfaces))
 
     def counted(number, one, many):
         return f"{number} {one if number == 1 else many}"
@@ -583,7 +582,7 @@ def _provenance(studies, surfaces, figures, model_error, files, dataset):
     made: dict[str, Node] = {}
     columns = [
         begin,
-        {"surfaces": Node("Surfaces", f"{len(surfaces)} of {counted(len(names), 'kind', 'kinds')}", "#surfaces")}
+        {"surfaces": Node("Surfaces", counted(len(surfaces), "topography", "topographies"), "#surfaces")}
         if surfaces
         else {},
         middle,

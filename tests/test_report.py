@@ -16,9 +16,18 @@ from icha.checks import Check, check_campaign
 from icha.figures import fig1_jkr
 from icha.figures.select import path_steps
 from icha.figures.style import save
+from icha.labels import RunLabels
 from icha.model_error import model_error
 from icha.records import read_campaign, read_dataset, write_dataset, write_surface
-from icha.report import Benchmark, ReportFigure, read_benchmarks, write_report, write_times_page
+from icha.report import (
+    MOST_ROWS,
+    Benchmark,
+    ReportFigure,
+    read_benchmarks,
+    read_surface_statistics,
+    write_report,
+    write_times_page,
+)
 
 
 class Page(HTMLParser):
@@ -248,6 +257,82 @@ def test_incomplete_campaigns_are_reported(write):
     text = write(campaign=tree, checks=check_campaign(tree), comparison=compare_campaign(tree))
     assert "3 of 4" in text and "1 of" in text and "nan" not in re.sub(r"base64,[^\"]*", "", text).lower().split()
     Page(text)
+
+
+def section(text, start, end):
+    return text[text.index(f'<h2 id="{start}">') : text.index(f'<h2 id="{end}">')]
+
+
+def test_failed_runs_are_listed_with_their_reasons(write, tmp_path):
+    assert 'id="failures"' not in write()
+    runs = list(small.runs())
+    runs[1] = (runs[1][0], runs[1][1].assign_attrs(incomplete="no equilibrium: <residual> 1e-3"))
+    tree = campaign_tree(runs)
+    text = write(campaign=tree, comparison=compare_campaign(tree), results=tmp_path)
+    page = Page(text)
+    (row,) = re.findall(r"<tr>(.*?)</tr>", section(text, "failures", "figures").split("<tbody>")[1])
+    assert "no equilibrium: &lt;residual&gt; 1e-3" in row
+    assert f"runs/{runs[1][0].path}.nc" in row and "#failures" in page.targets
+    assert "3 of 4 runs are complete" in text and "3 runs, 1 failed" in text
+    # Its values stand nowhere.
+    shown = section(text, "studies", "surfaces")
+    assert f"runs/{runs[0][0].path}.nc" in shown and f"runs/{runs[1][0].path}.nc" not in shown
+
+
+def test_means_over_the_seeds_have_their_confidence(write):
+    text = write()
+    assert text.count("Means over <i>n</i> seeds") == 1, "of the study of two seeds alone"
+    table = text[text.index("Means over <i>n</i> seeds") :].split("</table>")[0]
+    pressures = re.findall(r'<th class="num">([\d.]+)</th>', table)
+    cells = dict(zip(pressures, re.findall(r"<td[^>]*>(.*?)</td>", table)[-len(pressures) :], strict=True))
+    areas = [dict((p, a) for p, a, _ in at_round_pressures(small.run(seed)))[1e-2] for seed in (1, 2)]
+    assert cells["0.01"].split("<br>")[0] == f"{np.mean(areas):.4f} ± {_half_width(areas):.4f}"
+
+
+def test_figures_stand_with_their_study_and_are_numbered_as_they_come(write, tmp_path):
+    def figure(name, studies):
+        files = [tmp_path / "figures" / f"fig1_jkr.{ending}" for ending in ("png", "pdf")]
+        return ReportFigure(name, f"Caption of {name}.", *files, studies)
+
+    figures = [figure("late", ("single",)), figure("early", ("slopes",)), figure("both", ("slopes", "single"))]
+    text = write(figures=figures)
+    order = re.findall(r'<figure id="(.*?)">|<h3 id="(study-.*?)">', text)
+    assert [one or other for one, other in order] == ["both", "study-slopes", "early", "study-single", "late"]
+    assert re.findall(r"<b>Figure (\d)\.</b> Caption of (\w+)", text) == [("1", "both"), ("2", "early"), ("3", "late")]
+
+
+def test_surfaces_show_spectra_and_where_measurements_come_from(write, tmp_path):
+    text = write()
+    plain = read_surface_statistics(tmp_path / "s.nc")
+    assert "height" not in plain and text.count('<polyline class="curve"') == 1
+    origin = {"source_file": "scan & co.x3p", "source_sha256": "ab" * 32, "preparation": "tilt removed"}
+    measured = plain.assign(measured_rms_slope=0.321).assign_attrs(origin | {"surface": "scan"})
+    text = section(write(surfaces=[plain, measured, measured.assign(seed=2)]), "surfaces", "checks")
+    assert text.count('<polyline class="curve"') == 2
+    for part in ("scan &amp; co.x3p", "ab" * 32, "tilt removed", "0.321"):
+        assert part in text
+    assert text.count("ab" * 32) == 1
+    without = plain.drop_dims("psd_bin")
+    assert "<polyline" not in section(write(surfaces=[without]), "surfaces", "checks")
+    many = [plain.assign_attrs(surface=f"rough-hurst0.{k}") for k in range(20, 60)]
+    text = section(write(surfaces=many), "surfaces", "checks")
+    assert text.count("<polyline") == 40 and text.count('<path class="curve"') == 3, "only some have a name"
+
+
+def test_long_tables_are_folded_and_cut_and_say_so(write, tmp_path):
+    count = MOST_ROWS + 20
+    runs = [
+        (RunLabels("many", "rough", seed, 1.0, "soft"), small.run().assign(seed=small.run()["seed"] * 0 + seed))
+        for seed in range(1, count + 1)
+    ]
+    tree = campaign_tree(runs)
+    text = write(campaign=tree, checks=[], comparison=None, results=tmp_path)
+    Page(text)
+    statistics = section(text, "statistics", "data")
+    assert statistics.count("<tr>") == MOST_ROWS + 1 and f"<summary>Every run ({count})" in statistics
+    assert f"The first {MOST_ROWS} of {count} rows" in text
+    assert len(re.sub(r"base64,[^\"]*", "", text)) < 1.5e6
+    assert f"<b>{count}</b> complete runs" in text
 
 
 def test_benchmark_files_of_both_kinds(tmp_path):
