@@ -246,7 +246,21 @@ def verdicts(results) -> list[Verdict]:
     same = all(len(values) == 1 for values in compared)
     text = ("same" if same else "different") + " bytes with 1 and 2 threads at 512²" if compared else ""
     found.append(Verdict("the number of threads never changes a byte", text, same if compared else None))
+    plan = results.get("campaign-plan")
+    target = "plan of a campaign of 10 000 runs: at most 60 s and 2 GiB"
+    text = f"{plan['wall']:.0f} s, {plan['peak'] / GIB:.1f} GiB" if plan else ""
+    reached = plan["outcome"] == "complete" and plan["wall"] <= 60 and plan["peak"] <= 2 * GIB if plan else None
+    found.append(Verdict(target, text, reached))
+    runs = results.get("campaign-runs")
+    target = "1 000 small runs on two cores: less than half of the time outside the contact solver"
+    outside = 1 - solver_share(runs) if runs else None
+    found.append(Verdict(target, f"{outside:.0%}" if runs else "", outside < 0.5 if runs else None))
     return found
+
+
+def solver_share(runs) -> float:
+    """Part of the cores' time of a whole campaign that the contact solver takes."""
+    return runs["seconds_a_run"] * runs["runs"] / (runs["cores"] * runs["whole"]["wall"])
 
 
 def _stops(result) -> list[dict]:
@@ -291,8 +305,44 @@ def page(results: dict[str, dict]) -> str:
     parts += ["![Time of a sweep](images/benchmark_sweep.png)", "## Number of spots", SCALING_TEXT, _scaling(results)]
     parts += ["![Time and memory over the number of spots](images/benchmark_scaling.png)"]
     parts += ["## Where the time goes", STAGES_TEXT, _stages(results)]
+    parts += _campaigns(results)
     return "\n\n".join(part for part in parts if part) + "\n"
 
+
+def _campaigns(results) -> list[str]:
+    """What the workflow costs beside the solver."""
+    parts = ["## Whole campaigns", CAMPAIGNS_TEXT]
+    rows = []
+    if plan := results.get("campaign-plan"):
+        rows.append([f"plan (`-n`) of {plan['runs']} runs", seconds(plan["wall"]), mib(plan["peak"]), ""])
+    if runs := results.get("campaign-runs"):
+        share = f"{solver_share(runs):.0%} the contact solver's ({runs['seconds_a_run']:.2f} s a run)"
+        rows.append([f"{runs['runs']} small runs on {runs['cores']} cores", seconds(runs["whole"]["wall"]), "", share])
+    for part, what in (("write", "campaign dataset"), ("check", "checks")):
+        for each in sorted(chosen(results, f"dataset-{part}-"), key=lambda each: each["runs"]):
+            rows.append([f"{what} of {each['runs']} runs", seconds(each["wall"]), mib(each["peak"]), ""])
+    if not rows:
+        return []
+    parts.append(table(["", "time", "memory", "of the time"], rows))
+    if costs := results.get("costs"):
+        lines = []
+        for group, what in (("fitted", "to which the model was fitted"), ("others", "that it had not seen")):
+            ratios = [case["ratios"]["time"] for case in costs["cases"] if case["group"] == group]
+            if ratios:
+                within = sum(0.5 <= ratio <= 2 for ratio in ratios)
+                lines.append(
+                    f"- {len(ratios)} cases {what}: expected over measured time {min(ratios):.2f} to "
+                    f"{max(ratios):.2f}, {within} within a factor of two"
+                )
+        parts += ["What `icha describe` expects (`benchmarks/costs.py`):", "\n".join(lines) + "."]
+    return parts
+
+
+CAMPAIGNS_TEXT = """\
+A campaign of small runs: 128² nodes, 7 loads, five surface energies on 200 random surfaces. *The contact solver's* part
+is the time that 100 of its runs take again in two processes side by side (`icha.simulate`), for all runs, over the time
+of both cores from the call of Snakemake to its end: surfaces, runs, dataset, comparison, checks, figure and report. The
+plan is that of 10 000 such runs. The campaign dataset is written, and checked, of files of runs of 15 loads."""
 
 SWEEP_TEXT = """\
 Every code is given the same heights and the same 20 stops and is measured as a whole process, imports and reading
