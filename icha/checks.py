@@ -197,8 +197,8 @@ def _identities(run):
     overlap = run["overlap_fraction"].values
     yield (
         "P(u) complete",
-        np.max(np.abs(gap_content.sum(axis=1) + area + overlap - 1)),
-        "integral of P(u) over u, plus A/A0, plus overlap, against 1",
+        np.max(np.abs(gap_content.sum(axis=1) + area - run["area_beyond_edges"].values + overlap - 1)),
+        "integral of P(u) over u, plus A/A0 within the edges, plus overlap, against 1",
     )
     yield "area of spots", np.max(np.abs(spot_area - area) / area_scale), "sum of the spots' areas against A/A0"
     yield (
