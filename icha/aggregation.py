@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from icha.campaign import LABELS, loading_stops
+from icha.campaign import LABELS, loading_stops, reduced_gap
 from icha.ensemble import Ensemble, ensemble
 from icha.records import COMPLETE
 
@@ -92,7 +92,8 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
     loads = {"reduced_pressure": pressure, "relative_load": pressure * slope}
     curves = {
-        name: study[name].transpose(*LABELS, "step").values for name in ("contact_area_fraction", "reduced_separation")
+        "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
+        "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
     }
 
     variables, coords = (
@@ -245,5 +246,5 @@ def at_round_pressures(run: xr.Dataset) -> list[tuple[float, float, float]]:
     load = load[positive]
     covered = [p for p in ROUND_PRESSURES if load.min() * (1 - 1e-9) <= p <= load.max() * (1 + 1e-9)]
     area = interpolated(load, run["contact_area_fraction"].values[positive], covered, logarithmic=True)
-    gap = interpolated(load, run["reduced_separation"].values[positive], covered, logarithmic=False)
+    gap = interpolated(load, reduced_gap(run).values[positive], covered, logarithmic=False)
     return list(zip(covered, area.tolist(), gap.tolist(), strict=True))

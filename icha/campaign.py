@@ -107,6 +107,16 @@ def _own(study, dim, place):
     return slice(int(begin), int(end))
 
 
+def reduced_gap(data: xr.Dataset) -> xr.DataArray:
+    """Mean gap over rms height: what figures and comparisons show as separation of a run or of all runs of a study.
+
+    Of a periodic surface it is the mean separation over the rms height; of a free square, whose separation is that of
+    the half-space far away, it is the one that can be compared with others.
+    """
+    gap = (data["mean_gap"] / data["rms_height"]).transpose(*data["reduced_separation"].dims)
+    return data["reduced_separation"].where(data["boundary"] != "free", gap)
+
+
 def loading_stops(data: xr.Dataset) -> xr.DataArray:
     """Which steps of a run, or of all runs of a study, are stops of the first loading, and not between stops."""
     return (data["leg"] == 0) & (data["step_kind"] != BETWEEN)

@@ -62,6 +62,7 @@ _VARIES_WITH = {
     "nayak_parameter": ("surface", "seed", "rms_slope"),
     "period": ("surface",),
     "grid": ("surface",),
+    "boundary": ("surface",),
     "gap_bin_edges": ("surface", "seed", "rms_slope"),
     "pressure_bin_edges": ("rms_slope", "material"),
     "snapshot_kind": (),

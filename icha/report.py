@@ -294,6 +294,7 @@ def _means(dataset, complete):
     """Rows of means over seeds of A/A0 and mean separation at round pressures, with their 95 % confidence."""
     lines = {line: own for line, own in _lines(complete).items() if len(own) > 1}
     wanted = ["reduced_pressure", "contact_area_fraction", "reduced_separation", "leg", "step_kind", "step_count"]
+    wanted += ["mean_gap", "rms_height", "boundary"]
     steps = dataset[wanted]
     rows = []
     for line, own in list(lines.items())[:MOST_ROWS]:

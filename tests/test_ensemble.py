@@ -7,7 +7,7 @@ import xarray as xr
 from scipy.stats import t, ttest_1samp
 
 from icha.aggregation import compare_runs, mean_curve, mean_way
-from icha.campaign import LABELS, campaign_tree
+from icha.campaign import LABELS, campaign_tree, reduced_gap
 from icha.ensemble import ensemble
 from icha.labels import RunLabels
 
@@ -96,3 +96,16 @@ def test_the_comparison_has_bands_over_the_complete_seeds():
         assert np.all(comparison[f"separation_{name}"].values > 0)
     one = compare_runs(campaign_tree(runs[:1])["one"].to_dataset())
     assert np.isnan(one["area_confidence"].values).all() and np.isfinite(one["area_mean"].values).all()
+
+
+def test_separations_of_a_free_square_are_compared_by_its_mean_gap():
+    study = xr.Dataset(
+        {
+            "reduced_separation": (("surface", "step"), [[2.0, 1.0], [-1.0, -2.0]]),
+            "mean_gap": (("surface", "step"), [[4e-6, 2e-6], [3e-6, 1e-6]]),
+            "rms_height": ("surface", [2e-6, 1e-6]),
+            "boundary": ("surface", ["periodic", "free"]),
+        }
+    )
+    np.testing.assert_allclose(reduced_gap(study), [[2.0, 1.0], [3.0, 1.0]])
+    np.testing.assert_allclose(reduced_gap(study.isel(surface=1)), [3.0, 1.0])

@@ -29,7 +29,7 @@ from icha.figures import (
 )
 from icha.figures.scale import Scale, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
-from icha.figures.spots import periodic_circles
+from icha.figures.spots import circles_in_cell
 from icha.figures.style import BLACK, BLUE, VERMILLION, material_label, number, quantity, save, unit_for
 from icha.model_error import jaccard
 from icha.records import read_dataset, write_surface
@@ -259,7 +259,7 @@ def test_fig4_enlarges_small_spots_more_and_stays_small(tmp_path):
 
 
 def test_circles_continue_across_borders():
-    circles = list(periodic_circles([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0))
+    circles = list(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "periodic"))
     assert sorted((round(x, 9), round(y, 9)) for x, y, _ in circles) == [
         (0.02, -0.03),
         (0.02, 0.97),
@@ -267,6 +267,8 @@ def test_circles_continue_across_borders():
         (1.02, -0.03),
         (1.02, 0.97),
     ]
+    # A free square has no opposite border.
+    assert len(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "free")) == 2
 
 
 def test_fig5_lays_measurements_over_the_curves():

@@ -10,14 +10,15 @@ from matplotlib.patches import Patch, Rectangle
 
 from icha.campaign import find_snapshot, spots_of
 from icha.figures.select import check_topography, pick_run
-from icha.figures.spots import draw_spots, periodic_circles
+from icha.figures.spots import circles_in_cell, draw_spots
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, new_figure, number, panel_label, styled, unit_for
 from icha.model_error import check_same_contact, contact_of_spots, jaccard, state_of
 
 CAPTION = (
     "Contact spots (red circles, true size and position) over the topography of one period: the highest parts are "
-    "yellow. The load is given above the map; circles that cross a border continue at the opposite one. The framed "
-    "part around the largest spot is enlarged. Where there is a boundary-element solution of the same topography, load "
+    "yellow. The load is given above the map; circles that cross a border of a periodic surface continue at the "
+    "opposite one. The framed part around the largest spot is enlarged. Where there is a boundary-element solution of "
+    "the same topography, load "
     "and interaction range, by an independent code, its contact stands beside that of ICHA (b), its edge (black) "
     "beside the enlarged circles (c), and the map (d) shows where both are in contact and where only one of them is; "
     "the overlap is the area in contact in both over that in either. The areas given are corrected by the perimeter of "
@@ -113,7 +114,8 @@ def figure(
 
     cell = side / n
     look = {"origin": "lower", "cmap": "cividis", "vmin": -highest * height, "vmax": highest * height}
-    circles = periodic_circles(spots["spot_x"].values * length, spots["spot_y"].values * length, radius * length, side)
+    x, y = spots["spot_x"].values * length, spots["spot_y"].values * length
+    circles = circles_in_cell(x, y, radius * length, side, str(run["boundary"].values))
     near = circles[np.all(np.abs(circles[:, :2] - (corner + window / 2)) < window / 2 + circles[:, 2:], axis=1)]
 
     fig = new_figure(TWO_COLUMNS, 3.35 if solution is None else 6.9)

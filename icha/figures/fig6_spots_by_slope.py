@@ -9,7 +9,7 @@ from matplotlib.patches import Patch, Wedge
 
 from icha.campaign import find_snapshot, spots_of
 from icha.figures.select import pick, study_runs
-from icha.figures.spots import draw_spots, periodic_circles
+from icha.figures.spots import circles_in_cell, draw_spots
 from icha.figures.style import (
     BLUE,
     GREEN,
@@ -84,11 +84,12 @@ def figure(
             period = float(run["period"])
             length, unit = unit_for(period, "m")
             spots = spots_of(run, at)
-            circles = periodic_circles(
+            circles = circles_in_cell(
                 spots["spot_x"].values * length,
                 spots["spot_y"].values * length,
                 spots["spot_radius"].values * length,
                 period * length,
+                str(run["boundary"].values),
             )
             if kind == "relative_load":
                 draw_spots(ax, circles, zorder=2 + order, facecolor=colour[slope], edgecolor="black", lw=0.25)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.campaign import LABELS, RAGGED, RunLabels, find_snapshot, loading_stops, run_labels, select_run
+from icha.campaign import LABELS, RAGGED, RunLabels, find_snapshot, loading_stops, reduced_gap, run_labels, select_run
 from icha.figures.style import number
 from icha.records import COMPLETE
 
@@ -39,7 +39,8 @@ def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> lis
             {f"/{study}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])}
         )
     found = (RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True))) for index in complete.tolist())
-    return [(labels, select_run(campaign, labels)) for labels in found]
+    runs = [(labels, select_run(campaign, labels)) for labels in found]
+    return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
 
 
 def pick(labels: str, wanted, there: list):

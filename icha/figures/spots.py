@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 
 
-def periodic_circles(x, y, radius, period: float) -> np.ndarray:
-    """Centre and radius, (m, 3), of every circle and of its images that reach into the cell [0, L)²."""
-    shifts = np.array([(dx, dy) for dx in (-period, 0.0, period) for dy in (-period, 0.0, period)])
+def circles_in_cell(x, y, radius, period: float, boundary: str) -> np.ndarray:
+    """Centre and radius, (m, 3), of every circle and, on a periodic surface, of its images that reach into [0, L)²."""
+    steps = (-period, 0.0, period) if boundary == "periodic" else (0.0,)
+    shifts = np.array([(dx, dy) for dx in steps for dy in steps])
     centres = np.column_stack([x, y])[:, None, :] + shifts
     circles = np.concatenate([centres, np.broadcast_to(np.asarray(radius)[:, None, None], (*centres.shape[:2], 1))], -1)
     reach = circles[..., 2:]

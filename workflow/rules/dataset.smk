@@ -38,7 +38,7 @@ rule campaign_dataset:
         "../envs/icha.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=1000,
         runtime=30,
     params:
         labels=LABELS,
