@@ -568,7 +568,8 @@ def _provenance(studies, surfaces, figures, model_error, files, dataset):
 
     begin = {"configuration": Node("Configuration", "as used", files.get("Configuration"))}
     if sources := _sources(surfaces):
-        begin["measured"] = Node("Measurements", counted(len(sources), "file", "files"), "#surfaces")
+        count = len({source["source_sha256"] for source in sources})
+        begin["measured"] = Node("Measurements", counted(count, "file", "files"), "#surfaces")
     middle = {
         study["name"]: Node(
             _short(study["name"]),

@@ -525,6 +525,16 @@ def test_fig10_shows_means_and_scatter_of_the_errors_in_per_cent():
     assert adhesive.get_markerfacecolor() != "white" and bare.get_markerfacecolor() == "white"
 
 
+@pytest.mark.parametrize("module", COMPARED)
+def test_errors_of_runs_that_all_failed_are_nothing_to_draw(module):
+    errors = compared.errors()
+    empty = {f"/{name}": node.to_dataset() * np.nan for name, node in errors.children.items()}
+    for name, node in errors.children.items():
+        empty[f"/{name}"].attrs = node.attrs
+    with pytest.raises(NothingToDraw, match="study one: no run beside boundary elements is complete"):
+        module.figure(xr.DataTree.from_dict(empty), study="one")
+
+
 def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
     def many(node):
         names = [f"s{k}" for k in range(9)]

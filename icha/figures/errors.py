@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from icha.ensemble import ensemble
 from icha.figures.curves import PRESSURE_LABEL, bars_handle
 from icha.figures.scale import MOST_COLOURS, places_scale
-from icha.figures.select import study_errors
+from icha.figures.select import NothingToDraw, study_errors
 from icha.figures.style import (
     COLOURS,
     DASHES,
@@ -54,6 +54,8 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
 
     Raises
     ------
+    NothingToDraw
+        If no run of the study that was compared is complete.
     ValueError
         If the model error has nothing of the study.
     """
@@ -61,6 +63,8 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
     if not entries:
         there = sorted({str(node.attrs["study"]) for node in model_error.children.values()})
         raise ValueError(f"no boundary elements beside study {study!r}; there are some for {', '.join(there)}")
+    if not any(np.isfinite(errors[each.name].values).any() for errors in entries.values() for each in quantities):
+        raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
     places = [
         (entry, surface, slope, material)
         for entry, errors in entries.items()
