@@ -85,7 +85,8 @@ def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project
 
 
 def test_it_goes_on_after_it_was_stopped(project):
-    program, how = command(project, "runs", "--", "--forceall")
+    # So many that it is still at it when it is stopped.
+    program, how = command(project, "runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..60}}")
     process = subprocess.Popen(program, stderr=subprocess.STDOUT, start_new_session=True, **how)
     said = process.stdout.readline()
     assert said.startswith("["), said

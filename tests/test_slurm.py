@@ -146,7 +146,7 @@ def test_batches_ask_for_the_cores_and_the_memory_of_what_runs_side_by_side(call
     for record in batches:
         # Six runs on four cores are a layer of four and one of two: four times a run's memory, twice its time.
         assert record["ProcCnt"] == "4"
-        assert "mem=2400M" in record["Tres"] and record["TimeLimit"] == "480"
+        assert "mem=2400M" in record["Tres"] and record["TimeLimit"] == "60"
     (surfaces,) = [record for record in call.records if call.comments[record["JobId"]] == "rule_surfaces_surface"]
     assert surfaces["ProcCnt"] == "2" and "mem=1200M" in surfaces["Tres"] and surfaces["TimeLimit"] == "30"
 
