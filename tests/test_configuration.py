@@ -482,6 +482,11 @@ BAD = {
         {"hurst": [0.5, 1.5]},
         "studies.one.vary.hurst[1]: 1.5 is out of range; allowed: a number in (0, 1]",
     ),
+    "varied value twice": (
+        "studies.one.vary",
+        {"hurst": [0.6, 0.6]},
+        "studies.one.vary.hurst: [0.6, 0.6] 0.6 is given",
+    ),
     "varied value without its unit": (
         "studies.one.vary",
         {"surface_energy": [5]},
@@ -910,6 +915,12 @@ def test_few_cells_are_a_warning(load):
     (warning,) = warnings(load({"surfaces.rough.grid": 30}).campaign)
     assert "surfaces.rough.grid: 30 gives 3 grid cells" in warning
     assert warnings(load({"surfaces.rough.grid": 20}).campaign)
+
+
+def test_slopes_that_no_surface_has_are_a_warning(load):
+    changes = {"surfaces.rough": _measured_surface(height_unit="um"), "studies.one.rms_slopes": "measured"}
+    (warning,) = warnings(load(changes).campaign)
+    assert "surfaces.rough: the topography has an rms slope of 145" in warning and "units" in warning
 
 
 def _file_surface(path):

@@ -223,14 +223,25 @@ def _figure_problems(campaign: Campaign, location, figure, study):
         )
 
 
+# Rms slopes beyond this are rather a mistake about units than a surface.
+_STEEP = 3.0
+
+
 def warnings(campaign: Campaign) -> list[str]:
     """What is allowed but not advisable."""
-    pressed = {name for study in campaign.studies.values() for name in study.surfaces}
-    return [
-        f"surfaces.{name}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per shortest "
-        f"wavelength; 4 are the least advisable, 8 recommended"
-        for name, surface in campaign.surfaces.items()
-        if name in pressed
-        and isinstance(surface, SelfAffineSurface)
-        and surface.cells_per_short_wave < 4 * (1 - ROUNDING)
-    ]
+    found = []
+    for name in dict.fromkeys(name for study in campaign.studies.values() for name in study.surfaces):
+        surface, topography = campaign.surfaces[name], campaign.topography(name)
+        origin = campaign.origin("surfaces", name)
+        variant = "" if origin == name else f" (variant {name})"
+        if isinstance(surface, SelfAffineSurface) and surface.cells_per_short_wave < 4 * (1 - ROUNDING):
+            found.append(
+                f"surfaces.{origin}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per "
+                f"shortest wavelength{variant}; 4 are the least advisable, 8 recommended"
+            )
+        if topography is not None and (topography.rms_slope or 0) > _STEEP:
+            found.append(
+                f"surfaces.{origin}: the topography has an rms slope of {topography.rms_slope:g}{variant}; check its "
+                "units of height and length, its size, and whether a number stands for points that are missing"
+            )
+    return found

@@ -88,9 +88,13 @@ def flag(value: Any) -> bool:
 
 def distinct(values):
     """Refuse a list in which an entry stands twice."""
-    for index, value in enumerate(values):
-        if value in values[:index]:
+    # Seeds may be many; of the others, which cannot all be hashed, there are few.
+    quick = all(isinstance(value, str | int | float) for value in values)
+    seen: set | list = set() if quick else []
+    for value in values:
+        if value in seen:
             raise ValueError(f"{value!r} is given twice; allowed: every entry once")
+        seen.add(value) if quick else seen.append(value)
     return values
 
 
@@ -235,6 +239,7 @@ Values = Annotated[
     list[Any],
     BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
     Field(min_length=1),
+    AfterValidator(distinct),
     WithJsonSchema(
         {
             "anyOf": [

@@ -66,7 +66,7 @@ ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": CAMPAIGN.license}
 
 
 wildcard_constraints:
-    name="[a-z0-9_-]+",
+    name="|".join(CAMPAIGN.figures.drawn()) or "none",
     entry="[a-z0-9_-]+",
     asperity="hertz|mu[0-9.]+",
     study="[a-z0-9_-]+",
