@@ -570,8 +570,9 @@ def _provenance(studies, surfaces, figures, model_error, files, dataset):
     if sources := _sources(surfaces):
         count = len({source["source_sha256"] for source in sources})
         begin["measured"] = Node("Measurements", counted(count, "file", "files"), "#surfaces")
+    # A study may have the name of any other box: names of studies hold no blanks.
     middle = {
-        study["name"]: Node(
+        f"study {study['name']}": Node(
             _short(study["name"]),
             counted(study["complete"], "run", "runs") + (f", {study['failed']} failed" if study["failed"] else ""),
             f"#study-{study['name']}",

@@ -301,6 +301,20 @@ def test_figures_stand_with_their_study_and_are_numbered_as_they_come(write, tmp
     assert re.findall(r"<b>Figure (\d)\.</b> Caption of (\w+)", text) == [("1", "both"), ("2", "early"), ("3", "late")]
 
 
+@pytest.mark.parametrize("name", ["measured", "dataset", "surfaces", "report"])
+def test_graph_shows_studies_whatever_they_are_called(write, tmp_path, name):
+    source = {"source_file": "scan.txt", "source_sha256": "ab", "preparation": "none", "surface": "scan"}
+    runs = tuple((labels._replace(study=name), run) for labels, run in small.runs() if labels.study == "single")
+    measured = read_dataset(tmp_path / "s.nc").assign_attrs(source)
+    text = write(campaign=campaign_tree(runs), checks=[], comparison=None, surfaces=[measured])
+    graph = text.partition('<svg class="graph"')[2].partition("</svg>")[0]
+    boxes = re.findall(r'class="name"[^>]*>([^<]*)<', graph)
+    expected = ["Configuration", "Measurements", "Surfaces", name, "Campaign dataset", "Figures", "Checks", "Report"]
+    assert boxes == expected
+    # Every box but the first ones is reached, and every one but the last leads on.
+    assert graph.count('class="arrow"') == 2 + 1 + 1 + 2 + 2
+
+
 def test_surfaces_show_spectra_and_where_measurements_come_from(write, tmp_path):
     text = write()
     plain = read_surface_statistics(tmp_path / "s.nc")
