@@ -444,14 +444,21 @@ def _with_confidence(values, unit=""):
 
 
 def _spread(comparison):
-    """Largest spread of the area between materials and between slopes, at equal reduced pressure and at equal load."""
+    """Largest spread of the area between materials and between slopes, at equal reduced pressure and at equal load.
 
-    def largest(name):
-        values = comparison[name].values
+    None where no two complete runs differ in the material, or slope, alone, or where they share no load.
+    """
+    complete = comparison["status"] == COMPLETE
+
+    def largest(name, label):
+        values = comparison[name].where(complete.sum(label) > 1).values
         return float(np.nanmax(values)) if np.isfinite(values).any() else None
 
-    names = ("material_spread", "slope_spread", "material_spread_at_load", "slope_spread_at_load")
-    return {name: largest(name) for name in names}
+    return {
+        f"{short}_spread{suffix}": largest(f"{short}_spread{suffix}", label)
+        for label, short in (("material", "material"), ("rms_slope", "slope"))
+        for suffix in ("", "_at_load")
+    }
 
 
 def _entries(model_error):

@@ -381,6 +381,25 @@ def test_comparison_of_slopes_without_adhesion_shows_no_spread():
     assert float(comparison["slope_spread_at_load"].min()) > 1
 
 
+def test_differences_are_told_where_there_is_something_to_compare(write):
+    def own_slopes(*materials):
+        runs = [
+            (RunLabels("own", f"patch{slope:g}", 1, slope, material), small.run(1, slope, material))
+            for slope in (1.0, 0.2)
+            for material in materials
+        ]
+        tree = campaign_tree(runs)
+        return write(campaign=tree, checks=[], comparison=compare_campaign(tree))
+
+    both = write()
+    assert "between materials" in both and "between rms slopes" in both
+    # Every surface has a slope of its own: no two runs differ in the slope alone.
+    assert "Largest difference" not in own_slopes("soft")
+    several = own_slopes("soft", "hertz").partition("Largest difference")[2].partition("</p>")[0]
+    assert "between materials" in several and "between rms slopes" not in several
+    assert several.strip().endswith("at equal reduced pressure.")
+
+
 def test_comparison_can_be_kept(tmp_path):
     for name in ("a.nc", "b.nc"):
         write_dataset(compare_campaign(small.tree()), tmp_path / name)
