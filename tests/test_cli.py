@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from icha.cli import app
 from icha.cli.events import Watch, last_line, reason_of
 from icha.cli.live import LiveView, duration
-from icha.cli.plan import CHANGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
+from icha.cli.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, damaged_files, failed_runs, plan, time_on, total
 from icha.cli.show import sparkline
 from icha.configuration.expansion import run_cases, run_sha256
 from icha.configuration.load import load_configuration
@@ -183,6 +183,30 @@ def test_what_is_there_is_told_from_what_is_to_do(project):
     assert told.exit_code == 0
     assert "4 runs, 2 to do" in told.output and "1 run there, but with other settings" in told.output
     assert f"failed: runs/{failed.path}.nc: {reason}" in " ".join(told.output.split())
+
+
+def test_files_that_were_cut_off_are_damaged_and_to_do_again(project):
+    Path("tiny.yaml").write_text(TINY)
+    campaign, results = load_configuration("tiny.yaml").campaign, project / "results/tiny"
+    whole, cut, *_ = (f"runs/{case.path}.nc" for case in run_cases(campaign))
+    sha256 = run_sha256(campaign, run_cases(campaign)[0])
+    empty = ["surfaces/rough/seed2.nc", "references/rough.nc", "dataset/tiny.nc", "aggregated/tiny.nc"]
+    for path in (whole, cut, *empty):
+        (results / path).parent.mkdir(parents=True, exist_ok=True)
+        write_dataset(small.run().assign_attrs(config_sha256=sha256), results / path)
+    assert damaged_files(campaign, results) == []
+    (results / cut).write_bytes((results / cut).read_bytes()[:-100])
+    for path in empty:
+        (results / path).write_bytes(b"")
+    assert set(damaged_files(campaign, results)) == {cut, *empty}
+    states = {item.path: item.state for item in plan(campaign, results)}
+    assert states[whole] == DONE and states[cut] == DAMAGED and states["surfaces/rough/seed2.nc"] == DAMAGED
+    sums = total(item for item in plan(campaign, results) if item.is_run)
+    assert (sums.done, sums.to_do) == (1, 3)
+    told = icha("describe", "tiny.yaml").output
+    for path in (cut, *empty):
+        assert f"damaged: {path}: to do again" in told
+    assert "other settings" not in told
 
 
 def test_jobs_that_were_slow_make_the_rest_expected_slower(project):

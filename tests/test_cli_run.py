@@ -84,6 +84,29 @@ def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project
     assert again.returncode == 0 and "Nothing to do" in again.stdout
 
 
+def test_damaged_files_are_made_again(project):
+    results = project / "results/tiny"
+    paths = [
+        "surfaces/rough/seed1.nc",
+        "runs/load/rough/seed1/slope1/bare.nc",
+        "dataset/tiny.nc",
+        "aggregated/tiny.nc",
+    ]
+    before = {path: (results / path).read_bytes() for path in paths}
+    for path in paths[:2]:
+        (results / path).write_bytes(b"")
+    for path in paths[2:]:
+        (results / path).write_bytes(before[path][:-1000])
+    told = run(project, "--dry-run").stdout
+    assert all(f"damaged, to be made again: results/tiny/{path}\n" in told for path in paths)
+    done = run(project, "dataset")
+    for path in paths:
+        assert f"damaged, made again: results/tiny/{path}\n" in done.stdout
+        assert (results / path).read_bytes() == before[path]
+    # No job fails but the verdict on the run that cannot be completed.
+    assert "1 job failed:\n  Verdict" in done.stdout
+
+
 def test_it_goes_on_after_it_was_stopped(project):
     # So many that it is still at it when it is stopped.
     program, how = command(project, "runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..60}}")

@@ -26,19 +26,20 @@ def describe(
     """
     from rich.console import Console
 
-    from icha.cli.plan import plan
+    from icha.cli.plan import damaged_files, plan
 
     path = configuration_path(config)
     campaign = read_configuration(path).campaign
     home = (folder or find_project() or Path.cwd()).resolve()
-    items = plan(campaign, home / "results" / campaign.name)
+    results = home / "results" / campaign.name
+    items, damaged = plan(campaign, results), damaged_files(campaign, results)
     count = _count(cores)
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(f"[bold]{campaign.name}[/]: {campaign.title}", highlight=False)
     console.print(f"configuration: {shown(path)}\n", highlight=False)
     if runs:
         _list(console, items)
-    _summary(console, items, count)
+    _summary(console, items, damaged, count)
 
 
 def _count(cores: str | None) -> int:
@@ -47,7 +48,7 @@ def _count(cores: str | None) -> int:
     return int(cores) if cores else 2
 
 
-def _summary(console, items, cores) -> None:
+def _summary(console, items, damaged, cores) -> None:
     from rich.table import Table
 
     from icha.cli.live import duration
@@ -91,7 +92,7 @@ def _summary(console, items, cores) -> None:
     runs = [item for item in items if item.is_run]
     changed = sum(item.state == "changed" for item in runs)
     console.print()
-    if not every.to_do:
+    if not every.to_do and not damaged:
         console.print(f"{counted(len(runs), 'run')}; everything is there.", highlight=False)
     else:
         console.print(
@@ -101,6 +102,8 @@ def _summary(console, items, cores) -> None:
             f"dataset.",
             highlight=False,
         )
+    for path in damaged:
+        console.print(f"[red]damaged:[/] {path}: to do again.", highlight=False, soft_wrap=True)
     if changed:
         console.print(f"{counted(changed, 'run')} there, but with other settings: to do again.", highlight=False)
     for item in runs:

@@ -22,7 +22,7 @@ from icha.configuration.expansion import (
 )
 from icha.configuration.model import Campaign, SelfAffineSurface
 
-DONE, TO_DO, CHANGED, FAILED = "done", "to do", "changed", "failed"
+DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
 # From so many nodes on, a side, a job takes two cores, as in the workflow.
 _TWO_CORES = 2048
 # So many of the files that are there are compared with what was expected of them.
@@ -51,14 +51,15 @@ class Item:
     @property
     def to_do(self) -> bool:
         """Whether it is still to be computed; a run that failed is not, it would fail again."""
-        return self.state in (TO_DO, CHANGED)
+        return self.state in (TO_DO, CHANGED, DAMAGED)
 
 
 def plan(campaign: Campaign, results: Path) -> list[Item]:
     """All files of a campaign but those that are made of others at little cost, in the order of the configuration.
 
     A run counts as done if its file is there and was made with the present settings (`config_sha256`); whether the
-    program has changed since is known to Snakemake only. Other files count as done if they are there.
+    program has changed since is known to Snakemake only. Other files count as done if they are there. A file that
+    cannot be opened is damaged, and to be made again.
 
     Parameters
     ----------
@@ -76,7 +77,9 @@ def _items(campaign, results) -> Iterator[Item]:
         return _asperities(campaign, surface, results / "surfaces" / surface)
 
     def there(part, path, cost, threads=1):
-        return Item(part, path, DONE if (results / path).is_file() else TO_DO, cost, threads)
+        file = results / path
+        state = TO_DO if not file.is_file() else DAMAGED if path.endswith(".nc") and is_damaged(file) else DONE
+        return Item(part, path, state, cost, threads)
 
     def threads(surface):
         return 2 if grid(surface) >= _TWO_CORES else 1
@@ -170,7 +173,10 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
     """State of a run's file, and the reason why the run failed, if it did."""
     if not file.is_file():
         return TO_DO, ""
-    attributes = read_attributes(file)
+    try:
+        attributes = read_attributes(file)
+    except DamagedFile:
+        return DAMAGED, ""
     if attributes.get("config_sha256") != sha256:
         return CHANGED, ""
     if reason := attributes.get("incomplete"):
@@ -178,15 +184,59 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
     return DONE, ""
 
 
+class DamagedFile(Exception):
+    """A file that is there but is no netCDF-4 file, or only a part of one."""
+
+
 def read_attributes(file: Path) -> dict[str, str]:
-    """What a run's file says of its settings and of its end, read without its variables; empty if it is unreadable."""
+    """What a file says of the settings and the end of a run, read without its variables.
+
+    Raises
+    ------
+    DamagedFile
+        If its content cannot be read.
+    OSError
+        If the system does not let it be read.
+    """
     import h5py
 
     try:
         with h5py.File(file, "r") as data:
             return {name: _text(data.attrs[name]) for name in ("config_sha256", "incomplete") if name in data.attrs}
-    except OSError:
-        return {}
+    except OSError as error:
+        if error.errno is not None:  # no permission, for one: that says nothing of the content
+            raise
+        raise DamagedFile(file) from None
+
+
+def is_damaged(file: Path) -> bool:
+    """Whether a file that is there cannot be opened as netCDF-4, for it is empty or only a part."""
+    try:
+        read_attributes(file)
+    except DamagedFile:
+        return True
+    return False
+
+
+def damaged_files(campaign: Campaign, results: Path) -> list[str]:
+    """Paths of all netCDF files of a campaign that are there but damaged, also of those that `plan` leaves out."""
+    surfaces = list(surface_cases(campaign))
+    references = (
+        *dict.fromkeys(name for name, _ in surfaces),
+        *(f"boundary_elements/{case.path}" for case in solution_cases(campaign)),
+        *(f"loops/{case.path}" for case in loop_cases(campaign)),
+        *(f"error_sources/{case.path}" for case in source_cases(campaign)),
+        *(f"one_asperity/{name}" for name in asperity_cases(campaign)),
+    )
+    files = (
+        *(f"surfaces/{name}/seed{seed}.nc" for name, seed in surfaces),
+        *(f"runs/{case.path}.nc" for case in run_cases(campaign)),
+        *(f"references/{name}.nc" for name in references),
+        f"dataset/{campaign.name}.nc",
+        f"aggregated/{campaign.name}.nc",
+        "aggregated/model_error.nc",
+    )
+    return [file for file in files if (results / file).is_file() and is_damaged(results / file)]
 
 
 def _text(attribute) -> str:

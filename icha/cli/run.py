@@ -77,6 +77,7 @@ def run(
         # In the place of profiles/default, which would be found by itself.
         *(["--workflow-profile", str(_profile(profile, home))] if profile else []),
     ]
+    _remove_damaged(campaign, folder / "results" / campaign.name, dry_run)
     if dry_run:
         raise typer.Exit(subprocess.run([*command, "--dry-run"], cwd=home).returncode and FAILED)
     from rich.console import Console
@@ -104,6 +105,16 @@ def _profile(asked: str, home: Path) -> Path:
             return path.resolve()
     there = sorted(path.parent.name for path in (home / "profiles").glob("*/config.yaml"))
     raise Mistake(f"--profile {asked}: no folder with a config.yaml; there are: {', '.join(there)}")
+
+
+def _remove_damaged(campaign, results: Path, dry_run: bool) -> None:
+    """Remove files that cannot be opened: what a job has written is whole, and for Snakemake they are up to date."""
+    from icha.cli.plan import damaged_files
+
+    for path in damaged_files(campaign, results):
+        if not dry_run:
+            (results / path).unlink()
+        typer.secho(f"damaged, {'to be ' if dry_run else ''}made again: {shown(results / path)}", fg="yellow")
 
 
 def _log_file(folder: Path, campaign: str) -> Path:
