@@ -32,6 +32,10 @@ _MOST_NODES = 32768
 _ROUNDING = 1e-9
 # Relative difference of the two sides of a square of whole pixels that are not square.
 _SQUARE = 1e-3
+# Heights that differ by less than this part of the largest one, once their trend is removed, are rounding.
+_FLAT = 1e-13
+# Letters of what a library says about a file that it cannot read.
+_LONGEST_REASON = 160
 
 
 class UnfitTopography(ValueError):
@@ -134,13 +138,27 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     if how.touches_first == "low":
         scan = replace(scan, heights=-scan.heights)
     steps.append(f"{how.touches_first} numbers touch first")
-    for step in (_cropped, _detrended, _filled):
-        scan, said = step(scan, how)
+    part, said = _cropped(scan, how)
+    steps += said
+    left = part
+    for step in (_detrended, _filled):
+        left, said = step(left, how)
         steps += said
-    surface, said = _bounded(scan, how)
+    _check_roughness(left, part, how)
+    surface, said = _bounded(left, how)
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     return PreparedTopography(surface, path.name, digest, "; ".join([*steps, *said]))
+
+
+_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: ""}
+
+
+def in_words(metres: float) -> str:
+    """A length with a unit as configurations write it, such as `2.5 um`."""
+    power = 3 * math.floor(math.log10(abs(metres)) / 3 + 1e-9) if metres else 0
+    power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
+    return f"{metres * 10.0**-power:.6g} {_PREFIXES[power]}m"
 
 
 def _existing(path):
@@ -155,17 +173,28 @@ def _existing(path):
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """What a file says in metres: heights (ny, nx), nan where missing, first axis y, and the size (x, y) of it all."""
+    """What a file says in metres: heights (ny, nx), nan where missing, first axis y, and the size (x, y) of it all.
+
+    coordinate_unit: metres, where the size follows from coordinates whose unit the file does not tell.
+    """
 
     heights: np.ndarray
     size: tuple[float, float]
     description: str = ""
+    coordinate_unit: float | None = None
 
     @property
     def pixel(self) -> tuple[float, float]:
         """Distance of neighbouring nodes along x and along y, m."""
         rows, columns = self.heights.shape
         return self.size[0] / columns, self.size[1] / rows
+
+    @property
+    def remark_on_unit(self) -> str:
+        """What is to be added where a length of the scan is at fault."""
+        if self.coordinate_unit is None:
+            return ""
+        return f"; the coordinates are taken to be in units of {in_words(self.coordinate_unit)}, see `lateral_unit`"
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +212,8 @@ class _Found:
 
 def read_scan(path: Path, how: Preparation) -> Scan:
     """Read a file of any of the formats; errors as `prepared_topography`."""
+    if not path.stat().st_size:
+        raise UnfitTopography("path", "is empty; allowed: a file of heights")
     name = _format_of(path) if how.format == "auto" else how.format
     try:
         found = READERS[name](path, how)
@@ -190,6 +221,8 @@ def read_scan(path: Path, how: Preparation) -> Scan:
         raise
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
         reason = " ".join(str(error).replace(str(path), path.name).split()) or type(error).__name__
+        if len(reason) > _LONGEST_REASON:
+            reason = f"{reason[: _LONGEST_REASON - 1]}…"
         raise UnfitTopography(
             "path", f"cannot be read as {name} ({reason}); allowed: a file that is, or another `format`"
         ) from None
@@ -198,19 +231,27 @@ def read_scan(path: Path, how: Preparation) -> Scan:
         raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; allowed: heights")
     if heights.ndim != 2:
         raise UnfitTopography("path", f"holds an array of shape {heights.shape}; allowed: rows and columns of heights")
+    if not heights.size:
+        raise UnfitTopography(
+            "path", f"holds an array of shape {heights.shape}, no heights; allowed: a file of heights"
+        )
     unit = how.height_unit or found.unit
     if unit is None:
         raise UnfitTopography("height_unit", "is missing, and the file does not say it; allowed: such as 'um'")
-    size = how.size or found.size
+    size, coordinate_unit = how.size or found.size, None
     if size is None and found.coordinates is not None:
-        size = tuple(each * (how.lateral_unit or unit) for each in found.coordinates)
+        coordinate_unit = how.lateral_unit or unit
+        size = tuple(each * coordinate_unit for each in found.coordinates)
     if size is None:
         raise UnfitTopography("size", "is missing, and the file does not say it; allowed: a length, such as '90 um'")
-    if not all(np.isfinite(each) and each > 0 for each in size):
-        raise UnfitTopography("size", f"is {size[0]:g} m by {size[1]:g} m in the file; allowed: give it here")
     rows, columns = heights.shape
+    scan = Scan(heights.astype(float) * unit, tuple(size), "", coordinate_unit)
+    if not all(np.isfinite(each) and each > 0 for each in size):
+        raise UnfitTopography(
+            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; allowed: give it here"
+        )
     said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
-    return Scan(heights.astype(float) * unit, tuple(size), said)
+    return replace(scan, description=said)
 
 
 def _format_of(path):
@@ -223,7 +264,7 @@ def _format_of(path):
 
 
 def _columns_of_text(path):
-    """Numbers in the first line that is no comment; None if it does not hold numbers alone."""
+    """Numbers in the first line that is no comment, 0 if there is no such line; None if it holds anything else."""
     with path.open("rb") as file:
         start = file.read(2**24)
     try:
@@ -232,7 +273,7 @@ def _columns_of_text(path):
                 return len([float(word) for word in _words(text)])
     except ValueError:
         return None
-    return None
+    return 0
 
 
 _SEPARATORS = str.maketrans(",;\t", "   ")
@@ -245,7 +286,9 @@ def _words(text):
 def _table(path):
     """The numbers of a text file (rows, columns); blanks, tabs, commas or semicolons between them, # before remarks."""
     with path.open(encoding="utf-8-sig") as file:
-        first = next((text for line in file if (text := line.split("#")[0].strip())), "")
+        first = next((text for line in file if (text := line.split("#")[0].strip())), None)
+        if first is None:
+            raise UnfitTopography("path", "holds no numbers, only remarks and blanks; allowed: a file of heights")
         fields = [field.strip() for field in re.split(r"[;\s]+", first)]
         if len(fields) > 1 and any("," in field.strip(",") for field in fields):
             raise ValueError(f"it is not clear whether the commas of {first[:40]!r} are decimal; write points")
@@ -312,6 +355,8 @@ def _read_fourier(path, how):
     k = _wave_numbers(table[:, :2], how)
     period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
     modes = table[:, 2] + 1j * table[:, 3]
+    if not np.all(np.isfinite(modes)):
+        raise ValueError("some amplitudes are not finite")
     highest = int(np.max(np.abs(k)))
     n = how.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
     if 2 * highest >= n:
@@ -458,8 +503,13 @@ def _read_hdf5(path, how):
 def _read_instrument(path, how):
     """Whatever SurfaceTopography reads. Its arrays have x as first axis."""
     from SurfaceTopography import open_topography
+    from SurfaceTopography.Exceptions import CannotDetectFileFormat
 
-    with open_topography(str(path)) as file:
+    try:
+        opened = open_topography(str(path))
+    except CannotDetectFileFormat:  # its message lists what every reader says
+        raise ValueError("none of the formats that SurfaceTopography knows") from None
+    with opened as file:
         names = [channel.name for channel in file.channels]
         if how.data is None:
             channel = file.default_channel
@@ -506,30 +556,31 @@ def _cropped(scan, how):
         if first_x + nx > columns or first_y + ny > rows:
             raise UnfitTopography(
                 "crop",
-                f"ends at x = {x + side:g} m, y = {y + side:g} m, outside of the scan; allowed: up to "
-                f"x = {scan.size[0]:g} m, y = {scan.size[1]:g} m",
+                f"ends at x = {in_words(x + side)}, y = {in_words(y + side)}, outside of the scan"
+                f"{scan.remark_on_unit}; allowed: up to x = {in_words(scan.size[0])}, y = {in_words(scan.size[1])}",
             )
     if nx < 8 or ny < 8:
         raise UnfitTopography(
-            "crop" if how.crop else "path", f"leaves {nx} x {ny} points; allowed: at least 8 x 8 of them"
+            "crop" if how.crop else "path",
+            f"leaves {nx} x {ny} points{scan.remark_on_unit}; allowed: at least 8 x 8 of them",
         )
     if how.boundary == PERIODIC and (nx, ny) != (columns, rows):
         raise UnfitTopography(
             "boundary",
-            f"is periodic, and the scan of {scan.size[0]:g} m x {scan.size[1]:g} m is not square; allowed: a square "
+            f"needs a square, and the scan is {in_words(scan.size[0])} x {in_words(scan.size[1])}; allowed: a square "
             "one, or another boundary",
         )
     if abs(nx * dx / (ny * dy) - 1) > _SQUARE:
         raise UnfitTopography(
             "crop",
-            f"leaves {nx} x {ny} pixels of {dx:g} m x {dy:g} m, which are no square; allowed: x, y and a side of whole "
-            "pixels both ways",
+            f"leaves {nx} x {ny} pixels of {in_words(dx)} x {in_words(dy)}, which are no square; allowed: x, y and a "
+            "side of whole pixels both ways",
         )
     if nx != ny and how.grid is None:
         raise UnfitTopography(
             "grid",
-            f"is missing, and the pixels of {dx:g} m x {dy:g} m are not square; allowed: the nodes along a side to "
-            f"which {nx} x {ny} points are resampled",
+            f"is missing, and the pixels of {in_words(dx)} x {in_words(dy)} are not square; allowed: the nodes along a "
+            f"side to which {nx} x {ny} points are resampled",
         )
     part = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
     said = [] if part.shape == scan.heights.shape else [f"cut to {nx} x {ny} points from ({first_x}, {first_y})"]
@@ -558,6 +609,13 @@ def _detrended(scan, how):
     return replace(scan, heights=scan.heights - trend), [f"{how.detrend} removed"]
 
 
+def _check_roughness(left, part, how):
+    """Raise unless the heights that are left of a part of the scan are more than the rounding of those that it had."""
+    if np.ptp(left.heights) <= _FLAT * np.nanmax(np.abs(part.heights), where=np.isfinite(part.heights), initial=0.0):
+        without = "" if how.detrend == "none" else " but for the trend that is removed"
+        raise UnfitTopography("path", f"holds heights that are all the same{without}; allowed: a rough surface")
+
+
 def _filled(scan, how):
     """Without missing points."""
     missing = ~np.isfinite(scan.heights)
@@ -567,12 +625,11 @@ def _filled(scan, how):
     if how.missing == "refuse":
         raise UnfitTopography(
             "missing",
-            f"is refuse, and {count} of {missing.size} points have no height; allowed: fill, or a crop without them",
+            f"stops at points without a height, and there are {count} among {missing.size}; allowed: fill, or a crop "
+            "without them",
         )
     if 2 * count > missing.size:
-        raise UnfitTopography(
-            "missing", f"is fill, but {count} of {missing.size} points have no height; allowed: up to half of them"
-        )
+        raise UnfitTopography("missing", f"would make up {count} of {missing.size} points; allowed: up to half of them")
     heights = scan.heights.copy()
     heights[missing] = _harmonic(heights, missing, periodic=how.boundary == PERIODIC)
     return replace(scan, heights=heights), [f"{count} missing points filled"]

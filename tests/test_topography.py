@@ -369,7 +369,7 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
     harmonic = x**2 - y**2 + 2 * x * y  # of the five-point Laplacian, too
     holey = harmonic.copy()
     holey[4:7, 3:6] = np.nan
-    with pytest.raises(UnfitTopography, match=r"9 of 100 points have no height.*allowed: fill") as raised:
+    with pytest.raises(UnfitTopography, match=r"9 among 100; allowed: fill") as raised:
         prepared(holey, boundary="free")
     assert raised.value.key == "missing"
     result = prepared(holey, boundary="free", missing="fill")
@@ -420,7 +420,7 @@ def test_periodic_scans_are_taken_as_they_are(prepared):
     taken = prepared(surface.heights, boundary="periodic", size=(1.0, 1.0))
     np.testing.assert_allclose(taken.surface.heights, surface.heights, atol=1e-16)
     assert taken.rms_slope == pytest.approx(1.0, rel=1e-12)
-    with pytest.raises(UnfitTopography, match="not square") as raised:
+    with pytest.raises(UnfitTopography, match="needs a square") as raised:
         prepared(surface.heights[:20], boundary="periodic", size=(1.0, 0.625))
     assert raised.value.key == "boundary"
 
@@ -459,9 +459,89 @@ def test_pixels_that_are_not_square_need_a_grid(prepared):
         prepared(heights, boundary="free", size=(10.0, 7.3), grid=16)
 
 
-def test_a_flat_file_is_refused(prepared):
-    with pytest.raises(UnfitTopography, match="all the same"):
-        prepared(np.ones((10, 10)), boundary="free")
+@pytest.mark.parametrize("boundary", ["free", "mirror", "window"])
+@pytest.mark.parametrize(("detrend", "degree"), [("none", 0), ("tilt", 0), ("tilt", 1), ("curvature", 2)])
+def test_a_flat_file_is_refused(prepared, boundary, detrend, degree):
+    """Also where rounding is all that is left when the trend is removed: it would be scaled to any slope."""
+    y, x = np.mgrid[:12, :12]
+    with pytest.raises(UnfitTopography, match="all the same") as raised:
+        prepared(0.1 + degree * 0.3 * x - (degree == 2) * 0.07 * y**2, boundary=boundary, detrend=detrend, taper=0.1)
+    assert raised.value.key == "path"
+
+
+def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
+    """Nanometres on an offset of a metre."""
+    rough = 1e-9 * np.random.default_rng(2).normal(size=(12, 12))
+    surface = prepared(1.0 + rough, boundary="free").surface
+    np.testing.assert_allclose(surface.heights, centred(rough), atol=3e-16)
+
+
+@pytest.mark.parametrize(
+    ("heights", "key", "words"),
+    [
+        (np.empty((0, 0)), "path", "no heights"),
+        (np.empty((0, 12)), "path", "no heights"),
+        (np.empty((12, 0)), "path", "no heights"),
+        (np.ones((1, 1)), "path", "leaves 1 x 1 points"),
+        (np.arange(12.0)[None], "path", "leaves 12 x 1 points"),
+        (np.arange(12.0)[:, None], "path", "leaves 1 x 12 points"),
+        (np.full((12, 12), np.nan), "path", "no height at all"),
+        (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "would make up 132 of 144"),
+        (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 among 144"),
+    ],
+)
+@pytest.mark.parametrize("detrend", ["none", "tilt"])
+def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
+    missing = "fill" if "make up" in words else "refuse"
+    with pytest.raises(UnfitTopography, match=words) as raised:
+        prepared(heights, boundary="free", detrend=detrend, missing=missing, size=(6.0, 6.0))
+    assert raised.value.key == key
+
+
+@pytest.mark.parametrize("name", ["scan.txt", "scan.xyz", "scan.npy", "scan.nc", "scan.h5", "scan.dat"])
+def test_an_empty_file_is_refused(tmp_path, name):
+    (tmp_path / name).touch()
+    with pytest.raises(UnfitTopography, match="is empty") as raised:
+        scan(tmp_path / name, height_unit=NM, size=SIZE)
+    assert raised.value.key == "path"
+
+
+@pytest.mark.parametrize("kind", ["auto", "matrix", "xyz", "fourier"])
+def test_a_heading_alone_is_refused(tmp_path, kind):
+    (tmp_path / "scan.txt").write_text("# width 90 um\n\n  # heights\n")
+    with pytest.raises(UnfitTopography, match="holds no numbers") as raised:
+        scan(tmp_path / "scan.txt", format=kind, height_unit=NM, size=SIZE)
+    assert raised.value.key == "path"
+
+
+def test_messages_are_short_and_in_units_of_people(tmp_path, prepared):
+    (tmp_path / "words.txt").write_text("no heights in here\n")
+    with pytest.raises(UnfitTopography, match="none of the formats that SurfaceTopography knows") as raised:
+        scan(tmp_path / "words.txt", height_unit=NM, size=SIZE)
+    assert len(str(raised.value)) < 200
+    crop = {"x": "7 um", "y": "0 um", "side": "2.5 um"}
+    section = MeasuredSurface.model_validate(SECTION | {"crop": crop})
+    assert repr(section.crop) == "a square of 2.5 um at x = 7 um, y = 0 m"
+    with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* up to x = 4 um, y = 3 um"):
+        prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=section.preparation["crop"])
+    with pytest.raises(UnfitTopography, match=r"needs a square, and the scan is 4 um x 3 um"):
+        prepared(np.eye(12, 16), size=(4e-6, 3e-6), boundary="periodic")
+
+
+def test_where_coordinates_tell_the_size_their_unit_is_doubted(tmp_path):
+    """Coordinates in micrometres, taken for nanometres as the heights are."""
+    path = write_xyz(tmp_path / "scan.xyz")
+    crop = {"x": 0.0, "y": 0.0, "side": 2000 * UM}
+    with pytest.raises(UnfitTopography, match="units of 1 nm, see `lateral_unit`") as raised:
+        prepared_topography(path, preparation(height_unit=NM, crop=crop))
+    assert raised.value.key == "crop"
+    assert (
+        prepared_topography(path, preparation(height_unit=NM, lateral_unit=UM, crop=crop)).surface.period == 4000 * UM
+    )
+    # Not where the size was given.
+    with pytest.raises(UnfitTopography) as raised:
+        prepared_topography(path, preparation(height_unit=NM, size=SIZE, crop=crop))
+    assert "lateral_unit" not in str(raised.value)
 
 
 def test_provenance_and_facts(prepared, tmp_path):

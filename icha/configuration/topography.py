@@ -67,6 +67,12 @@ class Crop(Section):
     y: Position = Field(description="Distance of its first row from that of the scan.")
     side: Length = Field(description="Its side.")
 
+    def __repr__(self):
+        """How messages call it."""
+        from icha.topography import in_words  # slow to import
+
+        return f"a square of {in_words(self.side)} at x = {in_words(self.x)}, y = {in_words(self.y)}"
+
 
 class MeasuredSurface(Section):
     """A measured topography, prepared as the keys say. The mean height is always removed."""
