@@ -1,5 +1,6 @@
 """`icha run` for real, on a very small campaign: what fails, what is stopped, and what is said of it."""
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -8,6 +9,8 @@ import time
 
 import pytest
 from conftest import REPOSITORY, copy_project
+
+from icha.cli.run import _last_words
 
 CAMPAIGN = """
 name: tiny
@@ -126,6 +129,37 @@ def test_it_goes_on_after_it_was_stopped(project):
     assert not left
     done = run(project, "runs")
     assert done.returncode == 0, done.stdout
+
+
+def test_a_campaign_that_another_process_runs_is_refused_with_the_reason(project):
+    lock = project / ".snakemake/tiny.lock"
+    lock.parent.mkdir(exist_ok=True)
+    with lock.open("w") as file:
+        file.write("4242\n")
+        file.flush()
+        fcntl.flock(file, fcntl.LOCK_EX)
+        refused = run(project, "dataset", "--", "--forceall")
+    assert refused.returncode == 1
+    assert "Snakemake could not start:\n    Process 4242 is running this campaign" in refused.stdout
+    for wrong in ("for want of", "jobs done", "dataset:", "Job stats"):
+        assert wrong not in refused.stdout, refused.stdout
+
+
+@pytest.mark.parametrize("target", ["nosuchtarget", "results/tiny/runs/load/rough/seed9/slope1/bare.nc"])
+def test_targets_that_there_are_not_are_mistakes(project, target):
+    refused = run(project, target, *(["--dry-run"] if target == "nosuchtarget" else []))
+    assert refused.returncode == 2
+    assert refused.stdout.startswith(f"Error: {target}: no target, and no file that campaign tiny makes; allowed: all,")
+    assert len(refused.stdout.splitlines()) == 1
+
+
+def test_the_last_words_of_snakemake_are_its_reason_without_traceback():
+    said = "Host: here\nBuilding DAG of jobs...\nJob stats:\nall  1\ntotal  10\n\nReason 1\n"
+    assert _last_words(said) == ["Reason 1"]
+    trace = (
+        'Traceback (most recent call last):\n\n  File "a.py", line 3, in f\n    open(x)\n\nPermissionError: results\n'
+    )
+    assert _last_words(said + trace) == ["Reason 1", "PermissionError: results"]
 
 
 def test_wrong_options_of_snakemake_are_its_own_words(project):

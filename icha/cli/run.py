@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -79,7 +80,8 @@ def run(
     ]
     _remove_damaged(campaign, folder / "results" / campaign.name, dry_run)
     if dry_run:
-        raise typer.Exit(subprocess.run([*command, "--dry-run"], cwd=home).returncode and FAILED)
+        _rehearse([*command, "--dry-run"], home, campaign, asked)
+        return
     from rich.console import Console
 
     from icha.cli.events import Watch
@@ -94,6 +96,12 @@ def run(
         view = LiveView(watch, campaign.name, folder, console)
     log = _log_file(folder, campaign.name)
     status, stopped = _follow([*command, "--logger", "icha"], home, log, watch, view)
+    if status and watch.started is None and not stopped:
+        try:
+            _refuse_unknown(log.read_text(encoding="utf-8", errors="replace"), asked, campaign)
+        except Mistake:
+            log.unlink(missing_ok=True)
+            raise
     _tell(status, stopped, watch, campaign, folder, log)
     if status:
         raise typer.Exit(FAILED)
@@ -115,6 +123,41 @@ def _remove_damaged(campaign, results: Path, dry_run: bool) -> None:
         if not dry_run:
             (results / path).unlink()
         typer.secho(f"damaged, {'to be ' if dry_run else ''}made again: {shown(results / path)}", fg="yellow")
+
+
+def _rehearse(command: list[str], home: Path, campaign, asked: list[str]) -> None:
+    """Let Snakemake say what it would do, or why it cannot."""
+    done = subprocess.run(command, cwd=home, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode == 0:
+        print(done.stdout, end="")
+        return
+    _refuse_unknown(done.stdout, asked, campaign)
+    _heading("Snakemake could not start:")
+    _reason(None, _last_words(done.stdout))
+    raise typer.Exit(FAILED)
+
+
+def _refuse_unknown(said: str, asked: list[str], campaign) -> None:
+    """Raise `Mistake` if Snakemake has ended because a target that was asked for is none."""
+    unknown = re.findall(r"^No rule to produce (.+) \(if you use", said, re.MULTILINE)
+    if "\nInputFunctionException" in said:  # a file of a rule, but of no case of the campaign
+        unknown = [name for name in asked if name not in TARGETS and not name.startswith("-")]
+    if any(name in asked for name in unknown):
+        raise Mistake(
+            f"{', '.join(unknown)}: no target, and no file that campaign {campaign.name} makes; allowed: "
+            f"{', '.join(TARGETS)}, or a file of its own under results/{campaign.name}/"
+        )
+
+
+def _last_words(said: str) -> list[str]:
+    """Why Snakemake has ended without a failed job: the last lines that it said after its plan, and no traceback."""
+    lines = [line for line in said.splitlines() if line.strip()]
+    plan = [number for number, line in enumerate(lines) if re.match(r"Building DAG of jobs|total +\d+$", line)]
+    lines = lines[plan[-1] + 1 :] if plan else lines
+    calls = [number for number, line in enumerate(lines) if line.startswith("Traceback")]
+    if calls:
+        lines = lines[: calls[0]] + [line for line in lines[calls[0] + 1 :] if not line.startswith(" ")]
+    return lines[-_MOST_LINES:]
 
 
 def _log_file(folder: Path, campaign: str) -> Path:
@@ -196,7 +239,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
         log.unlink(missing_ok=True)  # Snakemake's own has all of it
     if status == 0 and watch.started is None:
         print("Nothing to do: everything that was asked for is there and up to date.")
-    elif watch.started is not None:
+    elif ended:
         took = duration(watch.clock() - watch.started)
         print(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}")
     incomplete = failed_runs(campaign, results) if status else {}
@@ -220,17 +263,18 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
     kept_back = watch.job_count - ended
     if stopped or status < 0:
         _heading("Stopped before the end. The same command goes on from here.")
-    elif status and watch.started is None:
-        _heading("Snakemake could not start:")
-        for line in log.read_text(encoding="utf-8", errors="replace").splitlines()[-_MOST_LINES:]:
-            typer.echo(f"    {line}")
+    elif status and not watch.failed:
+        _heading("Snakemake could not go on:" if ended else "Snakemake could not start:")
+        _reason(None, _last_words(log.read_text(encoding="utf-8", errors="replace")))
     elif status and kept_back:
         typer.echo(f"{counted(kept_back, 'job')} not done, for want of what failed")
-    for what, path in (
+    # Where nothing was made, what is there is of another day.
+    made = (
         ("figures", results / "figures"),
         ("dataset", results / "dataset" / f"{campaign.name}.nc"),
         ("report", results / "report.html"),
-    ):
+    )
+    for what, path in made if ended or not status else ():
         if path.exists():
             print(f"{what + ':':<9}{shown(path)}")
     if status:
@@ -241,8 +285,9 @@ def _heading(text: str) -> None:
     typer.secho(text, fg="red")
 
 
-def _reason(name: str, lines: list[str]) -> None:
-    typer.secho(f"  {name}", bold=True)
+def _reason(name: str | None, lines: list[str]) -> None:
+    if name is not None:
+        typer.secho(f"  {name}", bold=True)
     for line in lines[:_MOST_LINES]:
         typer.echo(f"    {line}")
     if len(lines) > _MOST_LINES:
