@@ -15,10 +15,10 @@ from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, new_figure, number
 from icha.model_error import check_same_contact, contact_of_spots, jaccard, state_of
 
 CAPTION = (
-    "Contact spots (red circles, true size and position) over the topography of one period: the highest parts are "
-    "yellow. The load is given above the map; circles that cross a border of a periodic surface continue at the "
-    "opposite one. The framed part around the largest spot is enlarged. Where there is a boundary-element solution of "
-    "the same topography, load "
+    "Contact spots (red circles, true size and position) over the topography, of which the highest parts are "
+    "yellow: one period of a periodic surface, where circles that cross a border continue at the opposite one, or the "
+    "whole of a free square, where they end beyond its edges. The load is given above the map. The framed part around "
+    "the largest spot is enlarged. Where there is a boundary-element solution of the same topography, load "
     "and interaction range, by an independent code, its contact stands beside that of ICHA (b), its edge (black) "
     "beside the enlarged circles (c), and the map (d) shows where both are in contact and where only one of them is; "
     "the overlap is the area in contact in both over that in either. The areas given are corrected by the perimeter of "
