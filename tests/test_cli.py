@@ -125,6 +125,16 @@ def test_mistakes_are_messages_and_status_2(project, arguments, message):
     assert not Path("run.nc").exists() and not Path("results").exists()
 
 
+def test_what_the_system_refuses_is_a_message_and_status_1(project):
+    write_surface("surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    refused = icha("show", "surface.nc", "--plot", "/proc/none/p.png")
+    assert refused.exit_code == 1 and "Error: /proc/none: No such file or directory" in refused.output
+    shutil.rmtree("config/campaigns")
+    Path("config/campaigns").write_text("a file where a folder is wanted")
+    refused = icha("new", "mine")
+    assert refused.exit_code == 1 and "config/campaigns: " in refused.output
+
+
 def test_a_wrong_configuration_says_all_that_is_wrong(project):
     text = Path("config/campaigns/smoke.yaml").read_text().replace("25 MPa", "25", 1).replace("grid: 64", "grid: 6")
     Path("wrong.yaml").write_text(text)
