@@ -263,6 +263,12 @@ def test_one_run_without_the_workflow(tmp_path, monkeypatch):
     flawed = icha("check", "run.nc", "sticky.nc")
     assert flawed.exit_code == 1 and "sticky.nc: run dataset, 1 flaw" in flawed.output
     assert "the run failed: the path ends" in flawed.output
+    # Every file is checked, whatever the others are.
+    Path("bad.npy").write_bytes(b"")
+    mixed = icha("check", "bad.npy", "none.nc", "sticky.nc", "run.nc")
+    assert mixed.exit_code == 2
+    for told in ("bad.npy: not a readable", "none.nc: no such file", "sticky.nc: run", "run.nc: run dataset, all is"):
+        assert told in mixed.output
 
 
 def test_surfaces_and_campaigns_are_shown(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, Mistake, counted
+from icha.cli.project import FAILED, WRONG, counted
 
 
 def check(
@@ -15,31 +15,34 @@ def check(
 ) -> None:
     """Check files: names, dimensions, units and attributes that are documented, and what every result must satisfy.
 
-    Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is none of those.
+    Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is none of those. All files are
+    checked in any case.
     """
     from icha.format import CAMPAIGN, RUN, UnknownFile, flaws, kind_of
 
-    flawed = 0
+    status = 0
     for file in files:
         try:
             kind, data = kind_of(file)
         except UnknownFile as error:
-            raise Mistake(str(error)) from None
+            typer.secho(f"Error: {error}", err=True, fg="red")
+            status = WRONG
+            continue
         found = flaws(kind, data)
         tested = 0
         if not found and kind in (RUN, CAMPAIGN):
             findings, tested = _physics(kind, data)
             found += findings
-        flawed += bool(found)
         if found:
+            status = max(status, FAILED)
             typer.secho(f"{file}: {kind}, {counted(len(found), 'flaw')}", fg="red")
             for flaw in found:
                 typer.echo(f"    {flaw}")
         else:
             numbers = f" ({counted(tested, 'check')} of its numbers)" if tested else ""
             typer.echo(f"{file}: {kind}, all is well{numbers}")
-    if flawed:
-        raise typer.Exit(FAILED)
+    if status:
+        raise typer.Exit(status)
 
 
 def _physics(kind, data):
