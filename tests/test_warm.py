@@ -13,31 +13,28 @@ import pytest
 WORKFLOW = Path(__file__).parents[1] / "workflow"
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="jobs are forked on Linux only")
 
-# Like a script of a job as Snakemake starts it: what it is told stands in a name of its main module.
-SCRIPT = f"""
-import sys
-sys.path.append({str(WORKFLOW / "scripts")!r})
-snakemake = "what the job is told"
-import job
-"""
+# As Snakemake starts it, with what the job is told at its top.
+SCRIPT = "import sys\nsnakemake = 'what the job is told'\n"
 
 
 @pytest.fixture
 def starter(tmp_path):
     """Start a script under a warm process that has imported `fractions`; end that process as its starter does."""
     code = f"import sys, os, json; sys.path.insert(0, {str(WORKFLOW)!r}); import warm; warm.start(['fractions']); "
-    code += "print(json.dumps([os.environ['ICHA_WARM_JOBS'], warm._started[0].pid]), flush=True); sys.stdin.read()"
+    code += "told = [os.environ['ICHA_WARM_JOBS'], os.environ['PYTHONPATH'], warm._started[0].pid]; "
+    code += "print(json.dumps(told), flush=True); sys.stdin.read()"
     process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    address, server = json.loads(process.stdout.readline())
+    address, path, server = json.loads(process.stdout.readline())
     jobs = []
 
     def start(body, threads="1", **environment):
-        script = tmp_path / f"job{len(jobs)}.py"
+        script = tmp_path / f".snakemake/scripts/job{len(jobs)}.py"
+        script.parent.mkdir(parents=True, exist_ok=True)
         script.write_text(SCRIPT + body)
-        environment |= {"ICHA_WARM_JOBS": address, "OMP_NUM_THREADS": threads}
+        environment |= {"ICHA_WARM_JOBS": address, "PYTHONPATH": path, "OMP_NUM_THREADS": threads}
         jobs.append(
             subprocess.Popen(
-                [sys.executable, str(script), "argument"],
+                [sys.executable, str(script)],
                 cwd=tmp_path,
                 env=os.environ | environment,
                 stdout=subprocess.PIPE,
@@ -75,7 +72,7 @@ def wait_until(condition):
 
 TELL = """
 import os
-print("fractions" in sys.modules, sys.argv[1:], os.getcwd(), os.environ.get("COLOUR"), snakemake)
+print("fractions" in sys.modules, len(sys.argv), os.getcwd(), os.environ.get("COLOUR"), snakemake)
 print(os.getpid(), file=sys.stderr)
 """
 
@@ -83,7 +80,7 @@ print(os.getpid(), file=sys.stderr)
 def test_a_job_runs_in_a_fork_as_if_it_ran_by_itself(starter, tmp_path):
     job = starter(TELL, COLOUR="red")
     out, error = job.communicate(timeout=60)
-    assert out.split("\n")[0] == f"True ['argument'] {tmp_path} red what the job is told"
+    assert out.split("\n")[0] == f"True 1 {tmp_path} red what the job is told"
     assert int(error) != job.pid
     assert job.returncode == 0
 
@@ -131,3 +128,13 @@ def test_the_process_ends_with_the_one_that_started_it_and_leaves_nothing(starte
     starter.process.kill()
     wait_until(lambda: not alive(starter.server))
     wait_until(lambda: not starter.folder.exists())
+
+
+def test_an_environments_own_sitecustomize_is_still_imported(tmp_path):
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own/sitecustomize.py").write_text("import sys; sys.own = True\n")
+    early = str(WORKFLOW / "early")
+    code = "import sys; print(sys.own, 'early' in ''.join(sys.path))"
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([early, str(tmp_path / "own")])}
+    found = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert (found.stdout, found.stderr) == ("True False\n", "")

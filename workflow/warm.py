@@ -1,9 +1,9 @@
 """One process that has imported everything, and forks for each job of a call of Snakemake.
 
 A job's script needs some seconds to import NumPy, SciPy, xarray and the package, often longer than its work. So the
-call starts a process that has done so; the script of a job hands itself over to it (`hand_over`), and a fork of it
-runs the script, with the job's own output, working directory and environment. A script that finds no such process,
-on a cluster for one, runs by itself. The process ends with the one that started it.
+call starts a process that has done so; Python hands the script of a job over to it before it imports anything
+(`workflow/early`), and a fork of it runs the script, with the job's own output, working directory and environment. A
+script that finds no such process, on a cluster for one, runs by itself. The process ends with the one that started it.
 
     python warm.py SOCKET MODULE…        (standard input: a pipe that closes when the starter ends)
 """
@@ -23,6 +23,7 @@ import tempfile
 from pathlib import Path
 
 ADDRESS = "ICHA_WARM_JOBS"
+EARLY = Path(__file__).with_name("early")
 _started = []
 
 
@@ -52,25 +53,7 @@ def start(modules: list[str]) -> None:
     # Kept open until this process ends, however it does; jobs do not inherit it.
     _started.append(process)
     os.environ[ADDRESS] = address
-
-
-def hand_over(script: str) -> None:
-    """Let the warm process run `script` and end this one with its exit status; return where there is none."""
-    address = os.environ.get(ADDRESS)
-    if not address or os.environ.get("OMP_NUM_THREADS") != "1":
-        return
-    connection = socket.socket(socket.AF_UNIX)
-    try:
-        connection.connect(address)
-    except OSError:
-        return
-    request = {"script": script, "arguments": sys.argv, "folder": os.getcwd(), "environment": dict(os.environ)}
-    streams = array.array("i", [1, 2])
-    connection.sendmsg([b"+"], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, streams)])
-    connection.sendall(json.dumps(request).encode() + b"\n")
-    answer = connection.makefile().readline()
-    # No answer: the fork, or the whole process, was killed. `_exit`: nothing here is worth cleaning up.
-    os._exit(int(answer) if answer.strip() else 1)
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(EARLY), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
 def serve(listener: socket.socket, folder: str, modules: list[str]) -> None:

@@ -1,8 +1,4 @@
-"""What the scripts of all jobs share: who runs them, where they write what they have to say, and how they fail.
-
-Imported before anything else, for a script that is handed over to the warm process (`workflow/warm.py`) must not spend
-seconds on imports of its own.
-"""
+"""What the scripts of all jobs share: where they write what they have to say, and how they fail."""
 
 import json
 import os
@@ -11,13 +7,6 @@ import sys
 import traceback
 from contextlib import contextmanager
 from pathlib import Path
-
-sys.path.append(str(Path(__file__).resolve().parents[1]))
-
-from warm import hand_over
-
-if hasattr(sys.modules["__main__"], "snakemake"):
-    hand_over(sys.argv[0])
 
 
 def _failures_of_solvers():
