@@ -108,6 +108,8 @@ def test_a_measured_file_is_asked_what_it_knows(project):
         (["simulate", "run.nc", "--modulus", "25"], "'25': the unit is missing; allowed: such as '25 MPa'"),
         (["simulate", "run.nc", "--period", "1 kg"], "is not a unit of length"),
         (["simulate", "run.nc", "--hurst", "2"], "hurst: 2.0 must lie in (0, 1]"),
+        (["simulate", "run.nc", "--grid", "32", "--rolloff", "20 um"], "--short 25 um, which is 8 grid cells if left"),
+        (["simulate", "run.nc", "--short", "30 um", "--rolloff", "20 um"], "give a smaller --short or a longer --roll"),
         (["simulate", "run.nc", "--pressures", "a,b"], "'a,b' is no list of numbers"),
         (["simulate", "run.nc", "--pressures", "0.1,0.01"], "strictly increasing"),
         (["simulate", "run.nc", "--pressures", "0.1", "--areas", "0.1"], "exactly one must be given"),
@@ -269,6 +271,13 @@ def test_one_run_without_the_workflow(tmp_path, monkeypatch):
     assert mixed.exit_code == 2
     for told in ("bad.npy: not a readable", "none.nc: no such file", "sticky.nc: run", "run.nc: run dataset, all is"):
         assert told in mixed.output
+
+
+@pytest.mark.parametrize("options", [["--grid", "32"], ["--grid", "16"], ["--grid", "32", "--period", "1 mm"]])
+def test_the_left_out_options_of_a_single_run_fit_each_other(tmp_path, monkeypatch, options):
+    monkeypatch.chdir(tmp_path)
+    made = icha("simulate", "run.nc", *options, "--energy", "0 J/m^2", "--pressures", "1e-3")
+    assert made.exit_code == 0 and "1 step" in made.output
 
 
 def test_surfaces_and_campaigns_are_shown(tmp_path, monkeypatch):

@@ -52,7 +52,10 @@ def simulate(
         ),
     ] = None,
     period: Annotated[str, typer.Option(help="Side of the periodic cell.", callback=_length)] = "100 um",
-    rolloff: Annotated[str, typer.Option(help="Roll-off wavelength.", callback=_length)] = "20 um",
+    rolloff: Annotated[
+        str | None,
+        _unset("Roll-off wavelength. Left out: a fifth of the period, at least twice the short one.", _length),
+    ] = None,
     short: Annotated[str | None, _unset("Short cut-off wavelength. Left out: 8 grid cells.", _length)] = None,
     hurst: Annotated[float, typer.Option(help="Hurst exponent.")] = 0.8,
     grid: Annotated[int, typer.Option(help="Grid points along a side.")] = 128,
@@ -110,7 +113,8 @@ def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope):
 
     if file is None:
         slope = 1.0 if rms_slope is None else rms_slope
-        return SelfAffineSpectrum(period, rolloff, short or 8 * period / max(grid, 1), hurst, slope).realise(grid, seed)
+        rolloff, short = _cutoffs(period, rolloff, short, grid)
+        return SelfAffineSpectrum(period, rolloff, short, hurst, slope).realise(grid, seed)
     if file.suffix == ".npy":
         from icha.configuration.height_map import read_height_map
 
@@ -123,6 +127,19 @@ def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope):
 
         found = read_surface(file)
     return found if rms_slope is None else found.scaled_to_rms_slope(rms_slope)
+
+
+def _cutoffs(period, rolloff, short, grid):
+    """Longest and shortest wavelengths, as asked for or such that there is a spectrum between them."""
+    cut = 8 * period / max(grid, 1) if short is None else short
+    roll = min(period, max(period / 5, 2 * cut)) if rolloff is None else rolloff
+    if cut >= roll:
+        left_out = "" if short is not None else ", which is 8 grid cells if left out,"
+        raise ValueError(
+            f"--short {cut * 1e6:g} um{left_out} must be less than --rolloff {roll * 1e6:g} um; "
+            f"give a smaller --short{'' if short is not None else ', a finer --grid'} or a longer --rolloff"
+        )
+    return roll, cut
 
 
 class _Progress:
