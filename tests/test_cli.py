@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import small_campaign as small
@@ -85,14 +86,36 @@ def test_a_measured_file_is_asked_what_it_knows(project):
     section = yaml.safe_load(Path("config/campaigns/scan.yaml").read_text())["surfaces"]["scan_1"]
     assert section["kind"] == "measured" and section["path"] == "../../scan 1.xyz"
     text = Path("config/campaigns/scan.yaml").read_text()
-    assert "12 x 12 points" in text
+    assert "12 x 12 points over 1.2e-05 x 1.2e-05 in its coordinates\n" in text and "It runs as it is" not in text
+    assert section["lateral_unit"] is None and "to fill in: surfaces.scan_1.lateral_unit" in written.output
     # Coordinates without a unit, heights without one: nothing is made up.
     assert section["height_unit"] is None and "to fill in: surfaces.scan_1.height_unit" in written.output
     assert icha("new", "other", "--measured", "none.xyz").exit_code == 2
     Path("words.txt").write_text("no heights in here\n")
     refused = icha("new", "other", "--measured", "words.txt")
     assert refused.exit_code == 2 and "words.txt" in refused.output
+    Path("empty.txt").write_text("\n \n")
+    refused = icha("new", "other", "--measured", "empty.txt")
+    assert refused.exit_code == 2 and "empty.txt: the file is empty" in refused.output
+    assert icha("new", "other", "--data", "z").exit_code == 2
     assert not Path("config/campaigns/other.yaml").exists()
+
+
+def test_one_of_several_datasets_of_a_measured_file_is_chosen_by_its_name(project):
+    with h5py.File("my.h5", "w") as file:
+        for name in ("first", "second"):
+            file[name] = np.random.default_rng(1).normal(size=(16, 16))
+            file[name].attrs["units"] = "nm"
+    refused = icha("new", "two", "--measured", "my.h5")
+    told = " ".join(refused.output.split())
+    assert refused.exit_code == 2 and "allowed: first, second; say which by --data NAME" in told
+    assert icha("new", "two", "--measured", "my.h5", "--data", "third").exit_code == 2
+    written = icha("new", "two", "--measured", "my.h5", "--data", "second")
+    assert written.exit_code == 0 and "to fill in: surfaces.my.size" in written.output
+    file = Path("config/campaigns/two.yaml")
+    assert "It runs once the keys marked" in file.read_text() and "lateral_unit" not in file.read_text()
+    file.write_text(file.read_text().replace("size: ", "size: 16 um"))
+    assert load_configuration(file).campaign.surfaces["my"].data == "second"
 
 
 @pytest.mark.parametrize(

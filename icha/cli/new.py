@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from pathlib import Path
@@ -21,12 +22,23 @@ def new(
         Path | None,
         typer.Option(help="File of a measured topography; what it says of itself is filled in.", show_default=False),
     ] = None,
+    data: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Which variable, dataset or channel of the measured file, if it has several.",
+            show_default=False,
+        ),
+    ] = None,
     pull_off: Annotated[bool, typer.Option("--pull-off", help="With a study of pull-off and hysteresis.")] = False,
     boundary_elements: Annotated[
         bool, typer.Option("--boundary-elements", help="With boundary elements beside the runs.")
     ] = False,
 ) -> None:
-    """Write a commented campaign, config/campaigns/NAME.yaml, that runs as it is, and say how to go on."""
+    """Write a commented campaign, config/campaigns/NAME.yaml, and say how to go on.
+
+    It runs as it is; with a measured file, once what that does not say of itself is filled in, which is listed.
+    """
     from icha.configuration.values import NAME_PATTERN
 
     folder = project()
@@ -37,14 +49,17 @@ def new(
         raise Mistake(f"{shown(file)} is there already; choose another name, or remove it")
     if measured is not None and boundary_elements:
         raise Mistake("--boundary-elements with --measured: they are periodic, and the template's surface is free")
+    if data is not None and measured is None:
+        raise Mistake("--data: is of a measured file; allowed: with --measured")
     surface, section, to_fill_in = ("rough", _part("self_affine"), [])
     if measured is not None:
-        surface, section, to_fill_in = _measured(measured, file.parent)
+        surface, section, to_fill_in = _measured(measured, data, file.parent)
     slopes = "[0.5]" if measured is None else "measured"
     text = _part(
         "campaign",
         name=name,
         title=name.replace("_", " ").replace("-", " ").capitalize(),
+        runs="It runs once the keys marked `to fill in` have their values." if to_fill_in else "It runs as it is.",
         schema=_relative(folder / "workflow/schemas/config.schema.json", file.parent),
         readme=_relative(folder / "config/README.md", folder),
         surface=surface,
@@ -83,7 +98,7 @@ def _relative(path: Path, start: Path) -> str:
     return Path(os.path.relpath(path, start)).as_posix()
 
 
-def _measured(path: Path, start: Path) -> tuple[str, str, list[str]]:
+def _measured(path: Path, data: str | None, start: Path) -> tuple[str, str, list[str]]:
     """Name and section of a measured surface, and what of it is left to fill in."""
     import numpy as np
 
@@ -91,22 +106,34 @@ def _measured(path: Path, start: Path) -> tuple[str, str, list[str]]:
 
     if not path.is_file():
         raise Mistake(f"--measured {path}: no such file")
+    if not path.read_bytes().strip():
+        raise Mistake(f"--measured {path}: the file is empty; allowed: one that holds a topography")
     assumed, missing = {}, {}
     guesses = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
     while True:
         try:
-            scan = read_scan(path, Preparation("auto", "free", **assumed))
+            scan = read_scan(path, Preparation("auto", "free", data, **assumed))
             break
         except UnfitTopography as error:
             if error.key not in guesses or error.key in assumed:
-                raise Mistake(f"--measured {path}: {error.key} {error}") from None
+                how = "; say which by --data NAME" if error.key == "data" else ""
+                raise Mistake(f"--measured {path}: {error.key} {error}{how}") from None
             assumed[error.key] = guesses[error.key]
             missing[error.key] = str(error)
+    sides = None
+    if "height_unit" in missing and "size" not in missing:
+        # Coordinates without a unit would count in that of the heights, which is not known either.
+        bare = read_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
+        if bare.size != scan.size:
+            sides = bare.size
+            missing["lateral_unit"] = "is missing, and the file does not say it; left out, it is that of the heights"
     rows, columns = scan.heights.shape
-    lines = [f"# {columns} x {rows} points{_what_is_known(scan, missing)}"]
-    examples = {"height_unit": "nm", "size": "[90 um, 90 um]"}
+    lines = [f"data: {json.dumps(data)}"] if data is not None else []
+    lines.append(f"# {columns} x {rows} points{_what_is_known(scan, missing, sides)}")
+    examples = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
     for key in missing:
-        lines.append(f"{key}:        # to fill in, for the file does not say it: such as {examples[key]}")
+        empty = " (empty: that of the heights)" if key == "lateral_unit" else ""
+        lines.append(f"{key}:        # to fill in, for the file does not say it{empty}: such as {examples[key]}")
     if gaps := int(np.count_nonzero(~np.isfinite(scan.heights))):
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
     found = "".join(f"    {line}\n" for line in lines)
@@ -115,11 +142,14 @@ def _measured(path: Path, start: Path) -> tuple[str, str, list[str]]:
     return name, section, [f"surfaces.{name}.{key} ({why})" for key, why in missing.items()]
 
 
-def _what_is_known(scan, missing) -> str:
+def _what_is_known(scan, missing, sides) -> str:
+    """Size and heights of a scan; `sides` are in the file's coordinates, if it gives these without their unit."""
     import numpy as np
 
     known = ""
-    if "size" not in missing:
+    if sides is not None:
+        known += f" over {sides[0]:.4g} x {sides[1]:.4g} in its coordinates"
+    elif "size" not in missing:
         known += f" over {scan.size[0] * 1e6:.4g} um x {scan.size[1] * 1e6:.4g} um"
     if "height_unit" not in missing:
         known += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
