@@ -1,6 +1,7 @@
 """Figures can be drawn from small and unusual campaigns, say what is wrong, and have the same bytes every time."""
 
 import itertools
+import re
 
 import compared_campaign as compared
 import cyclic_campaign as cyclic
@@ -30,7 +31,19 @@ from icha.figures import (
 from icha.figures.scale import Scale, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
 from icha.figures.spots import circles_in_cell
-from icha.figures.style import BLACK, BLUE, VERMILLION, material_label, number, quantity, save, unit_for
+from icha.figures.style import (
+    BLACK,
+    BLUE,
+    VERMILLION,
+    logarithmic_axes,
+    material_label,
+    new_figure,
+    number,
+    quantity,
+    save,
+    slope_label,
+    unit_for,
+)
 from icha.model_error import jaccard
 from icha.records import read_dataset, write_surface
 from icha.reference import reference_dataset
@@ -668,6 +681,92 @@ def many(surfaces=30, materials=1):
         run = small.run().assign(surface_energy=small.run()["surface_energy"] * (1 + 0.1 * k))
         runs.append((RunLabels("many", name, 1, 1.0, kind), run))
     return campaign_tree(runs)
+
+
+def two_surfaces(slopes=(1.0,)):
+    names = ["rough-hurst0.6", "rough-hurst0.9"]
+    runs = [
+        (RunLabels("vary", name, 1, slope, material), small.run(1 + k, slope, material).assign(seed=1))
+        for (k, name), slope, material in itertools.product(enumerate(names), slopes, ("soft", "hertz"))
+    ]
+    return names, campaign_tree(runs)
+
+
+@pytest.mark.parametrize("slopes", [(1.0,), (1.0, 0.2)])
+def test_fig5_tells_surfaces_apart(slopes):
+    names, tree = two_surfaces(slopes)
+    figure = fig5_multi_slope.figure(tree, study="vary")
+    (legend,) = figure.legends
+    words = {text.get_text(): handle for text, handle in zip(legend.get_texts(), legend.legend_handles, strict=True)}
+    places = list(itertools.product(names, slopes))
+    for name, slope in places:
+        (text,) = (text for text in words if name in text and (len(slopes) == 1 or f"{slope:g}" in text.split("=")[-1]))
+        marker = words[text].get_marker()
+        drawn = [line for line in figure.axes[0].get_lines() if line.get_marker() == marker and len(line.get_xdata())]
+        wanted = [small.run(1 + names.index(name), slope, material) for material in ("soft", "hertz")]
+        for line, run in zip(drawn, wanted, strict=True):
+            np.testing.assert_allclose(line.get_ydata(), path_steps(run)["contact_area_fraction"])
+    assert len(words) == len(places) + 2
+
+
+def test_theories_say_whose_they_are_where_there_are_several_surfaces():
+    names, tree = two_surfaces()
+    for module in (fig2_area_and_gap, fig7_stiffness):
+        for study, there in ((tree, {f"theories: {names[0]}"}), (small.tree(), set())):
+            name = next(iter(study.children))
+            figure = module.figure(study, reference_dataset(small.SPECTRUM), study=name)
+            legends = [legend for part in (figure, *figure.axes) for legend in _legends(part)]
+            words = {text.get_text() for legend in legends for text in legend.get_texts()}
+            assert {text for text in words if text.startswith("theories")} == there
+
+
+@pytest.mark.parametrize("module", [fig3_distributions, fig8_patch_sizes], ids=lambda module: module.__name__)
+def test_figures_of_one_surface_say_which(module):
+    names, tree = two_surfaces()
+    assert module.figure(tree, study="vary").axes[1].get_title(loc="right") == names[0]
+    assert module.figure(small.tree(), study="single").axes[1].get_title(loc="right") == ""
+    names, tree = two_surfaces((1.0, 0.2))
+    title = module.figure(tree, study="vary").axes[1].get_title(loc="right")
+    assert title == f"{names[0]}, {slope_label(0.2)}"
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ((1.5e-4, 9e-4), [2, 5]),
+        ((2e-4, 3e-3), [2, 5, 2]),
+        ((2e-4, 3e-2), []),
+        ((0.9e-3, 2.9e-3), [2]),
+    ],
+)
+def test_logarithmic_axes_label_no_more_than_has_room(limits, expected):
+    figure = new_figure(3.5, 3)
+    axes = figure.subplots()
+    logarithmic_axes(axes, "x")
+    axes.set_xlim(limits)
+    figure.canvas.draw()
+    labels = [text.get_text() for text in axes.get_xticklabels(minor=True) if text.get_text()]
+    assert [int(re.search(r"(\d)\\times", label)[1]) for label in labels] == expected
+    renderer = figure.canvas.get_renderer()
+    shown = [
+        text.get_window_extent(renderer)
+        for minor in (False, True)
+        for text in axes.get_xticklabels(minor=minor)
+        if text.get_text() and limits[0] <= text.get_position()[0] <= limits[1]
+    ]
+    shown.sort(key=lambda box: box.x0)
+    assert len(shown) > 1
+    assert all(one.x1 < two.x0 for one, two in itertools.pairwise(shown))
+
+
+@pytest.mark.parametrize("limits", [(6.1e-3, 8.9e-3), (1.001, 1.06), (5.5, 7.5)])
+def test_logarithmic_axes_of_small_ranges_have_some_labels(limits):
+    figure = new_figure(3.5, 3)
+    axes = figure.subplots()
+    logarithmic_axes(axes, "x")
+    axes.set_xlim(limits)
+    figure.canvas.draw()
+    assert 1 < sum(bool(text.get_text()) for text in axes.get_xticklabels(minor=True)) < 5
 
 
 MANY = [fig2_area_and_gap, fig5_multi_slope, fig7_stiffness, fig9_tabor]

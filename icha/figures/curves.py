@@ -123,6 +123,13 @@ def material_looks(dataset: xr.Dataset, materials: Sequence[str]) -> tuple[list[
     ], None
 
 
+def say_whose_theories(panels: Iterable[Axes], dataset: xr.Dataset) -> None:
+    """Name in the legends the first surface of a study, which theories are drawn for, where it has several."""
+    names = dataset["surface"].values.tolist()
+    for axes in panels if len(names) > 1 else ():
+        axes.plot([], [], ls="none", label=f"theories: {names[0]}")
+
+
 # A mean has about so many markers.
 _MEAN_MARKERS = 8
 

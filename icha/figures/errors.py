@@ -20,6 +20,7 @@ from icha.figures.style import (
     GREY,
     MARKERS,
     TWO_COLUMNS,
+    logarithmic_axes,
     material_label,
     new_figure,
     panel_label,
@@ -122,7 +123,7 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
         if own_rows:
             row[-1].set_title(material_label(interfaces, shown[0]), loc="right")
         for ax, quantity in zip(row, quantities, strict=True):
-            ax.set_xscale("log")
+            logarithmic_axes(ax, "x")
             ax.axhline(0, color="0.6", lw=0.7, zorder=0)
             ax.set_ylabel(quantity.label)
             panel_label(ax, next(letters))

@@ -19,6 +19,7 @@ from icha.figures.style import (
     SKY,
     TWO_COLUMNS,
     VERMILLION,
+    logarithmic_axes,
     new_figure,
     panel_label,
     styled,
@@ -114,7 +115,7 @@ def _draw_ratios(ax, error_sources, name):
             capsize=1.5,
             label=label,
         )
-    ax.set_xscale("log")
+    logarithmic_axes(ax, "x")
     ax.set_xlabel(PRESSURE_LABEL)
 
 

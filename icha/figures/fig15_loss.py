@@ -14,7 +14,7 @@ from scipy.stats import linregress
 from icha.figures.curves import bars_handle
 from icha.figures.hysteresis import Lines, averages, detached_runs_of, draw_averages, legend_below, several
 from icha.figures.select import NothingToDraw
-from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, styled, unit_for
+from icha.figures.style import GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
 
 CAPTION = (
     "(a) Hysteresis loss, the energy per nominal area that a path from first contact to the largest load and back to "
@@ -109,8 +109,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
             handles[lines.name(key) + _words(fit)] = points
     x, y = (np.concatenate([getattr(line, name) for line in drawn.values()]) for name in "xy")
     if all(np.all(values > 0) and values.max() > _SPAN * values.min() for values in (x, y)):
-        loss.set_xscale("log")
-        loss.set_yscale("log")
+        logarithmic_axes(loss)
     loss.axhline(0, color=GREY, lw=0.6, zorder=1)
     loss.set_xlabel(r"contact area at the largest load  $A/A_0$")
     loss.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")

@@ -21,6 +21,7 @@ from icha.figures.style import (
     GREY,
     TWO_COLUMNS,
     VERMILLION,
+    logarithmic_axes,
     material_label,
     new_figure,
     panel_label,
@@ -134,7 +135,7 @@ def figure(
                 _draw_count(when, events["separation"][own], color=kind.look["mec"], ls=dashes, lw=1.1)
     most = max((line.get_ydata()[-1] for line in when.get_lines()), default=1)
     if most > _FEW:
-        when.set_yscale("log")
+        logarithmic_axes(when, "y")
         when.set_ylim(bottom=0.8)
     else:
         when.set_ylim(0, 1.06 * most)

@@ -16,10 +16,11 @@ from icha.figures.curves import (
     add_legends,
     draw_line,
     draw_ways_back,
+    say_whose_theories,
     study_curves,
 )
 from icha.figures.select import study_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 
 CAPTION = (
     "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
@@ -33,7 +34,8 @@ CAPTION = (
     "it. Lines: adhesionless theories of Persson (area) and of Yang and Persson (separation), the linear law of Bush, "
     "Gibson and Thomas where few summits touch, and the theories of separate summits of Greenwood and Williamson (no "
     "adhesion) and of Fuller and Tabor (with adhesion, in the colour of the material), with the spectral moments of "
-    "the surface. Oblique crosses: adhesionless Green's function molecular dynamics (GFMD) of other surfaces (H = "
+    "the surface, of several the first one. "
+    "Oblique crosses: adhesionless Green's function molecular dynamics (GFMD) of other surfaces (H = "
     "0.8, q1/q0 = 100, no roll-off), reduced from published data."
 )
 
@@ -55,7 +57,7 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    references : theories and points for the study's surface (`icha.reference.reference_dataset`), if any.
+    references : theories and points for the study's first surface (`icha.reference.reference_dataset`), if any.
     model_error : `icha.model_error.model_error` of the campaign, for the boundary elements beside its runs, if any.
     study : name of the study.
 
@@ -76,8 +78,7 @@ def figure(
         gaps.append(gap)
         draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
     for ax in (left, right):
-        ax.set_xscale("log")
-        ax.set_yscale("log")
+        logarithmic_axes(ax)
     if curves.unloaded:
         left.plot([], [], color=GREY, label="unloading", **UNLOADING)
     for p, area, gap in _draw_solutions(left, right, curves.colours, study_errors(model_error, study)):
@@ -91,6 +92,7 @@ def figure(
     if references is not None:
         _draw_references(left, right, references, x)
         _draw_separate_summits(left, right, references, campaign[study].to_dataset(), curves.colours)
+        say_whose_theories([left, right], campaign[study].to_dataset())
     left.set_xlim(x)
     right.set_xlim(x)
     left.set_ylim(min(areas.min(), 1.6 * x[0]) / 1.5, 1)

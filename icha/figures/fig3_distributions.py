@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from icha.ensemble import ensemble
 from icha.figures.curves import band_handle, draw_mean, material_looks
-from icha.figures.select import first_line, snapshot_label, study_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.figures.select import first_line, name_of_place, snapshot_label, study_errors
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.model_error import state_of
 from icha.reference.persson import persson_pressure_density
 
@@ -89,9 +89,8 @@ def figure(
             left.plot(*solution_gap_points(*truths), **broad)
             right.plot(*solution_pressure_points(*truths), **broad)
             named = True
-    left.set_xscale("log")
-    for ax in (left, right):
-        ax.set_yscale("log")
+    logarithmic_axes(left)
+    logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
     if scale:
         scale.draw(fig, [left, right])
@@ -113,6 +112,8 @@ def figure(
         right.set_ylim(top * 5e-5, top * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
     left.set_title(snapshot_label(run, at), loc="right")
+    shown = lines[0].labels
+    right.set_title(name_of_place(campaign[study].to_dataset(), shown.surface, shown.rms_slope), loc="right")
     if left.get_legend_handles_labels()[0]:
         left.legend(loc="lower left")
     if right.get_legend_handles_labels()[0]:

@@ -19,6 +19,7 @@ from icha.figures.curves import (
     draw_ways_back,
     study_curves,
 )
+from icha.figures.select import name_of_place
 from icha.figures.style import (
     BLACK,
     COLOURS,
@@ -26,6 +27,7 @@ from icha.figures.style import (
     GREY,
     MARKERS,
     TWO_COLUMNS,
+    logarithmic_axes,
     material_label,
     new_figure,
     panel_label,
@@ -35,8 +37,9 @@ from icha.figures.style import (
 
 CAPTION = (
     "Real contact area over nominal area against the reduced pressure F/(E* h'rms A0) (a) and against F/(E* A0) (b) "
-    "for several rms slopes (shape of the markers) and materials (colour and size). Where there are several seeds the "
-    "lines are means over them at common loads, with the 95 % band of confidence of the mean (Student's t). Without "
+    "for several surfaces and rms slopes (shape of the markers) and materials (colour and size). Where there are "
+    "several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
+    "(Student's t). Without "
     "adhesion the curves of one topography, scaled to different slopes, are one curve in (a); what adhesion adds "
     "depends on the material and grows as the slope falls. In (b) the slope orders the curves: at a given load the "
     "area falls as the slope rises. Thin dashed lines, where there are any: the way back, unloading, while the load "
@@ -75,11 +78,13 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
     dataset = campaign[study].to_dataset()
     materials = list(curves.colours)
     # The largest slope comes first and gets circles, as in the paper.
-    slopes = sorted((float(value) for value in dataset["rms_slope"].values), reverse=True)
+    places = dict.fromkeys((line.labels.surface, line.labels.rms_slope) for line in curves.lines)
+    surfaces = dataset["surface"].values.tolist()
+    places = sorted(places, key=lambda place: (surfaces.index(place[0]), -place[1]))
     colour, marker, size = curves.colours, {}, {}
     if curves.scale is None:
         colour = {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(materials)}
-        marker = {slope: MARKERS[k % len(MARKERS)] for k, slope in enumerate(slopes)}
+        marker = {place: MARKERS[k % len(MARKERS)] for k, place in enumerate(places)}
         # Of curves that lie on each other all stay visible: later materials have smaller markers.
         size = {name: 7.0 * 0.68**k for k, name in enumerate(materials)}
 
@@ -88,7 +93,7 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
     for line in curves.lines:
         labels = line.labels
         if curves.scale is None:
-            own = {"marker": marker[labels.rms_slope], "mfc": "none", "ms": size[labels.material]}
+            own = {"marker": marker[labels.surface, labels.rms_slope], "mfc": "none", "ms": size[labels.material]}
             line = line._replace(look=line.look | own | dict.fromkeys(("color", "mec"), colour[labels.material]))
         line = line._replace(look=line.look | {"label": None})
         slope = float(line.runs[0]["rms_slope"])
@@ -96,8 +101,7 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
         draw_line(left, line, _points, logarithmic=True, lines=len(curves.lines))
         draw_line(right, line, _points_at_load, logarithmic=True, lines=len(curves.lines))
     for ax in (left, right):
-        ax.set_xscale("log")
-        ax.set_yscale("log")
+        logarithmic_axes(ax)
     for k, measured in enumerate(measurements):
         look = {
             "color": colour.get(measured.material, BLACK),
@@ -112,8 +116,19 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
     right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
     left.set_ylabel(AREA_LABEL)
 
-    slope_handles = [
-        Line2D([], [], ls="none", marker=marker[s], mec=GREY, mfc="none", ms=6, label=slope_label(s)) for s in marker
+    several = len({surface for surface, _ in marker}) > 1
+    place_handles = [
+        Line2D(
+            [],
+            [],
+            ls="none",
+            marker=marker[place],
+            mec=GREY,
+            mfc="none",
+            ms=6,
+            label=name_of_place(dataset, *place) if several else slope_label(place[1]),
+        )
+        for place in marker
     ]
     material_handles = [
         Line2D(
@@ -134,11 +149,17 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
         named = {line.look["label"]: line.look | {"ls": "none", "ms": 5} for line in curves.lines if line.look["label"]}
         material_handles = [Line2D([], [], **look) for look in named.values()]
     if curves.unloaded:
-        slope_handles.append(Line2D([], [], color=GREY, label="unloading", **UNLOADING))
+        place_handles.append(Line2D([], [], color=GREY, label="unloading", **UNLOADING))
     if curves.several_seeds:
-        slope_handles.append(band_handle(len(line.runs) for line in curves.lines))
-    if slope_handles:
-        right.legend(handles=slope_handles, loc="lower right")
+        place_handles.append(band_handle(len(line.runs) for line in curves.lines))
+    if several:
+        # Names of surfaces are long.
+        handles = material_handles + place_handles
+        fig.set_figheight(fig.get_figheight() + 0.1 * len(handles))
+        fig.legend(handles=handles, loc="outside lower center", ncols=2)
+        material_handles, place_handles = [], []
+    if place_handles:
+        right.legend(handles=place_handles, loc="lower right")
     first = left.legend(handles=material_handles, loc="lower right") if material_handles else None
     if measurements:
         if first is not None:

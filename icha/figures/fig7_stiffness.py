@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.figures.curves import PRESSURE_LABEL, add_legends, draw_line, study_curves
+from icha.figures.curves import PRESSURE_LABEL, add_legends, draw_line, say_whose_theories, study_curves
 from icha.figures.select import NothingToDraw
-from icha.figures.style import BLACK, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 
 CAPTION = (
     "Contact stiffness K = -dp/du, nominal pressure p over mean separation u, against the reduced pressure F/(E* "
@@ -29,7 +29,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     Parameters
     ----------
     campaign : the campaign dataset.
-    references : theory for the study's surface (`icha.reference.reference_dataset`), if any.
+    references : theory for the study's first surface (`icha.reference.reference_dataset`), if any.
     study : name of the study.
 
     Raises
@@ -46,9 +46,8 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         draw_line(right, line, _over_pressure, logarithmic=True, lines=len(curves.lines))
         pressures.append(p)
         stiffnesses.append(stiffness)
-    left.set_xscale("log")
-    left.set_yscale("log")
-    right.set_xscale("log")
+    logarithmic_axes(left)
+    logarithmic_axes(right, "x")
     pressures, stiffnesses = np.concatenate(pressures), np.concatenate(stiffnesses)
     if not len(pressures):
         raise NothingToDraw(f"study {study}: no stop with a positive load and a positive stiffness to draw")
@@ -61,6 +60,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         look = {"ls": "-", "color": BLACK, "lw": 1, "label": "Yang & Persson", "zorder": 2}
         left.plot(p[shown], theory[shown], **look)
         right.plot(p[shown], theory[shown] / p[shown], **look)
+        say_whose_theories([left, right], campaign[study].to_dataset())
         ratio = np.concatenate([ratio, theory[shown] / p[shown]])
     for ax, letter in ((left, "a"), (right, "b")):
         ax.set_xlim(x)

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from icha.campaign import spots_of
 from icha.ensemble import ensemble
 from icha.figures.curves import band_handle, draw_mean, material_looks
-from icha.figures.select import first_line, snapshot_label
-from icha.figures.style import TWO_COLUMNS, new_figure, panel_label, styled, unit_for
+from icha.figures.select import first_line, name_of_place, snapshot_label
+from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
 
 CAPTION = (
     "Sizes of the contact patches, the areas A of the spots (united ones count as one), at the load given in the "
@@ -66,10 +66,9 @@ def figure(
                 ax.plot(area, values[0], **own)
             else:
                 draw_mean(ax, area, ensemble(values), own, len(lines))
-        shown = snapshot_label(run, at)
+        state = snapshot_label(run, at)
     for ax in (left, right):
-        ax.set_xscale("log")
-        ax.set_yscale("log")
+        logarithmic_axes(ax)
     if scale:
         scale.draw(fig, [left, right])
     if any(len(line.members) > 1 for line in lines):
@@ -78,7 +77,9 @@ def figure(
     right.set_xlabel(f"patch area  $A$ ({unit}²)")
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    left.set_title(shown, loc="right")
+    left.set_title(state, loc="right")
+    shown = lines[0].labels
+    right.set_title(name_of_place(campaign[study].to_dataset(), shown.surface, shown.rms_slope), loc="right")
     for ax, corner in ((left, "best"), (right, "lower left")):
         if ax.get_legend_handles_labels()[0]:
             ax.legend(loc=corner)

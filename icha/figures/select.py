@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from icha.campaign import LABELS, RAGGED, RunLabels, find_snapshot, loading_stops, reduced_gap, run_labels, select_run
-from icha.figures.style import number
+from icha.figures.style import number, slope_label
 from icha.records import COMPLETE
 
 
@@ -149,6 +149,12 @@ def first_line(
             own = found.setdefault(labels.material, Snapshots(labels, []))
             own.members.append((run, find_snapshot(run, kind, target)))
     return list(found.values())
+
+
+def name_of_place(dataset: xr.Dataset, surface: str, rms_slope: float) -> str:
+    """A surface and rms slope in words, as far as their study has several of them."""
+    words = {"surface": surface, "rms_slope": slope_label(rms_slope)}
+    return ", ".join(text for label, text in words.items() if dataset.sizes[label] > 1)
 
 
 _KIND_LABELS = {

@@ -10,6 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation
 
 from icha.files import whole_file
 
@@ -86,6 +87,35 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
         with whole_file(pdf) as temporary:
             nothing = {"CreationDate": None, "Creator": None, "Producer": None}
             figure.savefig(temporary, format="pdf", metadata=nothing)
+
+
+def logarithmic_axes(axes, directions: str = "xy") -> None:
+    """Make the axes of these directions logarithmic; between powers of ten only as much is labelled as has room."""
+    for direction in directions:
+        axes.set(**{f"{direction}scale": "log"})
+        getattr(axes, f"{direction}axis").set_minor_formatter(_FewLabels())
+
+
+class _FewLabels(LogFormatterSciNotation):
+    """Labels of the ticks between powers of ten: twos and fives where an axis shows less than two powers.
+
+    Where these are too few as well, some of the ticks that there are.
+    """
+
+    _MOST = 3
+
+    def set_locs(self, locs):
+        low, high = sorted(self.axis.get_view_interval())
+        powers = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
+        inside = [at for at in locs if low <= at <= high]
+        digits = [at / 10 ** np.floor(np.log10(at)) for at in inside]
+        chosen = [at for at, digit in zip(inside, digits, strict=True) if np.isclose(digit, (2, 5)).any()]
+        if len(chosen) + powers < 2:
+            chosen = inside[:: -(-len(inside) // self._MOST) or 1]
+        self._chosen = chosen if powers < 2 else []
+
+    def __call__(self, x, pos=None):
+        return super().__call__(x, pos) if x in self._chosen else ""
 
 
 def panel_label(axes, letter: str) -> None:
