@@ -95,6 +95,8 @@ class Asperities:
         found = np.flatnonzero(event >= 0)
         per_step = {
             "mean_separation": u,
+            # Shown of free squares only.
+            "mean_gap": u,
             "nominal_pressure": pressure,
             "contact_area_fraction": area,
             "spot_count": np.array([np.count_nonzero(touching) for _, _, touching, _ in steps]),
@@ -125,6 +127,7 @@ class Asperities:
             "interaction_range": self.material.interaction_range,
             "rms_slope": self.rms_slope,
             "rms_height": self.rms_height,
+            "boundary": "periodic",
             "period": PERIOD,
             "grid": GRID,
             "seed": seed,
