@@ -129,8 +129,8 @@ title: Many small runs
 summary: A benchmark of the workflow.
 license: CC-BY-4.0
 surfaces:
-  rough: {{kind: self_affine, period: 100 um, rolloff_wavelength: 50 um, short_wavelength: 6.25 um, hurst: 0.8,
-          grid: 128}}
+  rough: {{kind: self_affine, period: 100 um, rolloff_wavelength: 50 um, short_wavelength: {short} um,
+          hurst: 0.8, grid: {grid}}}
 materials:
   soft: {{contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 2 nm}}
 studies:
@@ -147,14 +147,14 @@ figures:
 
 
 def campaigns(scratch: Path, limit: float) -> None:
-    """The workflow itself: the plan of 10 000 runs, and 1 000 small runs from surfaces to report."""
+    """The workflow itself: the plan of 10 000 runs, and 1 000 small runs of two sizes from surfaces to report."""
     cores = min(2, os.cpu_count())
 
-    def snakemake(seeds: int, *options: str) -> tuple[Path, Path, list[str]]:
-        folder = scratch / f"campaign-{seeds}"
+    def snakemake(seeds: int, grid: int, *options: str) -> tuple[Path, Path, list[str]]:
+        folder = scratch / f"campaign-{seeds}-{grid}"
         folder.mkdir()
         file = folder / "campaign.yaml"
-        file.write_text(CAMPAIGN.format(seeds=seeds))
+        file.write_text(CAMPAIGN.format(seeds=seeds, grid=grid, short=800 / grid))
         command = [sys.executable, "-m", "snakemake", "--snakefile", str(HERE.parent / "Snakefile")]
         return (
             folder,
@@ -162,23 +162,25 @@ def campaigns(scratch: Path, limit: float) -> None:
             [*command, "--directory", str(folder), "--configfile", str(file), "--quiet", "all", *options],
         )
 
-    _, _, command = snakemake(2000, "--dry-run")
+    _, _, command = snakemake(2000, 128, "--dry-run")
     print("campaign-plan ...", end=" ", flush=True)
     planned = measure(command, cores, limit)
     keep("campaign-plan", {"runs": 10000} | asdict(planned))
     print(f"{planned.outcome}, {planned.wall:.1f} s, {planned.peak / 2**20:.0f} MiB", flush=True)
 
-    folder, file, command = snakemake(200, "--cores", str(cores))
-    print("campaign-runs ...", end=" ", flush=True)
-    # The number of threads of a job is its rule's; Snakemake sets it.
-    whole = measure(command, cores, limit)
-    print(f"{whole.outcome}, {whole.wall:.1f} s", flush=True)
-    if whole.outcome == "complete":
-        sample = [sys.executable, script("solve_small"), str(file), str(folder / "results/many"), "100"]
-        about = {"whole": asdict(whole), "cores": cores}
-        found = run("campaign-runs", sample, folder / "sample.json", cores, limit, about)
-        share = found["seconds_a_run"] * found["runs"] / (cores * whole.wall)
-        print(f"{share:.0%} of {cores} x {whole.wall:.0f} s is the contact solver's", flush=True)
+    for grid in (128, 256):
+        name = f"campaign-runs-{grid}"
+        folder, file, command = snakemake(200, grid, "--cores", str(cores))
+        print(f"{name} ...", end=" ", flush=True)
+        # The number of threads of a job is its rule's; Snakemake sets it.
+        whole = measure(command, cores, limit)
+        print(f"{whole.outcome}, {whole.wall:.1f} s", flush=True)
+        if whole.outcome == "complete":
+            sample = [sys.executable, script("solve_small"), str(file), str(folder / "results/many"), "100"]
+            about = {"whole": asdict(whole), "cores": cores, "grid": grid}
+            found = run(name, sample, folder / "sample.json", cores, limit, about)
+            share = found["seconds_a_run"] * found["runs"] / (cores * whole.wall)
+            print(f"{share:.0%} of {cores} x {whole.wall:.0f} s is the contact solver's", flush=True)
 
 
 def machine() -> dict:

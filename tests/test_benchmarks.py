@@ -150,11 +150,11 @@ def test_page_and_figures_are_written_alike_from_the_same_results(page, results,
 
 
 def test_a_campaign_spends_its_time_in_the_solver_or_not(page):
-    runs = {"runs": 1000, "seconds_a_run": 0.3, "cores": 2, "whole": {"wall": 250.0}}
+    runs = {"grid": 128, "runs": 1000, "seconds_a_run": 0.3, "cores": 2, "whole": {"wall": 250.0}}
     plan = {"runs": 10000, "wall": 61.0, "peak": 2**29, "outcome": "complete"}
     assert page.solver_share(runs) == pytest.approx(0.6)
-    rows = [verdict.row() for verdict in page.verdicts({"campaign-runs": runs, "campaign-plan": plan})]
+    rows = [verdict.row() for verdict in page.verdicts({"campaign-runs-128": runs, "campaign-plan": plan})]
     (share,) = [row for row in rows if row[0].startswith("1 000 small runs")]
     (planned,) = [row for row in rows if row[0].startswith("plan of a campaign")]
-    assert share[1:] == ["40%", "reached"]
+    assert share[1:] == ["40% at 128²", "reached"]
     assert planned[1] == "61 s, 0.5 GiB" and planned[2] != "reached"
