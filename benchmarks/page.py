@@ -347,10 +347,10 @@ def _campaigns(results) -> list[str]:
 
 CAMPAIGNS_TEXT = """\
 Campaigns of small runs: 7 loads, five surface energies on 200 random surfaces of 128² or 256² nodes. *The contact
-solver's* part is the time that 100 of the runs take again in two processes side by side (`icha.simulate`), for all runs,
-over the time of both cores from the call of Snakemake to its end: surfaces, runs, dataset, comparison, checks, figure and
-report. The plan is that of 10 000 such runs. The campaign dataset is written, and checked, of files of runs of 15
-loads."""
+solver's* part is the time that 100 of the runs take again in two processes side by side (`icha.simulate`), for all
+runs, over the time of both cores from the call of Snakemake to its end: surfaces, runs, dataset, comparison, checks,
+figure and report. The plan is that of 10 000 such runs. The campaign dataset is written, and checked, of files of runs
+of 15 loads."""
 
 SWEEP_TEXT = """\
 Every code is given the same heights and the same 20 stops and is measured as a whole process, imports and reading
