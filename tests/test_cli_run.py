@@ -113,7 +113,12 @@ def test_damaged_files_are_made_again(project):
 def test_it_goes_on_after_it_was_stopped(project):
     # So many that it is still at it when it is stopped.
     program, how = command(project, "runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..60}}")
-    process = subprocess.Popen(program, stderr=subprocess.STDOUT, start_new_session=True, **how)
+
+    def heed():
+        # The tests may themselves run where it is ignored: in the background of a script, say.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    process = subprocess.Popen(program, stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=heed, **how)
     said = process.stdout.readline()
     assert said.startswith("["), said
     process.send_signal(signal.SIGINT)

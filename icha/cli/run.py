@@ -201,7 +201,9 @@ def _follow(command: list[str], home: Path, log: Path, watch, view) -> tuple[int
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, number)
 
-        former = {number: signal.signal(number, stop) for number in _SIGNALS}
+        # Those that are ignored, as under nohup or in the background of a script, are to be ignored.
+        heeded = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+        former = {number: signal.signal(number, stop) for number in heeded}
         try:
             listener = threading.Thread(target=_listen, args=(reading, watch, view, stopped), daemon=True)
             listener.start()
