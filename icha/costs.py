@@ -98,6 +98,11 @@ def summits_of_grid(grid: int) -> float:
     return (grid / 8) ** 2 / 4.5
 
 
+def job_threads(grid: int) -> int:
+    """Cores that a job of a surface takes, and is given: two where transforms of large arrays pay, else one."""
+    return 2 if grid >= 2048 else 1
+
+
 def surface_cost(grid: int) -> Cost:
     """Making a topography of `grid` nodes a side, and writing it."""
     heights = _DOUBLE * grid**2

@@ -23,8 +23,6 @@ from icha.configuration.expansion import (
 from icha.configuration.model import Campaign, SelfAffineSurface
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
-# From so many nodes on, a side, a job takes two cores, as in the workflow.
-_TWO_CORES = 2048
 # So many of the files that are there are compared with what was expected of them.
 _SAMPLE = 200
 
@@ -82,7 +80,7 @@ def _items(campaign, results) -> Iterator[Item]:
         return Item(part, path, state, cost, threads)
 
     def threads(surface):
-        return 2 if grid(surface) >= _TWO_CORES else 1
+        return costs.job_threads(grid(surface))
 
     for name, seed in surface_cases(campaign):
         yield there("surfaces", f"surfaces/{name}/seed{seed}.nc", costs.surface_cost(grid(name)), threads(name))

@@ -21,7 +21,6 @@ from icha.configuration.model import SURFACE_KINDS, Campaign, Defaults, Topograp
 from icha.configuration.problems import Problem, problems
 from icha.configuration.topography import Crop, MeasuredSurface
 from icha.configuration.values import MEASURED, NAME_PATTERN, NOTHING
-from icha.surface import Surface
 
 
 class ConfigurationError(ValueError):
@@ -317,7 +316,12 @@ def _facts(surface, with_slope: bool) -> tuple[int, float, str, float | None]:
         facts = topography_facts(surface.path, surface.preparation)
         return facts.grid, facts.period, facts.boundary, facts.rms_slope if with_slope else None
     heights = read_height_map(surface.path, surface.metres_per_unit)
-    slope = Surface(heights, surface.period).rms_slope if with_slope else None
+    slope = None
+    if with_slope:
+        # Imports SciPy's transforms, for which no other call should wait.
+        from icha.surface import Surface
+
+        slope = Surface(heights, surface.period).rms_slope
     return len(heights), surface.period, "periodic", slope
 
 

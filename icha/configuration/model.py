@@ -791,10 +791,6 @@ class Campaign(Section):
         topography = self.topography(surface)
         return topography.period if topography else self.surfaces[surface].period
 
-    def surface_seeds(self, study: str, surface: str) -> list[int]:
-        """Seeds of a surface in a study; a surface that is read from a file has one realisation, numbered 0."""
-        return list(dict.fromkeys(each.seed for each in self._contacts[study] if each.surface == surface))
-
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
         """Kind and value of all states that the runs of a study keep; None where they keep their last one.
 

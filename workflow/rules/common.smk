@@ -28,6 +28,7 @@ from icha.configuration.expansion import (
     surface_cases,
     surface_settings,
 )
+from icha.costs import job_threads
 
 CONFIGURATION = campaign_configuration(workflow)
 CAMPAIGN = CONFIGURATION.campaign
@@ -100,12 +101,12 @@ def memory_of(surface):
 
 def threads_of(surface):
     """Cores for a surface and its sweeps: one, with sweeps side by side, but where transforms of large arrays pay."""
-    return 2 if points_of(surface) >= 2048**2 else 1
+    return job_threads(CAMPAIGN.grid(surface))
 
 
 def minutes_of(wildcards):
     """Minutes after which a sweep is taken for stuck: many times what such sweeps have taken."""
-    if points_of(wildcards.surface) >= 2048**2:
+    if threads_of(wildcards.surface) > 1:
         return 240
     study = CAMPAIGN.studies[wildcards.study]
     return 120 if study.unload or study.turning_points else 30
