@@ -12,7 +12,7 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help environment slurm-environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page clean
+.PHONY: help environment slurm-environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -27,6 +27,7 @@ help:
 	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
 	@echo "make slurm-environment  install Snakemake with its executor for Slurm in .venv-slurm; docs/howto/cluster.md"
+	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  put a deposit to the validators of others, without network"
 	@echo "make clean   remove results, Snakemake's records and the built documentation (not the environment)"
 
 environment: .venv/.installed
@@ -92,6 +93,17 @@ benchmarks: environment .venv-benchmarks/.installed
 
 benchmarks-page: environment
 	python benchmarks/page.py
+
+# The validators have an environment of their own, for some of them need an old jsonschema.
+.venv-validators/.installed: .venv-tools/bin/uv tests/validators/requirements.txt
+	.venv-tools/bin/uv venv --quiet --clear --python $(PYTHON) .venv-validators
+	.venv-tools/bin/uv pip sync --quiet --require-hashes --python .venv-validators/bin/python tests/validators/requirements.txt
+	@touch $@
+
+validators-environment: .venv-validators/.installed
+
+validate: validators-environment
+	.venv-validators/bin/python tests/validators/validate.py $(DEPOSIT)
 
 clean:
 	rm -rf .snakemake docs/_build
