@@ -69,7 +69,7 @@ def test_the_examples_in_the_comments_of_a_new_campaign_are_valid_too(project):
     icha("new", "mine")
     file = project / "config/campaigns/mine.yaml"
     text = file.read_text()
-    for start, lines in (("# vary:", 1), ("# cases:", 3), ("# defaults:", 2), ("# authors:", 1)):
+    for start, lines in (("# vary:", 1), ("# cases:", 3), ("# defaults:", 2), ("# publication:", 4)):
         head, tail = text.split(start)
         block = (start + tail).splitlines()[:lines]
         (project / "config/campaigns/example.yaml").write_text(

@@ -259,6 +259,7 @@ def test_campaigns_are_immutable(load):
         load().campaign.materials["soft"].contact_modulus = 1.0
 
 
+CARBERRY = {"family_names": "Carberry", "given_names": "Josiah"}
 BAD = {
     # key, value, what the message must say of it
     "unknown key": ("materials.soft.modulus", "25 MPa", "materials.soft.modulus: unknown key"),
@@ -557,7 +558,60 @@ BAD = {
     ),
     "default of no kind of surface": ("defaults", {"surfaces": {"hrust": 0.8}}, "defaults.surfaces.hrust: unknown key"),
     "unknown section of defaults": ("defaults", {"figures": {}}, "defaults.figures: unknown key; allowed: materials"),
-    "ORCID": ("authors", [{"name": "A", "orcid": "1"}], "authors[0].orcid"),
+    "no ORCID": (
+        "publication",
+        {"authors": [CARBERRY | {"orcid": "1"}]},
+        "publication.authors[0].orcid: '1' is no ORCID",
+    ),
+    "check digit of an ORCID": (
+        "publication",
+        {"authors": [CARBERRY | {"orcid": "0000-0002-1825-0098"}]},
+        "publication.authors[0].orcid: '0000-0002-1825-0098' is no ORCID: its check digit is wrong; allowed: four",
+    ),
+    "ORCID of an organisation": (
+        "publication",
+        {"authors": [{"name": "A", "orcid": "0000-0002-1825-0097"}]},
+        "publication.authors[0]: an organisation has no ORCID; allowed: orcid beside family_names",
+    ),
+    "half an author": (
+        "publication",
+        {"authors": [{"family_names": "Carberry"}]},
+        "publication.authors[0]: is neither a person nor an organisation; allowed: family_names and given_names",
+    ),
+    "ROR": ("publication", {"authors": [CARBERRY | {"ror": "x"}]}, "authors[0].ror: 'x' is no ROR identifier; allowed"),
+    "version that YAML takes for a number": (
+        "publication",
+        {"version": 1.10},
+        "publication.version: 1.1 is no version; allowed: letters, digits and . + - _ between them, in quotes",
+    ),
+    "version that is a path": (
+        "publication",
+        {"version": "../1"},
+        "publication.version: '../1' is no version; allowed",
+    ),
+    "no day": ("publication", {"date": "2026-02-30"}, "publication.date: '2026-02-30' is no date; allowed: year"),
+    "no identifier": (
+        "publication",
+        {"related_identifiers": [{"identifier": "the paper", "relation": "Cites"}]},
+        "publication.related_identifiers[0].identifier: 'the paper' is no identifier; allowed: a DOI such as",
+    ),
+    "no relation": (
+        "publication",
+        {"related_identifiers": [{"identifier": "10.1007/s11249-017-0900-2", "relation": "Quotes"}]},
+        "publication.related_identifiers[0].relation: 'Quotes' is not a choice; allowed: 'IsCitedBy'",
+    ),
+    "no DOI": ("publication", {"doi": "reserved"}, "publication.doi: 'reserved' is no DOI; allowed: a DOI such as"),
+    "funding without a funder": ("publication", {"funding": [{}]}, "publication.funding[0].funder: the key is missing"),
+    "unknown key of a publication": (
+        "publication",
+        {"keyword": ["x"]},
+        "publication.keyword: unknown key (did you mean 'keywords'?)",
+    ),
+    "failure of no run": (
+        "publication",
+        {"known_failures": [{"run": "one", "reason": "why"}]},
+        "publication.known_failures[0].run: 'one' is not a run; allowed: a run of the campaign, such as one/",
+    ),
 }
 
 

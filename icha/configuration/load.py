@@ -239,7 +239,7 @@ def _without_tags(location: tuple, content: Any) -> tuple:
 
 def _model(location: tuple, content: Any) -> type[BaseModel] | None:
     """The model of the section at `location`."""
-    from icha.configuration import model
+    from icha.configuration import model, publication
 
     sections = {
         "materials": model.Material,
@@ -248,7 +248,6 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
         "boundary_element_loops": model.BoundaryElementLoops,
         "error_sources": model.ErrorSources,
         "measurements": model.Measurement,
-        "authors": model.Author,
     }
     if not location:
         return Campaign
@@ -262,6 +261,8 @@ def _model(location: tuple, content: Any) -> type[BaseModel] | None:
         return model.Figures
     if location == ("one_asperity",):
         return model.OneAsperity
+    if location[0] == "publication":
+        return publication.Publication if len(location) == 1 else publication.PARTS.get(location[1])
     if len(location) == 2 and location[0] == "figures":
         return get_args(model.Figures.model_fields[location[1]].annotation)[0]
     if len(location) == 2:

@@ -21,6 +21,7 @@ from pydantic import (
     model_validator,
 )
 
+from icha.configuration.publication import Publication
 from icha.configuration.topography import MeasuredSurface
 from icha.configuration.units import conversion_factor
 from icha.configuration.values import (
@@ -677,16 +678,6 @@ class Topography(NamedTuple):
     sha256: str
 
 
-class Author(Section):
-    """A person who answers for the campaign."""
-
-    name: Text = Field(description="Full name.")
-    orcid: Annotated[str, Field(strict=True, pattern=r"^\d{4}-\d{4}-\d{4}-\d{3}[\dX]$")] | None = Field(
-        default=None, description="ORCID, such as `0000-0002-1825-0097`."
-    )
-    affiliation: Text | None = Field(default=None, description="Institution.")
-
-
 class Defaults(Section):
     """Values for every entry of a section that does not give its own."""
 
@@ -704,7 +695,6 @@ class Campaign(Section):
     title: Text = Field(description="One line that says what the campaign is.")
     summary: Text = Field(description="A few sentences for readers of the datasets and of the report.")
     license: Text = Field(description="Licence of the data, as an SPDX identifier such as `CC-BY-4.0`.")
-    authors: list[Author] = Field(default=[], description="Authors of the data, for the deposit.")
     defaults: Defaults = Field(
         default=Defaults(), description="Values for all surfaces, materials or studies that do not give their own."
     )
@@ -729,10 +719,20 @@ class Campaign(Section):
         default={}, description="Measurements by name, overlaid on figure 5. None are shipped with ICHA."
     )
     figures: Figures = Field(default=Figures(), description="Figures and what they show.")
+    publication: Publication = Field(
+        default=Publication(), description="What a deposit says of itself; nothing else depends on it."
+    )
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
     _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
+
+    def published(self) -> Publication:
+        """What a deposit says of itself; title, summary and licence are the campaign's where it has none of its own."""
+        own = self.publication
+        return own.model_copy(
+            update={key: getattr(own, key) or getattr(self, key) for key in ("title", "summary", "license")}
+        )
 
     def loop_load(self, entry: BoundaryElementLoops) -> float:
         """The reduced pressure at which boundary elements both ways turn: the last one of their study."""

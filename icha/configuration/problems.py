@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from icha.cohesive_zone import resolution_problem
+from icha.configuration.expansion import run_cases
 from icha.configuration.model import (
     BESIDE_STUDIES,
     Campaign,
@@ -51,6 +52,7 @@ def problems(campaign: Campaign) -> list[Problem]:
         known(("measurements", label, "study"), measurement.study, campaign.studies)
         if measurement.material is not None:
             known(("measurements", label, "material"), measurement.material, campaign.materials)
+    found += _publication_problems(campaign)
     for label, figure in campaign.figures.drawn().items():
         if isinstance(figure, SourcesFigure):
             known(("figures", label, "entry"), figure.entry, campaign.error_sources)
@@ -68,6 +70,16 @@ def problems(campaign: Campaign) -> list[Problem]:
         if figure.study in campaign.studies:
             found += _figure_problems(campaign, ("figures", label), figure, campaign.studies[figure.study])
     return found
+
+
+def _publication_problems(campaign: Campaign):
+    """Failures that are known of runs that are none."""
+    failures = campaign.publication.known_failures
+    runs = {case.path for case in run_cases(campaign)} if failures else set()
+    for index, failure in enumerate(failures):
+        if failure.run not in runs:
+            location = ("publication", "known_failures", index, "run")
+            yield location, failure.run, f"is not a run; allowed: a run of the campaign, such as {min(runs)}"
 
 
 def _apart_problems(campaign: Campaign, location, figure, name):

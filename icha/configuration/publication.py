@@ -249,12 +249,20 @@ class Publication(Section):
     )
 
 
-def needed(publication: Publication | None) -> list[str]:
-    """What is missing for a deposit, a line for each key, with what is allowed; empty if nothing is."""
-    given = publication or Publication()
+# What the entries of its lists are.
+PARTS = {
+    "authors": Author,
+    "funding": Funding,
+    "related_identifiers": RelatedIdentifier,
+    "known_failures": KnownFailure,
+}
+
+
+def needed(publication: Publication) -> list[str]:
+    """What is missing for a deposit, a line for each key, with what is needed; empty if nothing is."""
     missing = {
-        "version": (given.version is None, "the version of the data, such as '1.0.0'"),
-        "date": (given.date is None, "the day of publication, such as 2026-01-31"),
-        "authors": (not given.authors, "at least one, with family_names and given_names, or name"),
+        "version": (publication.version is None, "the version of the data, such as '1.0.0'"),
+        "date": (publication.date is None, "the day of publication, such as 2026-01-31"),
+        "authors": (not publication.authors, "at least one, with family_names and given_names, or name"),
     }
     return [f"publication.{key}: is missing; needed: {what}" for key, (lacks, what) in missing.items() if lacks]

@@ -66,7 +66,11 @@ _HEADINGS = {
     "PullOffFigure": "`figures.fig14_pull_off`",
     "LossFigure": "`figures.fig15_loss`",
     "SnapMapFigure": "`figures.fig16_snap_map`",
-    "Author": "`authors`, each",
+    "Publication": "`publication`",
+    "Author": "`publication.authors`, each",
+    "Funding": "`publication.funding`, each",
+    "RelatedIdentifier": "`publication.related_identifiers`, each",
+    "KnownFailure": "`publication.known_failures`, each",
 }
 
 
