@@ -83,4 +83,4 @@ rule report:
 
 rule publish:
     input:
-        DEPOSIT,
+        f"{DEPOSIT}.zip",

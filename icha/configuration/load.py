@@ -32,11 +32,12 @@ class Configuration:
     """A valid campaign and where it came from.
 
     `text` is the merged configuration as its author wrote it, units included; `campaign` is what it means, in SI
-    units and with the paths of its files resolved.
+    units and with the paths of its files resolved; `origin` is its file.
     """
 
     campaign: Campaign
     text: str
+    origin: str
 
 
 def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | None = None) -> Configuration:
@@ -73,7 +74,7 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     fail(unread)
     campaign = campaign.with_topographies(topographies)
     fail([*problems(campaign), *_problems_of_measurements(campaign)])
-    return Configuration(campaign, yaml.safe_dump(written, sort_keys=False, allow_unicode=True, width=110))
+    return Configuration(campaign, yaml.safe_dump(written, sort_keys=False, allow_unicode=True, width=110), str(path))
 
 
 def read_yaml(path: Path) -> dict:

@@ -9,6 +9,7 @@ import warm
 from campaign_lock import hold_lock
 from command_line import campaign_configuration
 from fingerprint import code_fingerprint, imported_modules
+from publishable import refuse_unpublishable
 
 from icha.configuration.expansion import (
     asperity_cases,
@@ -29,6 +30,7 @@ from icha.configuration.expansion import (
     surface_settings,
 )
 from icha.costs import job_threads
+from icha.publication.attributes import discovery_attributes
 
 CONFIGURATION = campaign_configuration(workflow)
 CAMPAIGN = CONFIGURATION.campaign
@@ -60,10 +62,12 @@ VERDICT = f"{RESULTS}/verdict.txt"
 FIGURES = [f"{RESULTS}/figures/{name}.{ending}" for name in CAMPAIGN.figures.drawn() for ending in ("png", "pdf")]
 REPORT = f"{RESULTS}/report.html"
 RUN_TIMES = f"{RESULTS}/run_times.tsv"
-DEPOSIT = f"{RESULTS}/publish/SHA256SUMS"
+PUBLICATION = CAMPAIGN.published()
+# Without a version nothing is made: see publish.smk.
+DEPOSIT = f"{RESULTS}/publish/{CAMPAIGN.name}-{PUBLICATION.version or 'without_version'}"
 
 # Attributes of every dataset of the campaign.
-ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": CAMPAIGN.license}
+ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
 
 
 wildcard_constraints:

@@ -44,6 +44,7 @@ rule campaign_dataset:
         labels=LABELS,
         size=len(RUNS),
         attributes=ATTRIBUTES
+        | discovery_attributes(PUBLICATION)
         | {"title": CAMPAIGN.title, "summary": CAMPAIGN.summary, "config_sha256": campaign_sha256(CAMPAIGN)},
         code=code_of("make_dataset.py"),
     message:

@@ -1,16 +1,20 @@
-# publish/: everything that a reader needs, with checksums. The list of checksums is written last.
+# publish/<campaign>-<version>/ and its .zip: everything that a reader needs, with checksums. See docs/howto/publish.md.
+
+
+def what_is_published(wildcards):
+    """The files of a deposit; ends the program where there can be none, before anything is computed."""
+    refuse_unpublishable(CONFIGURATION, workflow.basedir)
+    # The verdict fails with the checks; with failures that are known, they are compared with these by the deposit.
+    judged = [CHECKS] if PUBLICATION.known_failures else [CHECKS, VERDICT]
+    return [CONFIG_USED, DATASET, COMPARISON, *judged, REPORT, *FIGURES, *SURFACES, *RUNS, *REFERENCES, *MODEL_ERROR]
 
 
 rule deposit:
     input:
-        [CONFIG_USED, DATASET, COMPARISON, CHECKS, VERDICT, REPORT],
-        FIGURES,
-        SURFACES,
-        RUNS,
-        REFERENCES,
-        MODEL_ERROR,
+        what_is_published,
     output:
-        DEPOSIT,
+        f"{DEPOSIT}/SHA256SUMS",
+        f"{DEPOSIT}.zip",
     log:
         f"{LOGS}/publish.log",
     benchmark:
@@ -22,12 +26,10 @@ rule deposit:
         mem_mb=500,
         runtime=30,
     params:
-        title=CAMPAIGN.title,
-        summary=CAMPAIGN.summary,
-        license=CAMPAIGN.license,
-        authors=[author.model_dump(exclude_none=True) for author in CAMPAIGN.authors],
+        results=RESULTS,
+        publication=PUBLICATION.model_dump(mode="json"),
         code=code_of("publish.py"),
     message:
-        "Deposit"
+        "Deposit {PUBLICATION.version}"
     script:
         "../scripts/publish.py"

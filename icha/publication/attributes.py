@@ -1,0 +1,33 @@
+"""What a published dataset says of its makers, in the file itself."""
+
+from __future__ import annotations
+
+from icha.configuration.publication import Author, Publication
+
+
+def discovery_attributes(publication: Publication) -> dict[str, str]:
+    """Global attributes of the Attribute Convention for Data Discovery (ACDD 1.3) that a publication gives a dataset.
+
+    Of several creators the values are lists with commas, in the same order; where one has no value it is empty.
+    """
+    authors = publication.authors
+    found = {
+        "creator_name": [author.full_name for author in authors],
+        "creator_type": ["person" if author.is_person else "institution" for author in authors],
+        "creator_url": [_url(author) for author in authors],
+        "creator_institution": [author.affiliation or "" for author in authors],
+        "keywords": publication.keywords,
+        "product_version": [publication.version or ""],
+        "acknowledgement": [_acknowledged(each) for each in publication.funding],
+        "metadata_link": [f"https://doi.org/{publication.doi}" if publication.doi else ""],
+    }
+    return {name: ", ".join(values) for name, values in found.items() if any(values)}
+
+
+def _url(author: Author) -> str:
+    return f"https://orcid.org/{author.orcid}" if author.orcid else author.ror or ""
+
+
+def _acknowledged(funding) -> str:
+    award = f" (award {funding.award_number})" if funding.award_number else ""
+    return f"Funded by {funding.funder}{award}"
