@@ -388,6 +388,30 @@ def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
     return tuple(found.values())
 
 
+def told(check: Check) -> str:
+    """A failed check in a line."""
+    if check.name == COMPLETED:
+        return f"{check.subject}: the run failed: {check.description}"
+    return f"{check.subject}: {check.name}: {check.value:.3g} ({check.description}); allowed: at most {check.limit:g}"
+
+
+def refuse_unknown_failures(checks: Iterable[Check], known: Iterable[str]) -> None:
+    """Refuse failed checks of other subjects than those that are known to fail.
+
+    Raises
+    ------
+    ValueError
+        Listing the checks that failed and are not known to, and the subjects that are known to fail and do not.
+    """
+    failed = [check for check in checks if not check.passed]
+    known = list(known)
+    passing = sorted(set(known) - {check.subject for check in failed})
+    lines = [told(check) for check in failed if check.subject not in known]
+    lines += [f"{subject}: is said to fail, and all of its checks passed" for subject in passing]
+    if lines:
+        raise ValueError("\n".join(lines))
+
+
 def write_checks(checks: Iterable[Check], path: str | os.PathLike) -> None:
     """Write findings to a JSON file."""
     rows = [asdict(check) for check in checks]

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).parents[1]
-PARTS = ("Snakefile", "icha", "workflow", "config", "profiles")
+PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
+PARTS += ("pyproject.toml", "uv.lock", "README.md")
 SMOKE = "config/campaigns/smoke.yaml"
 
 
@@ -31,13 +32,17 @@ def snakemake(project, *arguments, configuration=SMOKE):
 
 
 def copy_project(source, target):
-    """Copy the program's files, as a clone does."""
+    """Copy the program's files, and commit them, as a clone has them."""
     target.mkdir(parents=True)
     for part in PARTS:
         if (source / part).is_dir():
             shutil.copytree(source / part, target / part, ignore=shutil.ignore_patterns("__pycache__"))
         else:
             shutil.copyfile(source / part, target / part)
+    who = {"NAME": "nobody", "EMAIL": "nobody@example.org", "DATE": "2000-01-01T00:00:00Z"}
+    told = {f"GIT_{role}_{key}": value for role in ("AUTHOR", "COMMITTER") for key, value in who.items()}
+    for command in (["init", "--quiet"], ["add", "."], ["commit", "--quiet", "--message", "A copy"]):
+        subprocess.run(["git", *command], cwd=target, env=os.environ | told, check=True)
     return target
 
 

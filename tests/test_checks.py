@@ -7,7 +7,16 @@ import small_campaign as small
 
 import icha
 from icha.campaign import RunLabels, campaign_tree
-from icha.checks import Check, check_campaign, check_run, check_solution, read_checks, worst, write_checks
+from icha.checks import (
+    Check,
+    check_campaign,
+    check_run,
+    check_solution,
+    read_checks,
+    refuse_unknown_failures,
+    worst,
+    write_checks,
+)
 from icha.reference.boundary_elements import boundary_elements
 
 
@@ -246,6 +255,18 @@ def test_failed_runs_have_one_check_with_their_reason():
     }
     assert sum(check.subject in failed for check in checks) == 2
     assert sum(check.name == "completed" and check.passed for check in checks) == 2
+
+
+def test_only_failures_that_are_known_are_let_through():
+    checks = [Check("a", 2.0, 1.0, False, "what a is", "x"), Check("a", 0.0, 1.0, True, "what a is", "y")]
+    refuse_unknown_failures(checks, ["x"])
+    refuse_unknown_failures(checks[1:], [])
+    with pytest.raises(ValueError, match="^x: a: 2 .what a is.; allowed: at most 1$"):
+        refuse_unknown_failures(checks, [])
+    with pytest.raises(ValueError, match="^y: is said to fail, and all of its checks passed$"):
+        refuse_unknown_failures(checks, ["x", "y"])
+    with pytest.raises(ValueError, match="^z: is said to fail"):
+        refuse_unknown_failures(checks, ["x", "z"])
 
 
 def test_worst_prefers_failures_and_then_large_values():

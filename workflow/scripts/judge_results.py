@@ -2,7 +2,7 @@
 
 from job import logged
 
-from icha.checks import COMPLETED, read_checks
+from icha.checks import read_checks, told
 from icha.files import whole_file
 
 
@@ -15,17 +15,11 @@ def judge_results(checks, output):
         Listing the checks that failed.
     """
     found = read_checks(checks)
-    failed = [_said(check) for check in found if not check.passed]
+    failed = [told(check) for check in found if not check.passed]
     if failed:
         raise ValueError("\n".join([f"{len(failed)} of {len(found)} checks failed", *failed]))
     with whole_file(output) as temporary:
         temporary.write_text(f"all {len(found)} checks passed\n", encoding="utf-8")
-
-
-def _said(check):
-    if check.name == COMPLETED:
-        return f"{check.subject}: the run failed: {check.description}"
-    return f"{check.subject}: {check.name}: {check.value:.3g} ({check.description}); allowed: at most {check.limit:g}"
 
 
 if "snakemake" in globals():
