@@ -261,11 +261,11 @@ def test_only_failures_that_are_known_are_let_through():
     checks = [Check("a", 2.0, 1.0, False, "what a is", "x"), Check("a", 0.0, 1.0, True, "what a is", "y")]
     refuse_unknown_failures(checks, ["x"])
     refuse_unknown_failures(checks[1:], [])
-    with pytest.raises(ValueError, match="^x: a: 2 .what a is.; allowed: at most 1$"):
+    with pytest.raises(ValueError, match=r"^x: a: 2 .what a is.; allowed: at most 1$"):
         refuse_unknown_failures(checks, [])
-    with pytest.raises(ValueError, match="^y: is said to fail, and all of its checks passed$"):
+    with pytest.raises(ValueError, match=r"^y: is said to fail, and all of its checks passed$"):
         refuse_unknown_failures(checks, ["x", "y"])
-    with pytest.raises(ValueError, match="^z: is said to fail"):
+    with pytest.raises(ValueError, match=r"^z: is said to fail"):
         refuse_unknown_failures(checks, ["x", "z"])
 
 
