@@ -52,8 +52,9 @@ def test_everything_that_was_promised_is_there(smoke):
         "verdict.txt",
         "config.used.yaml",
         "report.html",
-        "publish/SHA256SUMS",
-        "publish/dataset/smoke.nc",
+        "publish/smoke-0.0.1/SHA256SUMS",
+        "publish/smoke-0.0.1/dataset/smoke.nc",
+        "publish/smoke-0.0.1.zip",
     ):
         assert name in files
     figures = sorted(file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py"))
@@ -104,15 +105,13 @@ def test_all_checks_passed(smoke):
 
 
 def test_the_deposit_can_be_verified(smoke):
+    deposit = smoke / "results/smoke/publish/smoke-0.0.1"
     done = subprocess.run(
-        ["sha256sum", "--check", "--strict", "SHA256SUMS"],
-        cwd=smoke / "results/smoke/publish",
-        capture_output=True,
-        text=True,
+        ["sha256sum", "--check", "--strict", "SHA256SUMS"], cwd=deposit, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    listed = {line.split("  ")[1] for line in (smoke / "results/smoke/publish/SHA256SUMS").read_text().splitlines()}
-    there = {name.removeprefix("publish/") for name in results_of(smoke) if name.startswith("publish/")}
+    listed = {line.split("  ")[1] for line in (deposit / "SHA256SUMS").read_text().splitlines()}
+    there = {str(file.relative_to(deposit)) for file in deposit.rglob("*") if file.is_file()}
     assert there == listed | {"SHA256SUMS"}
 
 
