@@ -1,0 +1,295 @@
+"""Put a deposit to the validators of others, without any network.
+
+    .venv-validators/bin/python tests/validators/validate.py DEPOSIT
+
+DEPOSIT is its folder or its zip archive. One line for each validator; the status is 1 if one of them fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import logging
+import os
+import subprocess
+import sys
+import tempfile
+import traceback
+import warnings
+import zipfile
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from importlib import resources
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+CRATE = "ro-crate-metadata.json"
+PROFILE = "provenance-run-crate-0.5"
+CONVENTIONS = "cf:1.11"
+
+
+class Outcome(NamedTuple):
+    """What a validator says: what it looked at, what is wrong, and what could be better."""
+
+    counted: str
+    problems: list[str]
+    remarks: tuple[str, ...] | list[str] = ()
+
+
+def check_checksums(folder: Path) -> Outcome:
+    """`sha256sum --check`: the files are those that the list names."""
+    listed = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
+    done = subprocess.run(
+        ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"], cwd=folder, capture_output=True, text=True
+    )
+    problems = (done.stdout + done.stderr).splitlines()
+    if done.returncode and not problems:
+        problems = [f"status {done.returncode}"]
+    return Outcome(f"{len(listed)} files", problems)
+
+
+def check_crate(folder: Path) -> Outcome:
+    """roc-validator: the crate is a Provenance Run Crate; what is only recommended is a remark."""
+    from rocrate_validator import services
+    from rocrate_validator.models import Severity
+
+    with tempfile.TemporaryDirectory() as scratch:
+        cache = Path(scratch, "cache")
+        _cache_contexts(cache)
+        settings = services.ValidationSettings(
+            rocrate_uri=str(folder),
+            profile_identifier=PROFILE,
+            requirement_severity=Severity.RECOMMENDED,
+            offline=True,
+            cache_path=cache,
+        )
+        result = services.validate(settings)
+        found: dict[Severity, list[str]] = {Severity.REQUIRED: [], Severity.RECOMMENDED: []}
+        for issue in result.get_issues(Severity.RECOMMENDED):
+            found[issue.severity].append(f"{issue.violatingEntity or './'}: {issue.message}")
+        checks = len(result.executed_checks)
+    return Outcome(
+        f"{checks} checks of {PROFILE}", sorted(found[Severity.REQUIRED]), sorted(found[Severity.RECOMMENDED])
+    )
+
+
+def _cache_contexts(path: Path) -> None:
+    """Put the JSON-LD context of RO-Crate 1.1, which comes with `rocrate`, where the validator looks for it."""
+    from requests.adapters import HTTPAdapter
+    from requests_cache import CachedSession
+    from urllib3 import HTTPResponse
+
+    context = (resources.files("rocrate") / "data" / "ro-crate.jsonld").read_bytes()
+
+    class Shelf(HTTPAdapter):
+        """Answers from what is at hand."""
+
+        def send(self, request, **_):
+            headers = {"Content-Type": "application/ld+json"}
+            body = HTTPResponse(io.BytesIO(context), headers, status=200, preload_content=False)
+            return self.build_response(request, body)
+
+    with CachedSession(str(path), backend="sqlite", expire_after=-1) as session:
+        session.mount("https://", Shelf())
+        session.get("https://w3id.org/ro/crate/1.1/context").raise_for_status()
+
+
+def check_actions(folder: Path) -> Outcome:
+    """runcrate: another reader of such crates can list what was run."""
+    from runcrate.report import dump_crate_actions
+
+    crate = folder / CRATE
+    expected = sum("CreateAction" in _types(entity) for entity in json.loads(crate.read_bytes())["@graph"])
+    text = io.StringIO()
+    dump_crate_actions(folder, text)
+    listed = sum(line.startswith("action: ") for line in text.getvalue().splitlines())
+    problems = [] if listed == expected > 0 else [f"{listed} of {expected} actions are listed"]
+    return Outcome(f"{listed} actions", problems)
+
+
+def _types(entity: dict) -> list[str]:
+    types = entity["@type"]
+    return types if isinstance(types, list) else [types]
+
+
+def check_citation(folder: Path) -> Outcome:
+    """cffconvert: CITATION.cff is valid."""
+    from cffconvert import Citation
+
+    citation = Citation((folder / "CITATION.cff").read_text(encoding="utf-8"))
+    try:
+        citation.validate()
+    except Exception as error:
+        return Outcome("CITATION.cff", [str(error).strip().splitlines()[0]])
+    return Outcome(f"CITATION.cff {citation.cffversion}", [])
+
+
+def check_datacite(folder: Path) -> Outcome:
+    """The schema of DataCite 4.5, and its XML can be made from it."""
+    from datacite import schema45
+
+    metadata = json.loads((folder / "datacite.json").read_bytes())
+    problems = _violations(schema45.validator, metadata)
+    if not problems:
+        schema45.tostring(metadata)
+    return Outcome(f"{len(metadata)} properties", problems)
+
+
+def check_zenodo(folder: Path) -> Outcome:
+    """A schema written after Zenodo's documentation of its deposit API; there is none of Zenodo's own to be had."""
+    from jsonschema import Draft7Validator, FormatChecker
+
+    schema = json.loads(Path(__file__).with_name("zenodo.schema.json").read_bytes())
+    metadata = json.loads((folder / ".zenodo.json").read_bytes())
+    problems = _violations(Draft7Validator(schema, format_checker=FormatChecker()), metadata)
+    return Outcome(f"{len(metadata)} properties", problems)
+
+
+def _violations(validator, metadata: dict) -> list[str]:
+    return sorted(f"{'/'.join(map(str, error.path))}: {error.message}" for error in validator.iter_errors(metadata))
+
+
+def check_conventions(folder: Path) -> Outcome:
+    """compliance-checker: every group of every netCDF file keeps to CF 1.11; its advice of low weight is a remark."""
+    paths = sorted(folder.rglob("*.nc"))
+    with ProcessPoolExecutor() as processes:
+        answers = [answer for found in processes.map(_conventions_of, paths) for answer in found]
+    problems, remarks = [], []
+    for answer in answers:
+        problems += [f"{answer.place.relative_to(folder)}: {problem}" for problem in answer.problems]
+        remarks += [f"{answer.place.relative_to(folder)}: {remark}" for remark in answer.remarks]
+    score, out_of = (sum(points) for points in zip(*(answer.points for answer in answers), strict=True))
+    return Outcome(f"{score} of {out_of} points, {len(answers)} groups of {len(paths)} files", problems, remarks)
+
+
+class Conformance(NamedTuple):
+    """What compliance-checker says of one group of a file."""
+
+    place: Path
+    points: tuple[int, int]
+    problems: list[str]
+    remarks: list[str]
+
+
+def _conventions_of(path: Path) -> list[Conformance]:
+    """CF of one netCDF file, group by group."""
+    from compliance_checker.base import BaseCheck
+    from compliance_checker.suite import CheckSuite
+    from flat import flat_files
+
+    suite = CheckSuite()
+    suite.load_all_available_checkers()
+    answers = []
+    with tempfile.TemporaryDirectory() as scratch:
+        for group, file in flat_files(path, Path(scratch)):
+            with suite.load_dataset(str(file)) as data:
+                results, failed = suite.run_all(data, [CONVENTIONS])[CONVENTIONS]
+            problems, remarks = [f"{name} could not be run" for name in failed], []
+            score, out_of = 0, 0
+            for result in results:
+                points = result.value if isinstance(result.value, tuple) else (int(bool(result.value)), 1)
+                score, out_of = score + points[0], out_of + points[1]
+                if points[0] < points[1]:
+                    told = remarks if result.weight == BaseCheck.LOW else problems
+                    told += [f"{result.name}: {message}" for message in result.msgs or ["failed"]]
+            answers.append(Conformance(path / group.strip("/"), (score, out_of), problems, remarks))
+    return answers
+
+
+def check_units(folder: Path) -> Outcome:
+    """cf-units: every unit of every variable is one that UDUNITS knows."""
+    import netCDF4
+    from cf_units import Unit
+
+    where: dict[str, str] = {}
+    for path in sorted(folder.rglob("*.nc")):
+        with netCDF4.Dataset(path) as data:
+            pending = [data]
+            while pending:
+                group = pending.pop()
+                pending += group.groups.values()
+                for name, variable in group.variables.items():
+                    if "units" in variable.ncattrs():
+                        place = f"{path.relative_to(folder)}:{group.path.rstrip('/')}/{name}"
+                        where.setdefault(str(variable.units), place)
+    problems = []
+    for unit, place in where.items():
+        try:
+            Unit(unit)
+        except ValueError as error:
+            problems.append(f"{place}: {error}")
+    return Outcome(f"{len(where)} units", problems)
+
+
+VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
+    "sha256sum": check_checksums,
+    "roc-validator": check_crate,
+    "runcrate": check_actions,
+    "cffconvert": check_citation,
+    "datacite": check_datacite,
+    "zenodo": check_zenodo,
+    "compliance-checker": check_conventions,
+    "cf-units": check_units,
+}
+
+
+def validate(folder: Path, names: list[str], most: int) -> bool:
+    """Run validators and print what they say; whether all are content."""
+    good = True
+    for name in names:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            try:
+                outcome = VALIDATORS[name](folder)
+            except Exception as error:
+                lines = traceback.format_exception(error)
+                outcome = Outcome("could not be run", ["".join(lines).strip()])
+        good &= not outcome.problems
+        verdict = "failed" if outcome.problems else "passed"
+        print(f"{name}: {verdict}; {outcome.counted}, {len(outcome.problems)} problems, {len(outcome.remarks)} remarks")
+        for kind, messages in (("problem", outcome.problems), ("remark", outcome.remarks)):
+            for message in messages[:most]:
+                print(f"  {kind}: {message}")
+            if len(messages) > most:
+                print(f"  … and {len(messages) - most} more (--all)")
+    return good
+
+
+def root_of(folder: Path) -> Path:
+    """The folder of the crate in an archive, which may have one folder around it."""
+    if not (folder / CRATE).exists():
+        inner = [path.parent for path in folder.glob(f"*/{CRATE}")]
+        if len(inner) != 1:
+            sys.exit(f"no deposit: there is no {CRATE} in it")
+        return inner[0]
+    return folder
+
+
+def main() -> int:
+    """Validate what the command line names."""
+    parser = argparse.ArgumentParser(description="Put a deposit to the validators of others, without any network.")
+    parser.add_argument("deposit", type=Path, help="a folder or a zip archive")
+    parser.add_argument("--only", nargs="+", choices=VALIDATORS, default=list(VALIDATORS), metavar="NAME")
+    parser.add_argument("--all", action="store_true", help="all messages, and not the first five of a kind")
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore")
+    logging.disable(logging.WARNING)
+    most = sys.maxsize if arguments.all else 5
+    if arguments.deposit.is_dir():
+        return 0 if validate(arguments.deposit.resolve(), arguments.only, most) else 1
+    if not zipfile.is_zipfile(arguments.deposit):
+        parser.error(f"{arguments.deposit} is neither a folder nor a zip archive")
+    with tempfile.TemporaryDirectory() as scratch:
+        with zipfile.ZipFile(arguments.deposit) as archive:
+            archive.extractall(scratch)
+        return 0 if validate(root_of(Path(scratch)), arguments.only, most) else 1
+
+
+if __name__ == "__main__":
+    status = main()
+    sys.stdout.flush()
+    # rocrate's and the validator's clean-up at exit would look for a cache that is gone already.
+    os._exit(status)
