@@ -74,7 +74,12 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     fail(unread)
     campaign = campaign.with_topographies(topographies)
     fail([*problems(campaign), *_problems_of_measurements(campaign)])
-    return Configuration(campaign, yaml.safe_dump(written, sort_keys=False, allow_unicode=True, width=110), str(path))
+    return Configuration(campaign, dumped(written), str(path))
+
+
+def dumped(content: Mapping) -> str:
+    """The text of a configuration, in the order in which it was written."""
+    return yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True, width=110)
 
 
 def read_yaml(path: Path) -> dict:

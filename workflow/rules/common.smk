@@ -29,6 +29,7 @@ from icha.configuration.expansion import (
     surface_cases,
     surface_settings,
 )
+from icha.configuration.inputs import with_files_beside_it
 from icha.costs import job_threads
 from icha.publication.attributes import discovery_attributes
 
@@ -41,6 +42,10 @@ RESULTS = f"results/{CAMPAIGN.name}"
 LOGS = f"{RESULTS}/logs"
 BENCHMARKS = f"{RESULTS}/benchmarks"
 CONFIG_USED = f"{RESULTS}/config.used.yaml"
+# The configuration is kept with copies of the files that it names (of a kept configuration, they are there).
+CONFIG_TEXT, NAMED_FILES = with_files_beside_it(CONFIGURATION)
+INPUTS = {f"{RESULTS}/{place}": file for place, file in NAMED_FILES.items()}
+COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() != Path(file).resolve()}
 SURFACES = [f"{RESULTS}/surfaces/{name}/seed{seed}.nc" for name, seed in surface_cases(CAMPAIGN)]
 RUNS = [f"{RESULTS}/runs/{path}" for path in CASES]
 THEORIES = [f"{RESULTS}/references/{name}.nc" for name in dict.fromkeys(name for name, _ in surface_cases(CAMPAIGN))]

@@ -4,8 +4,11 @@
 
 
 rule configuration:
+    input:
+        list(COPIED.values()),
     output:
         CONFIG_USED,
+        list(COPIED),
     log:
         f"{LOGS}/configuration.log",
     benchmark:
@@ -17,7 +20,7 @@ rule configuration:
         mem_mb=200,
         runtime=2,
     params:
-        text=CONFIGURATION.text,
+        text=CONFIG_TEXT,
         code=code_of("write_configuration.py"),
     message:
         "Writing the configuration as used"

@@ -6,7 +6,19 @@ def what_is_published(wildcards):
     refuse_unpublishable(CONFIGURATION, workflow.basedir)
     # The verdict fails with the checks; with failures that are known, they are compared with these by the deposit.
     judged = [CHECKS] if PUBLICATION.known_failures else [CHECKS, VERDICT]
-    return [CONFIG_USED, DATASET, COMPARISON, *judged, REPORT, *FIGURES, *SURFACES, *RUNS, *REFERENCES, *MODEL_ERROR]
+    return [
+        CONFIG_USED,
+        *INPUTS,
+        DATASET,
+        COMPARISON,
+        *judged,
+        REPORT,
+        *FIGURES,
+        *SURFACES,
+        *RUNS,
+        *REFERENCES,
+        *MODEL_ERROR,
+    ]
 
 
 rule deposit:

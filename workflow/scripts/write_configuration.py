@@ -1,16 +1,22 @@
 """Write the configuration of a campaign as it was used: defaults of the file with the command line's values."""
 
+import shutil
+
 from job import logged
 
 from icha.files import whole_file
 
 
-def write_configuration(output, *, text):
-    """Write `text` to the file `output`."""
+def write_configuration(output, *, text, copies):
+    """Write `text` to the file `output`, and files to the paths of their copies."""
+    for copy, file in copies.items():
+        with whole_file(copy) as temporary:
+            shutil.copyfile(file, temporary)
     with whole_file(output) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 if "snakemake" in globals():
     with logged(snakemake.log[0]):
-        write_configuration(snakemake.output[0], text=snakemake.params.text)
+        output, *copies = snakemake.output
+        write_configuration(output, text=snakemake.params.text, copies=dict(zip(copies, snakemake.input, strict=True)))
