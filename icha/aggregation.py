@@ -10,6 +10,7 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
 from icha.campaign import LABELS, loading_stops, reduced_gap
+from icha.discovery import DERIVED, collected
 from icha.ensemble import Ensemble, ensemble
 from icha.records import COMPLETE
 
@@ -141,13 +142,14 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
             variables[f"{label.removeprefix('rms_')}_spread{suffix}"] = derived(
                 _spread, label, f"largest over smallest A/A0 of all {many}, less 1"
             )
-    title = {
-        "title": f"Comparison of the runs of study {study.attrs.get('study', '')}".rstrip(),
-        "summary": "Contact area and mean separation at loads common to all runs, by monotone interpolation.",
-        "Conventions": "CF-1.11",
-    }
-    kept = {name: study.attrs[name] for name in ("study", "source", "license") if study.attrs.get(name)}
-    return xr.Dataset(variables, coords, title | kept | dict(attrs))
+    described = collected(
+        f"Comparison of the runs of study {study.attrs.get('study', '')}".rstrip(),
+        "Contact area and mean separation at loads common to all runs, by monotone interpolation.",
+        DERIVED,
+        [study.attrs],
+    )
+    kept = {name: study.attrs[name] for name in ("study", "license") if study.attrs.get(name)}
+    return xr.Dataset(variables, coords, described | kept | dict(attrs))
 
 
 def _seed_count(complete):
@@ -232,8 +234,13 @@ def _common_grid(loads):
 def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.DataTree:
     """`compare_runs` for every study of a campaign, as a tree of the same shape."""
     groups = {f"/{name}": compare_runs(node.to_dataset()) for name, node in tree.children.items()}
-    root = {"title": "Comparison of the runs of every study", "Conventions": "CF-1.11"} | dict(attrs)
-    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root)} | groups)
+    root = collected(
+        "Comparison of the runs of every study",
+        "Contact area and mean separation of all runs of a study at common loads, a group for each study.",
+        DERIVED,
+        [group.attrs for group in groups.values()],
+    )
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
 
 
 def at_round_pressures(run: xr.Dataset) -> list[tuple[float, float, float]]:

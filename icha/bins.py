@@ -5,8 +5,58 @@ bulk is, 20 per decade in the tails. JKR pressures tend to minus infinity at the
 long tail.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 GAPS_PER_DECADE = 20
 GAP_BINS = np.concatenate([[0.0], np.logspace(-4, 1.5, 111)])
 PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5, 301), 5 * np.logspace(0, 2, 41)[1:]])
+
+# Lower and upper edge of a bin, as CF has bounds.
+BOUND = "bound"
+
+
+def bin_table(quantity: str, units: str, over: str = "") -> dict[str, tuple[tuple[str, ...], str, str]]:
+    """Dimensions, units and long names of the variables that say where the bins of a quantity are.
+
+    `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
+    bounds (CF 1.11, section 7.1), which have its units and its long name. In Pa it must not be a coordinate
+    variable, along a dimension of its own name, which CF would take for a height.
+
+    Parameters
+    ----------
+    quantity : what is binned.
+    units : of the edges.
+    over : by what the quantity is divided, if by anything.
+    """
+    over = f" over {over}" if over else ""
+    bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
+    return {
+        f"{bins}_edges": ((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
+        f"{bins}_centre": ((bins,), units, inside),
+        f"{bins}_bounds": ((bins, BOUND), units, inside),
+    }
+
+
+def bin_values(quantity: str, edges: np.ndarray) -> dict[str, np.ndarray]:
+    """Values of the variables of `bin_table`."""
+    return {
+        f"{quantity}_bin_edges": edges,
+        f"{quantity}_bin_centre": (edges[:-1] + edges[1:]) / 2,
+        f"{quantity}_bin_bounds": np.column_stack([edges[:-1], edges[1:]]),
+    }
+
+
+def with_bounds(data: xr.Dataset) -> xr.Dataset:
+    """The dataset whose bin centres are coordinates and name their bounds."""
+    centres = {name: variable for name, variable in data.variables.items() if str(name).endswith("_bin_centre")}
+    for name, variable in centres.items():
+        variable.attrs |= {"bounds": name.replace("_centre", "_bounds"), "comment": "middle of the bin"}
+    # Behind all others, where they are in a dataset that is read.
+    return data.drop_vars(centres).assign_coords(centres)

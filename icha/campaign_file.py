@@ -21,6 +21,8 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
+from icha.bins import bin_table
+from icha.discovery import COLLECTED, collected
 from icha.files import whole_file
 from icha.labels import RunLabels
 from icha.netcdf import (
@@ -63,8 +65,8 @@ _VARIES_WITH = {
     "period": ("surface",),
     "grid": ("surface",),
     "boundary": ("surface",),
-    "gap_bin_edges": ("surface", "seed", "rms_slope"),
-    "pressure_bin_edges": ("rms_slope", "material"),
+    **dict.fromkeys(bin_table("gap", "m"), ("surface", "seed", "rms_slope")),
+    **dict.fromkeys(bin_table("pressure", "Pa"), ("rms_slope", "material")),
     "snapshot_kind": (),
     "snapshot_target": (),
     "control": (),
@@ -117,7 +119,9 @@ def write_campaign(
     with tempfile.TemporaryFile(dir=path.parent) as spool:
         studies = _arranged(_taken(runs, spool), design)
         with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
-            file.setncatts({"Conventions": "CF-1.11"} | dict(attrs))
+            models = [study.model.attrs for study in studies]
+            described = collected("Campaign of rough contacts", _STUDIES, COLLECTED, models)
+            file.setncatts(described | dict(attrs))
             # All is defined before anything is written, which is quicker: see icha.netcdf.
             groups = [_Group(file.createGroup(study.name), study, attrs) for study in studies]
             for group in groups:
@@ -326,6 +330,14 @@ class _Study:
         return not there.all() or any((self.sizes_of(dim)[having] != self.sizes[dim]).any() for dim in own)
 
 
+_STUDIES = "The runs of every study, a group for each."
+_LAYOUT = (
+    "Variables of the runs along surface, seed, rms_slope and material. Spots and events of all runs, in this order of "
+    "the runs, are ragged arrays along spot and event: the variables with an instance_dimension say where along that "
+    "dimension each belongs, from 0; those that agree in all of them are of one snapshot of one run."
+)
+
+
 class _Column(NamedTuple):
     """A variable of the runs in the file: the labels it varies with, its own dimensions, what stands for no value."""
 
@@ -358,18 +370,14 @@ class _Group:
         self.counts = {dim: int(study.sizes_of(dim).sum()) for dim in RAGGED if dim in model.dims}
         self.sizes = dict(zip(LABELS, study.shape, strict=True)) | study.sizes | self.counts
         define_dimensions(group, self.sizes)
-        own = {
-            name: model.attrs[name]
-            for name in ("Conventions", "source", "license", "references")
-            if name in model.attrs
-        }
+        own = {"study": study.name} | {name: model.attrs[name] for name in ("license",) if name in model.attrs}
         # Not the checksum of one of its runs.
         own |= {name: attrs[name] for name in ("config_sha256",) if name in attrs}
-        group.setncatts({"title": f"Study {study.name}", "study": study.name} | own)
+        group.setncatts(collected(f"Study {study.name}", _LAYOUT, COLLECTED, [model.attrs]) | own)
 
         names = [name for name in model.variables if name not in LABELS]
         dims = {name: sum(study.dims_of(name), ()) for name in names} | {label: (label,) for label in LABELS}
-        coordinates = coordinates_of(dims, {*model.coords, *LABELS})
+        coordinates = coordinates_of(model.variables, {*model.coords, *LABELS}, dims)
         varying = [own for along, own in map(study.dims_of, names) if along == LABELS]
         largest = max(math.prod(self._shape((), own)) for own in varying)
         self.block = self._block(LABELS, largest)
@@ -390,7 +398,11 @@ class _Group:
                 f"{dim}_{label}",
                 (dim,),
                 np.int32,
-                {"units": "1", "long_name": f"position of the {dim}'s run along {label}, from 0"},
+                {
+                    "units": "1",
+                    "long_name": f"position of the {dim}'s run along {label}, from 0",
+                    "instance_dimension": label,
+                },
                 **self._storage((), (dim,)),
             )
             for dim in self.counts

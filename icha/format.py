@@ -40,7 +40,7 @@ RUN_VARIABLES = {
     "nominal_pressure": Promised(("step",), "Pa"),
     "contact_area_fraction": Promised(("step",), "1"),
     "spot_count": Promised(("step",), "1"),
-    "contact_stiffness": Promised(("step",), "Pa m-1"),
+    "contact_stiffness": Promised(("step",), "Pa m^-1"),
     "residual": Promised(("step",), "1"),
     "converged": Promised(("step",), "1"),
     "branch": Promised(("step",), "1"),
@@ -57,38 +57,42 @@ RUN_VARIABLES = {
     "snapshot_kind": Promised(("snapshot",), "1", SNAPSHOTS),
     "snapshot_target": Promised(("snapshot",), "1", SNAPSHOTS),
     "overlap_fraction": Promised(("snapshot",), "1", SNAPSHOTS),
-    "gap_density": Promised(("snapshot", "gap_bin"), "m-1", SNAPSHOTS),
-    "pressure_density": Promised(("snapshot", "pressure_bin"), "Pa-1", SNAPSHOTS),
+    "gap_density": Promised(("snapshot", "gap_bin"), "m^-1", SNAPSHOTS),
+    "pressure_density": Promised(("snapshot", "pressure_bin"), "Pa^-1", SNAPSHOTS),
     "pressure_bin_mean": Promised(("snapshot", "pressure_bin"), "Pa", SNAPSHOTS),
     "gap_bin_edges": Promised(("gap_edge",), "m", SNAPSHOTS),
     "pressure_bin_edges": Promised(("pressure_edge",), "Pa", SNAPSHOTS),
+    "gap_bin_centre": Promised(("gap_bin",), "m", SNAPSHOTS),
+    "gap_bin_bounds": Promised(("gap_bin", "bound"), "m", SNAPSHOTS),
+    "pressure_bin_centre": Promised(("pressure_bin",), "Pa", SNAPSHOTS),
+    "pressure_bin_bounds": Promised(("pressure_bin", "bound"), "Pa", SNAPSHOTS),
     "spot_snapshot": Promised(("spot",), "1", SNAPSHOTS),
     "spot_x": Promised(("spot",), "m", SNAPSHOTS),
     "spot_y": Promised(("spot",), "m", SNAPSHOTS),
     "spot_radius": Promised(("spot",), "m", SNAPSHOTS),
     "spot_force": Promised(("spot",), "N", SNAPSHOTS),
     "contact_modulus": Promised((), "Pa"),
-    "surface_energy": Promised((), "J m-2"),
+    "surface_energy": Promised((), "J m^-2"),
     "interaction_range": Promised((), "m"),
     "rms_slope": Promised((), "1"),
     "rms_height": Promised((), "m"),
     "period": Promised((), "m"),
     "seed": Promised((), "1"),
-    "work": Promised(("step",), "J m-2", WAY_BACK),
-    "stored_energy": Promised(("step",), "J m-2", WAY_BACK),
-    "dissipated_by_jump_in": Promised(("step",), "J m-2", WAY_BACK),
-    "dissipated_by_jump_off": Promised(("step",), "J m-2", WAY_BACK),
-    "dissipated_by_coalescence": Promised(("step",), "J m-2", WAY_BACK),
-    "dissipated_by_load_jump": Promised(("step",), "J m-2", WAY_BACK),
+    "work": Promised(("step",), "J m^-2", WAY_BACK),
+    "stored_energy": Promised(("step",), "J m^-2", WAY_BACK),
+    "dissipated_by_jump_in": Promised(("step",), "J m^-2", WAY_BACK),
+    "dissipated_by_jump_off": Promised(("step",), "J m^-2", WAY_BACK),
+    "dissipated_by_coalescence": Promised(("step",), "J m^-2", WAY_BACK),
+    "dissipated_by_load_jump": Promised(("step",), "J m^-2", WAY_BACK),
     "pull_off_pressure": Promised((), "Pa", WAY_BACK),
     "pull_off_separation": Promised((), "m", WAY_BACK),
     "detachment_pressure": Promised((), "Pa", WAY_BACK),
-    "hysteresis_loss": Promised((), "J m-2", WAY_BACK),
-    "loss_by_jump_in": Promised((), "J m-2", WAY_BACK),
-    "loss_by_jump_off": Promised((), "J m-2", WAY_BACK),
-    "loss_by_coalescence": Promised((), "J m-2", WAY_BACK),
-    "loss_by_load_jump": Promised((), "J m-2", WAY_BACK),
-    "loss_unattributed": Promised((), "J m-2", WAY_BACK),
+    "hysteresis_loss": Promised((), "J m^-2", WAY_BACK),
+    "loss_by_jump_in": Promised((), "J m^-2", WAY_BACK),
+    "loss_by_jump_off": Promised((), "J m^-2", WAY_BACK),
+    "loss_by_coalescence": Promised((), "J m^-2", WAY_BACK),
+    "loss_by_load_jump": Promised((), "J m^-2", WAY_BACK),
+    "loss_unattributed": Promised((), "J m^-2", WAY_BACK),
     "event_kind": Promised(("event",), "1", WAY_BACK),
     "event_step": Promised(("event",), "1", WAY_BACK),
     "event_x": Promised(("event",), "m", WAY_BACK),
@@ -105,16 +109,17 @@ SURFACE_VARIABLES = {
     "seed": Promised((), "1"),
     "rms_slope": Promised((), "1"),
     "rms_height": Promised((), "m"),
-    "rms_curvature": Promised((), "m-1"),
-    "spectral_moment_0": Promised((), "m2"),
+    "rms_curvature": Promised((), "m^-1"),
+    "spectral_moment_0": Promised((), "m^2"),
     "spectral_moment_2": Promised((), "1"),
-    "spectral_moment_4": Promised((), "m-2"),
+    "spectral_moment_4": Promised((), "m^-2"),
     "rolloff_wavelength": Promised((), "m", SYNTHESISED),
     "short_wavelength": Promised((), "m", SYNTHESISED),
     "hurst": Promised((), "1", SYNTHESISED),
     "measured_rms_slope": Promised((), "1", MEASURED),
-    "psd_wavevector": Promised(("psd_bin",), "rad m-1", MEASURED),
-    "power_spectrum": Promised(("psd_bin",), "m4", MEASURED),
+    "psd_wavevector": Promised(("psd_bin",), "rad m^-1", MEASURED),
+    "psd_wavevector_bounds": Promised(("psd_bin", "bound"), "rad m^-1", MEASURED),
+    "power_spectrum": Promised(("psd_bin",), "m^4", MEASURED),
 }
 
 # Dimensions of every variable of a run in a study of a campaign dataset: those of the run are added.
@@ -127,12 +132,18 @@ STUDY_VARIABLES = {name: Promised(DESIGN, "1") for name in ("status", "step_coun
 
 # Global attributes. Those of a campaign are written by the workflow, not by `icha.simulate`.
 ATTRIBUTES = {
-    RUN: ("title", "summary", "Conventions", "source", "references"),
-    SURFACE: ("title", "summary", "Conventions"),
-    CAMPAIGN: ("title", "summary", "Conventions", "campaign", "config_sha256", "license"),
+    RUN: ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level", "references"),
+    SURFACE: ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level"),
+    CAMPAIGN: (
+        *("title", "summary", "keywords", "Conventions", "source", "history", "processing_level", "references"),
+        *("campaign", "config_sha256", "license"),
+    ),
 }
 IN_CAMPAIGN = ("campaign", "study", "config_sha256", "license")
-_REFUSED_ATTRIBUTES = ("date_created", "date_modified", "history", "creator_name", "user", "host", "hostname")
+_REFUSED_ATTRIBUTES = ("date_created", "date_modified", "date_issued", "creator_email", "user", "host", "hostname")
+# A campaign dataset may name its makers, as a publication does.
+_MAKERS = ("creator_name", "creator_type", "creator_url", "creator_institution")
+_TIME = re.compile(r"\d{4}-\d\d|\d:\d\d")
 _BRANCHES = ("loading", "unloading")
 _WORDS = ("branch", "step_kind")
 
@@ -171,7 +182,7 @@ def flaws(kind: str, data: xr.Dataset | xr.DataTree) -> list[str]:
     kind, data : as `kind_of` gives them.
     """
     if kind == CAMPAIGN:
-        found = list(_flaws_of_attributes(data.attrs, ATTRIBUTES[CAMPAIGN]))
+        found = list(_flaws_of_attributes(data.attrs, ATTRIBUTES[CAMPAIGN], refused=_REFUSED_ATTRIBUTES))
         for name, node in data.children.items():
             found += [f"{name}: {flaw}" for flaw in _flaws_of_study(node.to_dataset())]
         return found
@@ -261,13 +272,15 @@ def _flaws_of_study(study):
     yield from _flaws_of_steps(numbers.reset_coords(drop=True).where(complete).assign(branch=study["branch"]), study)
 
 
-def _flaws_of_attributes(attributes, needed) -> Iterator[str]:
+def _flaws_of_attributes(attributes, needed, refused=(*_REFUSED_ATTRIBUTES, *_MAKERS)) -> Iterator[str]:
     for name in needed:
         if not str(attributes.get(name, "")).strip():
             yield f"attribute {name} is missing"
-    for name in _REFUSED_ATTRIBUTES:
+    for name in refused:
         if name in attributes:
             yield f"attribute {name} is there; allowed: nothing that tells who made a file, where or when"
+    if _TIME.search(str(attributes.get("history", ""))):
+        yield f"attribute history: {attributes['history']!r}; allowed: no times"
     sha256 = str(attributes.get("config_sha256", ""))
     if sha256 and not re.fullmatch("[0-9a-f]{64}", sha256):
         yield f"attribute config_sha256: {sha256!r}; allowed: 64 hexadecimal digits"

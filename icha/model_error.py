@@ -11,12 +11,16 @@ import numpy as np
 import xarray as xr
 from scipy.stats import wasserstein_distance
 
-from icha.bins import GAP_BINS, PRESSURE_BINS
+from icha.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
 from icha.campaign import LABELS, RAGGED, find_snapshot, select_run, spots_of
+from icha.discovery import DERIVED, collected
 from icha.labels import RunLabels, SolutionLabels
 from icha.observables import nodes_in_discs
 from icha.path import REDUCED_PRESSURE
 from icha.records import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, status_variable
+
+_TITLE = "Error of the model against boundary elements"
+_SUMMARY = "The same topographies, loads and ranges of attraction by the model and by boundary elements."
 
 AXES = (*LABELS, "reduced_pressure")
 
@@ -84,6 +88,7 @@ VARIABLES = {
         "P(p) E* h'rms of boundary elements in contact, over the nominal area",
     ),
 }
+_BINS = bin_table("gap", "1", "rms height") | bin_table("pressure", "1", "contact modulus and rms slope")
 _INTEGERS = {"solution_grid"}
 # Of these, mean and deviation over the seeds.
 SUMMARISED = (
@@ -127,7 +132,7 @@ def model_error(
     """
     select = cache(lambda labels: select_run(campaign, labels))
     entries: dict[str, dict[SolutionLabels, dict]] = {}
-    origins: dict[str, dict[str, set[str]]] = {}
+    origins: dict[str, list[dict[str, str]]] = {}
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)
         states = entries.setdefault(labels.entry, {})
@@ -145,23 +150,17 @@ def model_error(
             states[labels] = compare_state(run, at, solution)
         except ValueError as error:
             raise ValueError(f"{_name(labels)}: {error}") from None
-        for name in ("source", "references"):
-            parts = origins.setdefault(labels.entry, {}).setdefault(name, set())
-            parts.update(part.strip() for part in solution.attrs.get(name, "").split(";") if part.strip())
+        origins.setdefault(labels.entry, []).extend((run.attrs, solution.attrs))
     if not entries:
         raise ValueError("a model error needs at least one boundary-element solution")
     groups = {
         f"/{entry}": _entry_dataset(campaign, entry, states).assign_attrs(
-            {name: "; ".join(sorted(parts)) for name, parts in origins[entry].items() if parts}
+            collected(f"{_TITLE}, entry {entry}", _SUMMARY, DERIVED, origins.get(entry, []))
         )
         for entry, states in entries.items()
     }
-    root = {
-        "title": "Error of the model against boundary elements",
-        "summary": "The same topographies, loads and ranges of attraction by the model and by boundary elements.",
-        "Conventions": "CF-1.11",
-    } | dict(attrs)
-    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root)} | groups)
+    root = collected(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
 
 
 def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
@@ -358,11 +357,9 @@ def _entry_dataset(campaign, entry, states):
             described = f"standard deviation over the seeds: {long_name}"
             variables[f"{name}_deviation"] = _variable(others, deviation, "1", described)
             variables[f"{name}_deviation"].attrs["missing"] = "where fewer than two runs are complete"
-    variables["gap_bin_edges"] = _variable(("gap_edge",), GAP_BINS, "1", "edges of the gap bins over rms height")
-    variables["pressure_bin_edges"] = _variable(
-        ("pressure_edge",), PRESSURE_BINS, "1", "edges of the pressure bins over contact modulus and rms slope"
-    )
-    result = xr.Dataset(variables, coords, {"title": f"Entry {entry}", "entry": entry, "study": studies[0]})
+    edges = bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS)
+    variables |= {name: _variable(dims, edges[name], units, text) for name, (dims, units, text) in _BINS.items()}
+    result = with_bounds(xr.Dataset(variables, coords, {"entry": entry, "study": studies[0]}))
     own = study.sel(surface=axes["surface"], seed=axes["seed"], material=axes["material"])
     own = own.sel(rms_slope=axes["rms_slope"], method="nearest").assign_coords(rms_slope=result["rms_slope"])
     for name in ("contact_modulus", "surface_energy", "interaction_range", "tabor_parameter"):

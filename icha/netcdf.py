@@ -6,10 +6,14 @@ through them all whenever it turns from one to the other.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Collection, Hashable, Mapping
+from typing import TYPE_CHECKING
 
 import netCDF4
 import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FLOAT_FILL = 9.969209968386869e36
 INTEGER_FILL = -(2**31) + 1
@@ -66,19 +70,24 @@ def _define(group, name, dtype, dims, attrs, storage):
 
 
 def coordinates_of(
-    dims: Mapping[Hashable, tuple[Hashable, ...]], coordinates: Mapping[Hashable, object]
+    variables: Mapping[Hashable, xr.Variable],
+    coordinates: Collection[Hashable],
+    dims: Mapping[Hashable, tuple[Hashable, ...]] = {},
 ) -> dict[Hashable, str]:
     """The attribute `coordinates` (CF) of each variable that has coordinates besides those of its dimensions.
 
     Parameters
     ----------
-    dims : dimensions of all variables of a group, by name.
+    variables : all of a group, by name. Bounds of coordinates have no coordinates.
     coordinates : the names of those that are coordinates.
+    dims : dimensions of those that have others in the file.
     """
+    dims = {name: variable.dims for name, variable in variables.items()} | dict(dims)
+    without = {*coordinates, *(variable.attrs.get("bounds") for variable in variables.values())}
     auxiliary = sorted(name for name in coordinates if dims[name] != (name,))
     found = {
         name: " ".join(each for each in auxiliary if set(dims[each]) <= set(own))
         for name, own in dims.items()
-        if name not in coordinates
+        if name not in without
     }
     return {name: text for name, text in found.items() if text}

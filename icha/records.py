@@ -14,6 +14,8 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
+from icha.bins import BOUND
+from icha.discovery import INPUT, discovery
 from icha.files import whole_file
 from icha.netcdf import (
     COMPRESSION,
@@ -27,7 +29,7 @@ from icha.netcdf import (
     define_text,
     is_text,
 )
-from icha.roughness import SpectralMoments, radial_power_spectrum, spectral_moments
+from icha.roughness import SpectralMoments, radial_power_spectrum, ring_edges, spectral_moments
 from icha.surface import PERIODIC, Surface
 
 # Larger arrays are heights: a fifth less space would take half a minute for 8192 nodes a side.
@@ -85,7 +87,7 @@ def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.V
     """Make the dimensions and variables of a dataset in a group of a file; give them with what is to be written."""
     define_dimensions(group, dataset.sizes)
     group.setncatts(dataset.attrs)
-    coordinates = coordinates_of({name: v.dims for name, v in dataset.variables.items()}, dataset.coords)
+    coordinates = coordinates_of(dataset.variables, dataset.coords)
     defined = []
     for name, variable in dataset.variables.items():
         attrs = variable.attrs | ({"coordinates": coordinates[name]} if name in coordinates else {})
@@ -245,6 +247,8 @@ def write_surface(
 
     moments = spectral_moments(surface)
     wave_number, power = radial_power_spectrum(surface)
+    edges = ring_edges(surface)
+    rings = "rad m^-1", "wave number of a ring of wave vectors"
     variables = {
         "height": variable(("y", "x"), surface.heights, "m", "height towards the elastic body"),
         "period": variable((), surface.period, "m", "side of the periodic cell, or of the free square"),
@@ -252,16 +256,16 @@ def write_surface(
         "seed": variable((), np.int32(seed), "1", "seed of the random phases"),
         "rms_slope": variable((), surface.rms_slope, "1", "root mean square slope"),
         "rms_height": variable((), surface.rms_height, "m", "root mean square height"),
-        "rms_curvature": variable((), surface.rms_curvature, "m-1", "root mean square curvature of a profile"),
-        "spectral_moment_0": variable((), moments.m0, "m2", "variance of a profile's height"),
+        "rms_curvature": variable((), surface.rms_curvature, "m^-1", "root mean square curvature of a profile"),
+        "spectral_moment_0": variable((), moments.m0, "m^2", "variance of a profile's height"),
         "spectral_moment_2": variable((), moments.m2, "1", "variance of a profile's slope"),
-        "spectral_moment_4": variable((), moments.m4, "m-2", "variance of a profile's curvature"),
+        "spectral_moment_4": variable((), moments.m4, "m^-2", "variance of a profile's curvature"),
         "nayak_parameter": variable((), moments.nayak_parameter, "1", "Nayak's parameter m0 m4/m2^2"),
-        "psd_wavevector": variable("psd_bin", wave_number, "rad m-1", "mean wave number of a ring of wave vectors"),
+        "psd_wavevector_bounds": variable(("psd_bin", BOUND), np.column_stack([edges[:-1], edges[1:]]), *rings),
         "power_spectrum": variable(
             "psd_bin",
             power,
-            "m4",
+            "m^4",
             "isotropic power spectrum C(q); its integral over the plane is the variance of height",
         ),
     }
@@ -276,6 +280,11 @@ def write_surface(
             (), measured.rms_slope, "1", "root mean square slope of the measurement as prepared, before scaling"
         )
     coords = {axis: variable((axis,), nodes, "m", f"{axis} of the nodes") for axis in ("x", "y")}
+    coords["psd_wavevector"] = variable("psd_bin", wave_number, *rings)
+    coords["psd_wavevector"].attrs |= {
+        "bounds": "psd_wavevector_bounds",
+        "comment": "mean over the ring's wave vectors",
+    }
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
     if measured is not None:
         kind = "Measured topography"
@@ -284,14 +293,14 @@ def write_surface(
             "source_sha256": measured.source_sha256,
             "preparation": measured.description,
         }
-    title = {
-        "title": f"Topography {name}, seed {seed}",
-        "summary": f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
-        "Conventions": "CF-1.11",
-        "surface": name,
-        "boundary": surface.boundary,
-    }
-    write_dataset(xr.Dataset(variables, coords, title | origin | dict(attrs)), path)
+    described = discovery(
+        f"Topography {name}, seed {seed}",
+        f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
+        INPUT,
+        keywords=["topography"],
+    )
+    origin |= {"surface": name, "boundary": surface.boundary}
+    write_dataset(xr.Dataset(variables, coords, described | origin | dict(attrs)), path)
 
 
 def read_surface(path: str | os.PathLike) -> Surface:

@@ -92,16 +92,11 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     square is multiplied by Hann's window first, and C divided by the mean square of that, so that the step from one
     edge to the other does not show.
     """
-    shown, scale = surface, 1.0
+    edges, shown, scale = _ring_edges(surface), surface, 1.0
     if surface.free:
         hann = np.sin(np.pi * (np.arange(surface.grid) + 0.5) / surface.grid) ** 2
         shown = Surface(surface.heights * (hann[:, None] * hann), surface.period)
         scale = 1 / np.mean(hann**2) ** 2
-    last = (surface.grid - 1) // 2
-    edges = [0.5]
-    while edges[-1] < last:
-        edges.append(min(max(edges[-1] + 1, math.floor(1.1 * edges[-1]) + 0.5), last + 0.5))
-    edges = np.array(edges)
 
     def rings(k2, count, power):
         k = np.sqrt(k2)
@@ -113,3 +108,17 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     count, wave_number, power = np.sum(shown.by_wave_vector(rings), axis=0)[:, 1:-1]
     unit = 2 * np.pi / surface.period
     return unit * wave_number / count, scale * power / count / unit**2
+
+
+def ring_edges(surface: Surface) -> np.ndarray:
+    """Wave numbers (rad/m) of the edges of the rings of `radial_power_spectrum`, one more than there are rings."""
+    return 2 * np.pi / surface.period * _ring_edges(surface)
+
+
+def _ring_edges(surface):
+    """Edges of the rings in 2 pi/L."""
+    last = (surface.grid - 1) // 2
+    edges = [0.5]
+    while edges[-1] < last:
+        edges.append(min(max(edges[-1] + 1, math.floor(1.1 * edges[-1]) + 0.5), last + 0.5))
+    return np.array(edges)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Callable
 
 import numpy as np
@@ -10,7 +9,8 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from icha.asperities import find_summits
-from icha.bins import GAP_BINS, PRESSURE_BINS
+from icha.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
+from icha.discovery import COMPUTED, discovery
 from icha.dissipation import new_events
 from icha.equilibrium import (
     EVENT_KINDS,
@@ -64,7 +64,7 @@ VARIABLES = {
     "nominal_pressure": (("step",), "Pa", "force over nominal area"),
     "contact_area_fraction": (("step",), "1", "real over nominal contact area, A/A0"),
     "spot_count": (("step",), "1", "number of contact spots"),
-    "contact_stiffness": (("step",), "Pa m-1", "contact stiffness, -dp/du of the present spots"),
+    "contact_stiffness": (("step",), "Pa m^-1", "contact stiffness, -dp/du of the present spots"),
     "residual": (("step",), "1", "largest equilibrium error over h_rms"),
     "converged": (("step",), "1", "1 where the equilibrium converged"),
     "leg": (("step",), "1", "leg of the path: 0 the first loading, odd unloading, even loading again"),
@@ -103,10 +103,10 @@ VARIABLES = {
         "1",
         "part of the nominal area by which spots reach over the edges of a free square; 0 of a periodic surface",
     ),
-    "gap_density": (("snapshot", "gap_bin"), "m-1", "probability density of the gap over the nominal area"),
+    "gap_density": (("snapshot", "gap_bin"), "m^-1", "probability density of the gap over the nominal area"),
     "pressure_density": (
         ("snapshot", "pressure_bin"),
-        "Pa-1",
+        "Pa^-1",
         "probability density of the contact pressure over the nominal area",
     ),
     "pressure_bin_mean": (
@@ -114,8 +114,8 @@ VARIABLES = {
         "Pa",
         "mean pressure of the area in the bin, 0 where empty",
     ),
-    "gap_bin_edges": (("gap_edge",), "m", "edges of the gap bins"),
-    "pressure_bin_edges": (("pressure_edge",), "Pa", "edges of the pressure bins"),
+    **bin_table("gap", "m"),
+    **bin_table("pressure", "Pa"),
     "spot_snapshot": (("spot",), "1", "snapshot to which the spot belongs"),
     "spot_x": (("spot",), "m", "x of the spot's centre"),
     "spot_y": (("spot",), "m", "y of the spot's centre"),
@@ -124,14 +124,14 @@ VARIABLES = {
     "spot_curvature_radius": (("spot",), "m", "radius of curvature of the spot's paraboloid"),
     "spot_members": (("spot",), "1", "number of asperities united in the spot"),
     "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m-2", "energy of adhesion per area"),
+    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
     "interaction_range": ((), "m", "range of the attractive forces"),
     "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
     "rms_height": ((), "m", "root mean square height"),
-    "rms_curvature": ((), "m-1", "root mean square curvature of a profile, from the spectrum"),
-    "spectral_moment_0": ((), "m2", "spectral moment m0 of a profile: variance of its height"),
+    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
+    "spectral_moment_0": ((), "m^2", "spectral moment m0 of a profile: variance of its height"),
     "spectral_moment_2": ((), "1", "spectral moment m2 of a profile: variance of its slope"),
-    "spectral_moment_4": ((), "m-2", "spectral moment m4 of a profile: variance of its curvature"),
+    "spectral_moment_4": ((), "m^-2", "spectral moment m4 of a profile: variance of its curvature"),
     "nayak_parameter": ((), "1", "Nayak's parameter m0 m4/m2^2: breadth of the spectrum"),
     "period": ((), "m", "side of the periodic cell, or of the free square"),
     "boundary": ((), "1", "what lies beyond the cell: periodic or free"),
@@ -148,15 +148,19 @@ VARIABLES = {
 CYCLE_VARIABLES = {
     "work": (
         ("step",),
-        "J m-2",
+        "J m^-2",
         "work done on the contact since first contact, -(integral of p du), "
         "cubic between steps, by pressure and contact stiffness, and at constant pressure in a jump under load control",
     ),
-    "stored_energy": (("step",), "J m-2", "elastic energy less that of adhesion, 0 out of contact"),
-    "dissipated_by_jump_in": (("step",), "J m-2", "energy lost so far as contacts formed"),
-    "dissipated_by_jump_off": (("step",), "J m-2", "energy lost so far as contacts broke"),
-    "dissipated_by_coalescence": (("step",), "J m-2", "energy lost so far as spots united or unions were undone"),
-    "dissipated_by_load_jump": (("step",), "J m-2", "energy lost so far in jumps at constant load, under load control"),
+    "stored_energy": (("step",), "J m^-2", "elastic energy less that of adhesion, 0 out of contact"),
+    "dissipated_by_jump_in": (("step",), "J m^-2", "energy lost so far as contacts formed"),
+    "dissipated_by_jump_off": (("step",), "J m^-2", "energy lost so far as contacts broke"),
+    "dissipated_by_coalescence": (("step",), "J m^-2", "energy lost so far as spots united or unions were undone"),
+    "dissipated_by_load_jump": (
+        ("step",),
+        "J m^-2",
+        "energy lost so far in jumps at constant load, under load control",
+    ),
     "event_kind": (("event",), "1", "kind of the event"),
     "event_step": (("event",), "1", "step at which the event is first seen"),
     "event_separation": (("event",), "m", "mean separation of that step"),
@@ -181,20 +185,30 @@ LOOP_VARIABLES = {
     ),
     "detachment_pressure": ((), "Pa", "nominal pressure just before the last contact breaks"),
     "detachment_separation": ((), "m", "mean separation just before the last contact breaks"),
-    "hysteresis_loss": ((), "J m-2", "work lost from first contact to separation, integral of p du around the path"),
+    "hysteresis_loss": ((), "J m^-2", "work lost from first contact to separation, integral of p du around the path"),
     "hysteresis_loss_over_surface_energy": (
         (),
         "1",
         "work lost over the energy of adhesion; 0 without adhesion",
     ),
-    "loss_by_jump_in": ((), "J m-2", "part of the loss in jumps into contact"),
-    "loss_by_jump_off": ((), "J m-2", "part of the loss in jumps out of contact"),
-    "loss_by_coalescence": ((), "J m-2", "part of the loss in unions of spots and their undoing"),
-    "loss_by_load_jump": ((), "J m-2", "part of the loss in jumps at constant load, under load control"),
-    "loss_unattributed": ((), "J m-2", "part of the loss without an event: non-reciprocal interaction and integration"),
+    "loss_by_jump_in": ((), "J m^-2", "part of the loss in jumps into contact"),
+    "loss_by_jump_off": ((), "J m^-2", "part of the loss in jumps out of contact"),
+    "loss_by_coalescence": ((), "J m^-2", "part of the loss in unions of spots and their undoing"),
+    "loss_by_load_jump": ((), "J m^-2", "part of the loss in jumps at constant load, under load control"),
+    "loss_unattributed": (
+        (),
+        "J m^-2",
+        "part of the loss without an event: non-reciprocal interaction and integration",
+    ),
     "largest_contact_area_fraction": ((), "1", "largest A/A0 on the path"),
     "largest_reduced_pressure": ((), "1", "largest reduced pressure on the path"),
 }
+
+
+# Spots and events are kept one after the other, and these say to which snapshot or step each belongs: the indexed
+# ragged arrays of CF 1.11, section 9.3.4. Its feature types, all of a time or a place on earth, are not claimed.
+INDEXED = {"spot_snapshot": "snapshot", "event_step": "step"}
+_RAGGED = "index of a ragged array: positions along instance_dimension, from 0"
 
 
 class ConvergenceError(RuntimeError):
@@ -443,8 +457,8 @@ def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
     radius = 1 / surface.rms_curvature
     moments = spectral_moments(surface)
     values = {
-        "gap_bin_edges": GAP_BINS * surface.rms_height,
-        "pressure_bin_edges": PRESSURE_BINS * (material.contact_modulus * surface.rms_slope),
+        **bin_values("gap", GAP_BINS * surface.rms_height),
+        **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.rms_slope)),
         "contact_modulus": material.contact_modulus,
         "surface_energy": material.surface_energy,
         "interaction_range": material.interaction_range,
@@ -487,6 +501,9 @@ def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
     if path.cyclic:
         kinds = {"flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8), "flag_meanings": " ".join(EVENT_KINDS)}
         variables["event_kind"][2].update(kinds)
+    for name, dim in INDEXED.items():
+        if name in variables:
+            variables[name][2].update(instance_dimension=dim, comment=_RAGGED)
     adhesion = "with" if material.surface_energy > 0 else "without"
     coordinates = {
         "step": ("step", np.arange(len(steps)), {"units": "1", "long_name": "equilibrium along the path"}),
@@ -497,22 +514,13 @@ def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
         ),
         "snapshot": ("snapshot", np.arange(len(snapshots)), {"units": "1", "long_name": "snapshot"}),
     }
-    return xr.Dataset(
-        variables,
-        coordinates,
-        attrs={
-            "title": f"Rough contact {adhesion} adhesion, ICHA model",
-            "summary": (
-                f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "
-                f"{'periodic rough surface' if not surface.free else 'single rough square'} against an "
-                "elastic half-space by interacting and coalescing asperities with JKR adhesion and jump into contact."
-            ),
-            "Conventions": "CF-1.11",
-            "source": f"icha {importlib.metadata.version('icha')}",
-            "campaign": "",
-            "study": "",
-            "config_sha256": "",
-            "license": "",
-            "references": REFERENCES,
-        },
+    attrs = discovery(
+        f"Rough contact {adhesion} adhesion, ICHA model",
+        f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "
+        f"{'periodic rough surface' if not surface.free else 'single rough square'} against an "
+        "elastic half-space by interacting and coalescing asperities with JKR adhesion and jump into contact.",
+        COMPUTED,
+        references=REFERENCES,
     )
+    of_campaign = dict.fromkeys(("campaign", "study", "config_sha256", "license"), "")
+    return with_bounds(xr.Dataset(variables, coordinates, attrs | of_campaign))

@@ -59,7 +59,8 @@ def changed(run, name, **attrs):
         (lambda run: run.assign(gap_bin_edges=run["gap_bin_edges"][::-1]), "gap_bin_edges: do not increase"),
         (lambda run: run.assign(extra=xr.Variable((), 1.0)), "extra: has no attribute units"),
         (lambda run: run.assign(rms_height=run["rms_height"] * np.nan), "rms_height: 1 of 1 values are not finite"),
-        (lambda run: run.assign_attrs(history="2024"), "attribute history is there"),
+        (lambda run: run.assign_attrs(history="Thu May 2 10:11:12 2024: ncks"), "attribute history: 'Thu May"),
+        (lambda run: run.assign_attrs(creator_name="A. Maker"), "attribute creator_name is there"),
         (lambda run: run.assign_attrs(config_sha256="abc"), "attribute config_sha256: 'abc'"),
         (lambda run: run.assign_attrs(campaign="x", study=""), "attribute study is missing"),
         (

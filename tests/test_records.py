@@ -45,7 +45,9 @@ def content(group):
     for name, variable in group.variables.items():
         variable.set_auto_maskandscale(False)
         variable.set_auto_chartostring(False)
-        attrs = {key: np.asarray(variable.getncattr(key)).tolist() for key in variable.ncattrs()}
+        # What bounds inherit xarray takes from them, and has them have coordinates.
+        left_out = {"units", "long_name", "coordinates"} if name.endswith("_bounds") else set()
+        attrs = {key: np.asarray(variable.getncattr(key)).tolist() for key in {*variable.ncattrs()} - left_out}
         kept = variable[...].tobytes()
         variables[name] = (variable.dtype, variable.dimensions, attrs, variable.chunking(), variable.filters(), kept)
     return (

@@ -680,7 +680,7 @@ def test_surface_files_of_all_kinds_have_their_power_spectrum(tmp_path):
     file = read_dataset(tmp_path / "s.nc")
     assert file.attrs["boundary"] == "periodic" and "source_file" not in file.attrs
     q, power = file["psd_wavevector"].values, file["power_spectrum"].values
-    assert file["power_spectrum"].attrs["units"] == "m4" and file["psd_wavevector"].attrs["units"] == "rad m-1"
+    assert file["power_spectrum"].attrs["units"] == "m^4" and file["psd_wavevector"].attrs["units"] == "rad m^-1"
     # The integral over the plane of wave vectors, ring by ring, is the mean square height.
     edges = np.concatenate([[0.5 * 2 * np.pi], 0.5 * (q[1:] + q[:-1]), [q[-1]]])
     variance = np.sum(np.pi * np.diff(edges**2) * power)

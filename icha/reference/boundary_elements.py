@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from importlib.metadata import version
 
 import numpy as np
 import scipy.fft
@@ -27,8 +26,9 @@ import tamaas
 import tamaas.utils
 import xarray as xr
 
-from icha.bins import GAP_BINS, PRESSURE_BINS
+from icha.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
 from icha.cohesive_zone import longest_spacing, resolution_problem, strength_number
+from icha.discovery import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.material import Material
 from icha.surface import Surface
 from icha.validation import integer, positive
@@ -74,22 +74,22 @@ VARIABLES = {
     "spacing": ((), "m", "distance between nodes"),
     "longest_spacing": ((), "m", "widest spacing that resolves the cohesive zone; 0 without adhesion"),
     "strength_number": ((), "1", "sqrt(dgamma dx/E*)/range; 0 without adhesion"),
-    "gap_density": (("gap_bin",), "m-1", "probability density of the gap out of contact, over the nominal area"),
-    "gap_bin_edges": (("gap_edge",), "m", "edges of the gap bins"),
+    "gap_density": (("gap_bin",), "m^-1", "probability density of the gap out of contact, over the nominal area"),
+    **bin_table("gap", "m"),
     "pressure_density": (
         ("pressure_bin",),
-        "Pa-1",
+        "Pa^-1",
         "probability density of the pressure in contact, over the nominal area",
     ),
     "pressure_bin_mean": (("pressure_bin",), "Pa", "mean pressure of the area in the bin, 0 where empty"),
-    "pressure_bin_edges": (("pressure_edge",), "Pa", "edges of the pressure bins"),
+    **bin_table("pressure", "Pa"),
     "contact": (("y", "x"), "1", "1 where the node is in contact"),
     "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m-2", "energy of adhesion per area"),
+    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
     "interaction_range": ((), "m", "range of the attractive forces"),
     "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
     "rms_height": ((), "m", "root mean square height"),
-    "rms_curvature": ((), "m-1", "root mean square curvature of a profile, from the spectrum"),
+    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
     "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
     "period": ((), "m", "side of the periodic cell"),
     "seed": ((), "1", "seed of the surface; -1 where it has none"),
@@ -460,10 +460,10 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "longest_spacing": longest_spacing(material) if adhesive else 0.0,
         "strength_number": strength_number(material, fine.spacing),
         "gap_density": gaps / nodes / np.diff(GAP_BINS * height),
-        "gap_bin_edges": GAP_BINS * height,
+        **bin_values("gap", GAP_BINS * height),
         "pressure_density": count / nodes / np.diff(PRESSURE_BINS * unit),
         "pressure_bin_mean": np.divide(load, count, out=np.zeros(len(load)), where=count > 0) * unit,
-        "pressure_bin_edges": PRESSURE_BINS * unit,
+        **bin_values("pressure", PRESSURE_BINS * unit),
         "contact": contact.astype(np.int8),
         "contact_modulus": material.contact_modulus,
         "surface_energy": material.surface_energy,
@@ -481,15 +481,12 @@ def _dataset(surface, material, state, target, tolerance, seed):
     }
     nodes = np.arange(fine.grid) * fine.spacing
     coordinates = {axis: (axis, nodes, {"units": "m", "long_name": f"{axis} of the nodes"}) for axis in ("x", "y")}
-    adhesion = "with" if adhesive else "without"
-    return xr.Dataset(
-        variables,
-        coordinates,
-        attrs={
-            "title": f"Rough contact {adhesion} adhesion, boundary elements",
-            "summary": "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
-            "Conventions": "CF-1.11",
-            "source": f"tamaas {version('tamaas')}",
-            "references": REFERENCES,
-        },
+    attrs = discovery(
+        f"Rough contact {'with' if adhesive else 'without'} adhesion, boundary elements",
+        "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
+        COMPUTED,
+        programs=("tamaas",),
+        references=REFERENCES,
+        keywords=[BOUNDARY_ELEMENTS],
     )
+    return with_bounds(xr.Dataset(variables, coordinates, attrs))

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from icha.discovery import THEORY, discovery
 from icha.material import Material
 from icha.reference import persson, summits
 from icha.reference.literature import literature
@@ -45,12 +46,15 @@ def reference_dataset(
     variables = _persson(np.asarray(reduced_pressures, float), spectrum) | _published()
     if moments is not None:
         variables |= _separate_summits(moments, adhesive)
-    title = {
-        "title": "Theories of rough contact, and published points",
-        "summary": "Contact area, mean separation and contact stiffness against reduced pressure.",
-        "Conventions": "CF-1.11",
-    }
-    return xr.Dataset(variables, attrs=title | dict(attrs))
+    described = discovery(
+        "Theories of rough contact, and published points",
+        "Contact area, mean separation and contact stiffness against reduced pressure.",
+        THEORY,
+        references="; ".join(
+            dict.fromkeys(v.attrs["references"] for v in variables.values() if "references" in v.attrs)
+        ),
+    )
+    return xr.Dataset(variables, attrs=described | dict(attrs))
 
 
 _PRESSURE = "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"

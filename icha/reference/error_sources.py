@@ -28,7 +28,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +42,7 @@ from threadpoolctl import threadpool_limits
 
 from icha.asperities import Asperities, find_summits
 from icha.coalescence import covering_spot
+from icha.discovery import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.elasticity import HalfSpace, Interaction, displacement_at, periodic_difference
 from icha.equilibrium import Contact, ContactState, area_fraction
 from icha.jkr import JKR
@@ -99,19 +99,19 @@ VARIABLES = {
     "spot_load_share": (("category", "reduced_pressure"), "1", "part of the load that the model's spots carry"),
     "patch_load_share": (("category", "reduced_pressure"), "1", "part of the load that the patches carry"),
     "pair_reduced_pressure": (("pair",), "1", "reduced pressure at which a single spot and its patch were found"),
-    "pair_spot_area": (("pair",), "m2", "area of the spot"),
-    "pair_patch_area": (("pair",), "m2", "area of the patch"),
+    "pair_spot_area": (("pair",), "m^2", "area of the spot"),
+    "pair_patch_area": (("pair",), "m^2", "area of the patch"),
     "pair_spot_force": (("pair",), "N", "force on the spot"),
     "pair_patch_force": (("pair",), "N", "force on the patch"),
     "pair_patch_nodes": (("pair",), "1", "boundary elements in the patch"),
     "pair_curvature_radius": (("pair",), "m", "the summit's radius of curvature"),
-    "pair_fourth_order": (("pair",), "m-3", "the summit's fourth-order term, bi-Laplacian of the heights over 64"),
+    "pair_fourth_order": (("pair",), "m^-3", "the summit's fourth-order term, bi-Laplacian of the heights over 64"),
     "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m-2", "energy of adhesion per area"),
+    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
     "interaction_range": ((), "m", "range of the attractive forces"),
     "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
     "rms_height": ((), "m", "root mean square height"),
-    "rms_curvature": ((), "m-1", "root mean square curvature of a profile, from the spectrum"),
+    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
     "period": ((), "m", "side of the periodic cell"),
     "grid": ((), "1", "nodes of the surface along a side"),
     "refinement": ((), "1", "boundary elements per cell of the surface's grid, along a side"),
@@ -730,14 +730,12 @@ def _dataset(surface, material, pressures, states, parts, seed, solver):
             {"units": "1", "long_name": "what spots and patches lie on each other"},
         )
     adhesion = "with" if material.surface_energy > 0 else "without"
-    return xr.Dataset(
-        variables,
-        coordinates,
-        attrs={
-            "title": f"Sources of the error of the ICHA model {adhesion} adhesion",
-            "summary": "One surface solved by the model, by boundary elements and by variants between the two.",
-            "Conventions": "CF-1.11",
-            "source": f"icha {version('icha')}; tamaas {version('tamaas')}",
-            "references": REFERENCES,
-        },
+    attrs = discovery(
+        f"Sources of the error of the ICHA model {adhesion} adhesion",
+        "One surface solved by the model, by boundary elements and by variants between the two.",
+        COMPUTED,
+        programs=("icha", "tamaas"),
+        references=REFERENCES,
+        keywords=[BOUNDARY_ELEMENTS],
     )
+    return xr.Dataset(variables, coordinates, attrs)

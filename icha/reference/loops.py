@@ -12,12 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 
 import numpy as np
 import xarray as xr
 
 from icha.cohesive_zone import longest_spacing, strength_number
+from icha.discovery import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.material import Material
 from icha.reference.boundary_elements import (
     DEFAULT_TOLERANCE,
@@ -59,15 +59,15 @@ VARIABLES = {
     ),
     "residual": (("step",), "1", "error of the solver: its criterion of convergence"),
     "leg": (("step",), "1", "0 on the way down, 1 on the way up"),
-    "work": (("step",), "J m-2", "work done on the contact so far, minus the integral of pressure over mean gap"),
-    "stored_energy": (("step",), "J m-2", "elastic energy less that of adhesion, over the nominal area"),
-    "dissipated": (("step",), "J m-2", "work so far less the change of the stored energy: lost in jumps"),
+    "work": (("step",), "J m^-2", "work done on the contact so far, minus the integral of pressure over mean gap"),
+    "stored_energy": (("step",), "J m^-2", "elastic energy less that of adhesion, over the nominal area"),
+    "dissipated": (("step",), "J m^-2", "work so far less the change of the stored energy: lost in jumps"),
     "pull_off_pressure": ((), "Pa", "largest tension on the way up, at least 0"),
     "pull_off_separation": ((), "m", "mean gap of the largest tension on the way up"),
-    "hysteresis_loss": ((), "J m-2", "work of the whole loop"),
+    "hysteresis_loss": ((), "J m^-2", "work of the whole loop"),
     "hysteresis_loss_error": (
         (),
-        "J m-2",
+        "J m^-2",
         "estimate of its error, by the trapezoid and by the steps within which pressure jumps",
     ),
     "largest_reduced_pressure": ((), "1", "largest nominal pressure over contact modulus and rms slope"),
@@ -81,11 +81,11 @@ VARIABLES = {
     "longest_spacing": ((), "m", "widest spacing that resolves the cohesive zone; 0 without adhesion"),
     "strength_number": ((), "1", "sqrt(dgamma dx/E*)/range; 0 without adhesion"),
     "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m-2", "energy of adhesion per area"),
+    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
     "interaction_range": ((), "m", "range of the attractive forces"),
     "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
     "rms_height": ((), "m", "root mean square height"),
-    "rms_curvature": ((), "m-1", "root mean square curvature of a profile, from the spectrum"),
+    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
     "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
     "period": ((), "m", "side of the periodic cell"),
     "seed": ((), "1", "seed of the surface; -1 where it has none"),
@@ -362,15 +362,13 @@ def _dataset(surface, way, legs, separation_step, seed):
     branch = np.array(["loading", "unloading"], dtype=object)[leg]
     named = {"units": "1", "long_name": "loading on the way down, unloading on the way up"}
     variables["branch"] = ("step", branch, named)
-    adhesion = "with" if adhesive else "without"
-    return xr.Dataset(
-        variables,
-        {"step": ("step", np.arange(len(records)), {"units": "1", "long_name": "state of the loop"})},
-        attrs={
-            "title": f"Rough contact {adhesion} adhesion both ways, boundary elements",
-            "summary": "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
-            "Conventions": "CF-1.11",
-            "source": f"tamaas {version('tamaas')}",
-            "references": REFERENCES,
-        },
+    attrs = discovery(
+        f"Rough contact {'with' if adhesive else 'without'} adhesion both ways, boundary elements",
+        "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
+        COMPUTED,
+        programs=("tamaas",),
+        references=REFERENCES,
+        keywords=[BOUNDARY_ELEMENTS],
     )
+    steps = ("step", np.arange(len(records)), {"units": "1", "long_name": "state of the loop"})
+    return xr.Dataset(variables, {"step": steps}, attrs)

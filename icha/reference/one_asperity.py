@@ -16,7 +16,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
-from importlib.metadata import version
 
 import numpy as np
 import scipy.fft
@@ -24,6 +23,7 @@ import xarray as xr
 
 from icha.asperities import find_summits
 from icha.cohesive_zone import is_resolved, strength_number
+from icha.discovery import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.elasticity import displacement_at
 from icha.equilibrium import Contact, Control, area_fraction, equilibrium, mean_pressure, untouched
 from icha.jkr import JKR
@@ -53,12 +53,12 @@ _LAW = (
 # name: (dimensions, units, long name)
 VARIABLES = {
     "force_boundary_elements": (("approach",), "N", "force by boundary elements"),
-    "zero_gap_area": (("approach",), "m2", "area of zero gap by boundary elements, corrected by its perimeter"),
-    "energetic_area": (("approach",), "m2", "energy of adhesion by boundary elements over the surface energy"),
+    "zero_gap_area": (("approach",), "m^2", "area of zero gap by boundary elements, corrected by its perimeter"),
+    "energetic_area": (("approach",), "m^2", "energy of adhesion by boundary elements over the surface energy"),
     "residual": (("approach",), "1", "error of the boundary elements' solver: its criterion of convergence"),
     "force_icha": (("approach",), "N", "force by ICHA"),
-    "area_icha": (("approach",), "m2", "contact area by ICHA"),
-    "area_icha_at_load": (("given_load",), "m2", "contact area by ICHA at the boundary elements' force"),
+    "area_icha": (("approach",), "m^2", "contact area by ICHA"),
+    "area_icha_at_load": (("given_load",), "m^2", "contact area by ICHA at the boundary elements' force"),
     "approach_icha_at_load": (("given_load",), "m", "approach by ICHA at the boundary elements' force"),
     "approach_boundary_elements_at_load": (
         ("given_load",),
@@ -93,7 +93,7 @@ VARIABLES = {
     "pull_off_error": ((), "1", "ICHA's pull-off force less the boundary elements', over ICHA's"),
     "tabor_parameter": ((), "1", "Tabor parameter, (dgamma^2 R/E*^2)^(1/3)/range; 0 without adhesion"),
     "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m-2", "energy of adhesion per area"),
+    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
     "interaction_range": ((), "m", "range of the attractive forces"),
     "radius_of_curvature": ((), "m", "radius of curvature of the asperity"),
     "period": ((), "m", "side of the periodic cell"),
@@ -325,16 +325,13 @@ def _comparison(
         "approach": ("approach", approach, {"units": "m", "long_name": "approach of the summit to the mean plane"}),
         "given_load": ("given_load", force[at], {"units": "N", "long_name": "force by boundary elements, held"}),
     }
-    adhesion = "with" if adhesive else "without"
-    return xr.Dataset(
-        variables,
-        coordinates,
-        attrs={
-            "title": f"One asperity {adhesion} adhesion, ICHA and boundary elements",
-            "summary": "One paraboloid in a periodic cell by the model and by boundary elements, at the same approach "
-            "and at the same load.",
-            "Conventions": "CF-1.11",
-            "source": f"icha {version('icha')}; tamaas {version('tamaas')}",
-            "references": (_LAW if adhesive else "") + REFERENCES,
-        },
+    attrs = discovery(
+        f"One asperity {'with' if adhesive else 'without'} adhesion, ICHA and boundary elements",
+        "One paraboloid in a periodic cell by the model and by boundary elements, at the same approach and at the same "
+        "load.",
+        COMPUTED,
+        programs=("icha", "tamaas"),
+        references=(_LAW if adhesive else "") + REFERENCES,
+        keywords=[BOUNDARY_ELEMENTS],
     )
+    return xr.Dataset(variables, coordinates, attrs)

@@ -12,7 +12,6 @@ import contextlib
 import io
 import json
 import logging
-import os
 import subprocess
 import sys
 import tempfile
@@ -154,7 +153,7 @@ def _violations(validator, metadata: dict) -> list[str]:
 
 
 def check_conventions(folder: Path) -> Outcome:
-    """compliance-checker: every group of every netCDF file keeps to CF 1.11; its advice of low weight is a remark."""
+    """compliance-checker: every group of every netCDF file keeps to CF 1.11; what it only recommends is a remark."""
     paths = sorted(folder.rglob("*.nc"))
     with ProcessPoolExecutor() as processes:
         answers = [answer for found in processes.map(_conventions_of, paths) for answer in found]
@@ -194,7 +193,7 @@ def _conventions_of(path: Path) -> list[Conformance]:
                 points = result.value if isinstance(result.value, tuple) else (int(bool(result.value)), 1)
                 score, out_of = score + points[0], out_of + points[1]
                 if points[0] < points[1]:
-                    told = remarks if result.weight == BaseCheck.LOW else problems
+                    told = problems if result.weight == BaseCheck.HIGH else remarks
                     told += [f"{result.name}: {message}" for message in result.msgs or ["failed"]]
             answers.append(Conformance(path / group.strip("/"), (score, out_of), problems, remarks))
     return answers
@@ -289,7 +288,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    status = main()
-    sys.stdout.flush()
-    # rocrate's and the validator's clean-up at exit would look for a cache that is gone already.
-    os._exit(status)
+    sys.exit(main())
