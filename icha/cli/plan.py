@@ -255,6 +255,19 @@ def expected_seconds(campaign: Campaign, results: Path) -> dict[str, float]:
     return {f"results/{results.name}/{item.path}": item.cost.seconds for item in plan(campaign, results)}
 
 
+def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
+    """What a whole campaign is expected to take: seconds on one core, memory of the largest job, disk.
+
+    By the cost model alone, whatever the jobs of this machine have taken: the same wherever it is asked for.
+    """
+    each = [(item.cost, item.threads) for item in _items(campaign, results)]
+    return costs.Cost(
+        sum(cost.seconds * threads for cost, threads in each),
+        max(cost.memory for cost, _ in each),
+        sum(cost.disk for cost, _ in each),
+    )
+
+
 def _calibrated(items: Iterable[Item], results: Path) -> Iterator[Item]:
     """The items with times and memories scaled to what the jobs of their kind that are done have taken."""
     items = list(items)

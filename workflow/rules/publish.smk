@@ -25,8 +25,8 @@ rule deposit:
     input:
         what_is_published,
     output:
-        f"{DEPOSIT}/SHA256SUMS",
-        f"{DEPOSIT}.zip",
+        checksums=f"{DEPOSIT}/SHA256SUMS",
+        archive=f"{DEPOSIT}.zip",
     log:
         f"{LOGS}/publish.log",
     benchmark:
@@ -39,8 +39,10 @@ rule deposit:
         runtime=30,
     params:
         results=RESULTS,
-        publication=PUBLICATION.model_dump(mode="json"),
-        code=code_of("publish.py"),
+        named_files=NAMED_FILES,
+        project=workflow.basedir,
+        # The source is part of the deposit, comments and all.
+        commit=lambda wildcards: committed_source(workflow.basedir).commit,
     message:
         "Deposit {PUBLICATION.version}"
     script:

@@ -1,61 +1,55 @@
-"""Put together the deposit: copies of the results, a page that says what they are, and checksums."""
+"""Make the deposit of a campaign from its results."""
 
-import hashlib
-import shutil
+import sys
 from pathlib import Path
 
 from job import logged
 
-README = """# {title}
-
-{summary}
-
-{authors}Licence of the data: {license}. Made with ICHA (adhesive rough contact by interacting and coalescing
-asperities). All quantities are in SI units; every variable names its unit.
-
-| path | content |
-|---|---|
-| `config.used.yaml` | the configuration: everything that was asked for |
-| `dataset/` | the campaign dataset, netCDF-4, one group per study: `xarray.open_datatree` |
-| `aggregated/` | the runs of every study compared at common loads, and with boundary elements where there are any |
-| `runs/` | the same runs, one file each |
-| `surfaces/` | the topographies, at rms slope 1 |
-| `references/` | theory curves, published points and boundary-element solutions for these surfaces |
-| `figures/`, `report.html` | figures, and the report with tables and checks |
-| `checks.json`, `verdict.txt` | checks of the results, and that all passed |
-| `SHA256SUMS` | checksums of all files: `sha256sum -c SHA256SUMS` |
-"""
+from icha.cli.plan import whole_cost
+from icha.configuration.load import load_configuration
+from icha.publication.deposit import make_deposit
+from icha.publication.environment import refuse_other_environment
+from icha.publication.source import committed_source
 
 
-def publish(files, checksums, *, title, summary, license, authors):
-    """Copy `files` to the folder of `checksums`, which lies beside them, and write the checksums last."""
-    folder = Path(checksums).parent
-    part = folder.with_name(f".{folder.name}.part")
-    shutil.rmtree(part, ignore_errors=True)
-    for file in files:
-        copy = part / Path(file).relative_to(folder.parent)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(file, copy)
-    names = ", ".join(" ".join([author["name"], author.get("orcid", "")]).strip() for author in authors)
-    text = README.format(
-        title=title, summary=summary, license=license, authors=f"Authors: {names}.\n\n" if names else ""
+def publish(archive, *, results, files, named_files, project):
+    """Write the deposit of `files` below the folder `results` to `archive`, and to the folder of that name beside it.
+
+    `named_files` are the files that the configuration names, by their places beside the configuration as used.
+    """
+    refuse_other_environment(Path(project))
+    used = "config.used.yaml"
+    places = {file: str(Path(file).relative_to(results)) for file in files}
+    given = {file: place for place, file in named_files.items()} | {f"{results}/{used}": used}
+    made = {file: place for file, place in places.items() if place not in given.values()}
+    campaign = load_configuration(Path(results, used)).campaign
+    make_deposit(
+        archive.removesuffix(".zip"),
+        archive,
+        results=results,
+        files=places.values(),
+        publication=campaign.published(),
+        campaign=campaign,
+        source=committed_source(project),
+        jobs=_recorded_jobs(Path(project, "workflow"), made, given),
+        cost=whole_cost(campaign, Path(results)),
     )
-    (part / "README.md").write_text(text, encoding="utf-8")
-    sums = [f"{_sha256(path)}  {path.relative_to(part)}\n" for path in sorted(part.rglob("*")) if path.is_file()]
-    (part / Path(checksums).name).write_text("".join(sums), encoding="utf-8")
-    shutil.rmtree(folder, ignore_errors=True)
-    part.rename(folder)
 
 
-def _sha256(path):
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _recorded_jobs(workflow, made, given):
+    # Beside the rules, which it belongs to, and not beside the scripts.
+    sys.path.insert(0, str(workflow))
+    from provenance import recorded_jobs
+
+    return recorded_jobs(Path(".snakemake/metadata"), made, given, scripts=workflow / "scripts")
 
 
 if "snakemake" in globals():
     with logged(snakemake.log[0]):
         publish(
-            sorted(snakemake.input),
-            snakemake.output[0],
-            **{key: snakemake.params[key] for key in ("title", "summary", "license", "authors")},
+            snakemake.output.archive,
+            results=snakemake.params.results,
+            files=snakemake.input,
+            named_files=snakemake.params.named_files,
+            project=snakemake.params.project,
         )

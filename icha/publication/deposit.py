@@ -1,0 +1,309 @@
+"""A deposit: results with all that others need to understand, trust and compute them again, as a folder and a zip.
+
+The same results of the same commit give the same bytes: no times, no names of people, machines or folders but those
+that the results, the configuration and the source themselves have.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import zipfile
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path, PurePosixPath
+from typing import BinaryIO
+
+from icha.checks import Check, read_checks
+from icha.configuration.model import Campaign
+from icha.configuration.publication import Publication
+from icha.costs import Cost
+from icha.files import whole_file
+from icha.integrity import is_whole
+from icha.publication.citation import citation_cff, datacite_metadata, zenodo_metadata
+from icha.publication.crate import Job, write_crate
+from icha.publication.dictionary import data_dictionary, dictionary_csv
+from icha.publication.licences import known_licence, licence_page
+from icha.publication.readme import readme
+from icha.publication.source import Source
+from icha.records import read_campaign
+
+CHECKSUMS = "SHA256SUMS"
+SOURCE = "source"
+CRATE = "ro-crate-metadata.json"
+_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+_BLOCK = 2**20
+# The earliest time that a zip can hold.
+_NO_TIME = (1980, 1, 1, 0, 0, 0)
+
+
+def make_deposit(
+    folder: str | os.PathLike,
+    archive: str | os.PathLike,
+    *,
+    results: str | os.PathLike,
+    files: Iterable[str],
+    publication: Publication,
+    campaign: Campaign,
+    source: Source,
+    jobs: Sequence[Job],
+    cost: Cost,
+) -> None:
+    """Write a deposit to `folder` and, as a zip, to `archive`, in the place of what is there; whole, or not at all.
+
+    Parameters
+    ----------
+    folder, archive : where it goes. Its name is that of the folder within the archive.
+    results : the campaign's folder of results.
+    files : what of it is published, by paths from there: at least config.used.yaml, checks.json and the campaign
+        dataset.
+    publication : what the deposit says of itself, with version, date, authors, title, summary and licence.
+    campaign : what was asked for.
+    source : the source of the program.
+    jobs : those that made the results.
+    cost : what computing the campaign is expected to take.
+
+    Raises
+    ------
+    ValueError
+        If a file is not what its job wrote, if a check failed that is not among the known failures, or if one of these
+        is none.
+    """
+    folder, archive, results = Path(folder), Path(archive), Path(results)
+    files = sorted(files)
+    refuse_unknown_failures(read_checks(results / "checks.json"), publication)
+    refuse_changed(results, files)
+    part = folder.with_name(f".{folder.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    try:
+        for file in files:
+            _copy(results / file, part / file)
+        source.export(part / SOURCE)
+        _describe(part, files, publication, campaign, source.commit, cost)
+        checksums = {path: _sha256(part / path) for path in _files(part)}
+        write_crate(part, publication, jobs, campaign=campaign.name, commit=source.commit, checksums=checksums)
+        (part / CRATE).chmod(0o644)
+        checksums[CRATE] = _sha256(part / CRATE)
+        _write(part / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
+        with whole_file(archive) as temporary:
+            _write_zip(temporary, part, folder.name)
+            # What was here before goes at once, and its checksums with it.
+            archive.unlink(missing_ok=True)
+            _remove(folder)
+            part.rename(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def refuse_unknown_failures(checks: Iterable[Check], publication: Publication) -> None:
+    """Refuse results of which a check failed, but for the runs that the publication lists with a reason.
+
+    Raises
+    ------
+    ValueError
+        Naming the checks that failed, and the listed runs of which none did.
+    """
+    failed = [check for check in checks if not check.passed]
+    known = {failure.run for failure in publication.known_failures}
+    wrong = [f"{check.subject}: {check.name}: {check.description}" for check in failed if check.subject not in known]
+    wrong += [
+        f"publication.known_failures: {run}: no check of it failed; allowed: runs with a failed check"
+        for run in sorted(known - {check.subject for check in failed})
+    ]
+    if wrong:
+        raise ValueError(
+            "not published, for readers would not know of these failures; needed: results without them, or each run "
+            "among publication.known_failures, with its reason:\n" + "\n".join(wrong)
+        )
+
+
+def refuse_changed(results: Path, files: Iterable[str]) -> None:
+    """Refuse results that are not what their jobs wrote, as far as that is recorded; every byte is looked at.
+
+    Raises
+    ------
+    ValueError
+        Naming the files.
+    """
+    changed = [file for file in files if not is_whole(results, file, thorough=True)]
+    if changed:
+        raise ValueError(
+            "not published, for these files of the results are not what was written; needed: remove them, and run the "
+            "campaign again:\n" + "\n".join(f"  {results / file}" for file in changed)
+        )
+
+
+def verify_deposit(path: str | os.PathLike) -> list[str]:
+    """What is wrong with a deposit, a line each: files that differ, are missing, or were added. Empty if it is whole.
+
+    Parameters
+    ----------
+    path : its folder or its zip.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return _problems_of_folder(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _problems_of_zip(archive)
+    except FileNotFoundError:
+        return [f"{path.name}: no such file or folder"]
+    except (zipfile.BadZipFile, ValueError, NotImplementedError, EOFError, OSError) as error:
+        return [f"{path.name}: no readable zip archive: {error}"]
+
+
+def contents(path: str | os.PathLike) -> dict[str, int]:
+    """Bytes of every file of a deposit that is whole, by its path in the deposit."""
+    path = Path(path)
+    if path.is_dir():
+        return {name: (path / name).stat().st_size for name in _files(path)}
+    with zipfile.ZipFile(path) as archive:
+        return {info.filename.split("/", 1)[1]: info.file_size for info in archive.infolist() if not info.is_dir()}
+
+
+def _describe(part: Path, files: Sequence[str], publication: Publication, campaign: Campaign, commit, cost) -> None:
+    """Write all that says what the deposit is."""
+    licence = known_licence(publication.license)
+    dictionary = data_dictionary(part, files)
+    _write(part / "LICENSE.txt", licence_page(licence, source=SOURCE))
+    _write(part / "CITATION.cff", citation_cff(publication, commit))
+    _write(part / ".zenodo.json", _json(zenodo_metadata(publication)))
+    _write(part / "datacite.json", _json(datacite_metadata(publication)))
+    _write(part / "data_dictionary.csv", dictionary_csv(dictionary))
+    error = part / "aggregated/model_error.nc"
+    page = readme(
+        publication,
+        campaign=campaign,
+        licence=licence,
+        commit=commit,
+        dataset=read_campaign(part / f"dataset/{campaign.name}.nc"),
+        checks=read_checks(part / "checks.json"),
+        model_error=read_campaign(error) if error.is_file() else None,
+        dictionary=dictionary,
+        sizes={path: (part / path).stat().st_size for path in _files(part)},
+        cost=cost,
+    )
+    _write(part / "README.md", page)
+
+
+def _json(content) -> str:
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")
+    path.chmod(0o644)
+
+
+def _copy(file: Path, copy: Path) -> None:
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(file, copy)
+    copy.chmod(0o644)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder that is there, so that at no moment a part of it is under its name."""
+    if folder.is_dir():
+        old = folder.with_name(f".{folder.name}.old")
+        shutil.rmtree(old, ignore_errors=True)
+        folder.rename(old)
+        shutil.rmtree(old)
+
+
+def _files(folder: Path) -> list[str]:
+    """Paths of all files below a folder, sorted."""
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir())
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _write_zip(path: Path, folder: Path, name: str) -> None:
+    """Write all files of a folder to a zip, in a folder of the given name. They are stored: nothing depends on zlib."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for file in _files(folder):
+            status = (folder / file).stat()
+            entry = zipfile.ZipInfo(f"{name}/{file}", date_time=_NO_TIME)
+            entry.create_system = 3  # Unix, of which the mode is
+            entry.external_attr = (0o100000 | (0o755 if status.st_mode & 0o100 else 0o644)) << 16
+            entry.file_size = status.st_size
+            with (folder / file).open("rb") as content, archive.open(entry, "w") as stored:
+                shutil.copyfileobj(content, stored, _BLOCK)
+
+
+def _problems_of_folder(folder: Path) -> list[str]:
+    links = [name for name in _files(folder) if (folder / name).is_symlink() or not (folder / name).is_file()]
+    if not (folder / CHECKSUMS).is_file():
+        return [f"{CHECKSUMS}: is missing, so this is no whole deposit"]
+    there = {name: folder / name for name in _files(folder) if name not in links}
+    return [
+        *(f"{name}: is no file of its own" for name in links),
+        *_problems(there, lambda name: there[name].open("rb"), set(links)),
+    ]
+
+
+def _problems_of_zip(archive: zipfile.ZipFile) -> list[str]:
+    names = [info.filename for info in archive.infolist() if not info.is_dir()]
+    tops = {name.split("/", 1)[0] for name in names}
+    if len(tops) != 1 or any("/" not in name for name in names):
+        return [f"holds {', '.join(sorted(tops)) or 'nothing'}; allowed: a single folder, the deposit"]
+    twice = sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else []
+    (top,) = tops
+    there = {name.removeprefix(f"{top}/"): name for name in names}
+    if CHECKSUMS not in there:
+        return [f"{CHECKSUMS}: is missing, so this is no whole deposit"]
+    return [
+        *(f"{name}: is there more than once" for name in twice),
+        *_problems(there, lambda name: archive.open(there[name])),
+    ]
+
+
+def _problems(there: Iterable[str], opened, others: Iterable[str] = ()) -> Iterator[str]:
+    """What is wrong with files, of which `opened` gives the content, by the list of checksums among them."""
+    try:
+        with opened(CHECKSUMS) as file:
+            lines = file.read().decode("utf-8").splitlines()
+    except Exception as error:  # whatever a damaged archive may lead to
+        yield f"{CHECKSUMS}: cannot be read: {error}"
+        return
+    expected: dict[str, str] = {}
+    for number, line in enumerate(lines, 1):
+        found = _LINE.fullmatch(line)
+        if found is None or not _is_inside(found[2]):
+            yield f"{CHECKSUMS}, line {number}: {line[:80]!r} is no checksum of a file in this folder"
+        elif found[2] in expected:
+            yield f"{CHECKSUMS}, line {number}: {found[2]} is named twice"
+        else:
+            expected[found[2]] = found[1]
+    for name, digest in expected.items():
+        if name not in there:
+            if name not in others:
+                yield f"{name}: is missing"
+            continue
+        try:
+            with opened(name) as file:
+                same = _digest(file) == digest
+        except Exception as error:
+            yield f"{name}: cannot be read: {error}"
+        else:
+            if not same:
+                yield f"{name}: is not what it was: its checksum is another one"
+    for name in sorted(set(there) - set(expected) - {CHECKSUMS}):
+        yield f"{name}: was added: it is not in {CHECKSUMS}"
+
+
+def _is_inside(name: str) -> bool:
+    path = PurePosixPath(name)
+    return not path.is_absolute() and ".." not in path.parts and str(path) == name
+
+
+def _digest(file: BinaryIO) -> str:
+    digest = hashlib.sha256()
+    while block := file.read(_BLOCK):
+        digest.update(block)
+    return digest.hexdigest()

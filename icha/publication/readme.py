@@ -1,0 +1,297 @@
+"""README.md of a deposit: what it is, what is in it, how far it can be trusted, and how to open and rerun it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import jinja2
+import numpy as np
+import xarray as xr
+
+from icha.campaign import run_labels, select_run
+from icha.checks import Check, worst
+from icha.configuration.model import Campaign, SelfAffineSurface
+from icha.configuration.publication import Publication
+from icha.costs import Cost
+from icha.publication.citation import web_address
+from icha.publication.dictionary import Entry
+from icha.publication.licences import Licence
+from icha.records import INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
+
+_TEMPLATE = "README.md.jinja"
+# What lies in a deposit, in the order of interest: only what is there is listed.
+_PARTS = {
+    "dataset": "all runs in one file, a group per study",
+    "aggregated": "the runs of every study compared at common loads, and with boundary elements where there are any",
+    "runs": "the same runs, a file each",
+    "surfaces": "the topographies, scaled to an rms slope of 1",
+    "references": "theories, published points and boundary-element solutions for these topographies",
+    "figures": "figures, as PNG and PDF",
+    "report.html": "report: figures, tables and checks on a page that needs no network",
+    "checks.json": "every check of every result, with its value and its limit",
+    "verdict.txt": "the verdict on the checks",
+    "config.used.yaml": "the configuration: everything that was asked for",
+    "inputs": "the files that the configuration names",
+    "source": "the program and the workflow that made all this, with the lock of their environment, `uv.lock`",
+    "data_dictionary.csv": "every variable of every netCDF file: meaning, unit, dimensions, range",
+}
+# A longer list is cut.
+_MOST_NAMES = 12
+_METADATA = "citation, licence and provenance for people and machines"
+
+
+class Part(NamedTuple):
+    """What lies under a path of a deposit; `size` in bytes."""
+
+    path: str
+    content: str
+    files: int
+    size: int
+
+
+class StudyDesign(NamedTuple):
+    """The cells of a study, and what has become of them."""
+
+    name: str
+    surfaces: tuple[str, ...]
+    seeds: tuple[int, ...]
+    rms_slopes: tuple[float, ...]
+    materials: tuple[str, ...]
+    status: Mapping[str, int]
+
+    @property
+    def runs(self) -> int:
+        """Number of the runs that were asked for."""
+        return sum(self.status.values()) - self.status[STATUS_MEANINGS[NOT_IN_DESIGN]]
+
+
+class ModelError(NamedTuple):
+    """Errors of the model against boundary elements, smallest and largest over loads, surfaces and slopes."""
+
+    entry: str
+    study: str
+    material: str
+    loads: tuple[float, float]
+    area: tuple[float, float]
+    separation: tuple[float, float]
+    overlap: tuple[float, float]
+
+
+def readme(
+    publication: Publication,
+    *,
+    campaign: Campaign,
+    licence: Licence,
+    commit: str,
+    dataset: xr.DataTree,
+    checks: Sequence[Check],
+    model_error: xr.DataTree | None,
+    dictionary: Sequence[Entry],
+    sizes: Mapping[str, int],
+    cost: Cost,
+) -> str:
+    """The page, in Markdown.
+
+    Parameters
+    ----------
+    publication : what the deposit says of itself, with version, date, authors, title, summary and licence.
+    campaign, dataset, checks, model_error : what was asked for, and what came of it.
+    licence : that of the data.
+    commit : that of the source.
+    dictionary : the variables of all files.
+    sizes : bytes of every file, by its path in the deposit.
+    cost : what computing the whole campaign is expected to take.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {
+        "cell": _cell,
+        "number": "{:.4g}".format,
+        "size": _size,
+        "duration": _duration,
+        "span": _span,
+        "seeds": _seeds,
+        "few": _few,
+    }
+    designs, surfaces = study_designs(dataset), _written(campaign, "surfaces")
+    known = {failure.run: failure.reason for failure in publication.known_failures}
+    text = environment.get_template(_TEMPLATE).render(
+        publication=publication,
+        citation=citation(publication),
+        campaign=campaign,
+        surfaces=surfaces,
+        materials=_written(campaign, "materials"),
+        licence=licence,
+        commit=commit,
+        designs=designs,
+        incomplete=[(str(labels), reason, known.get(str(labels), "")) for labels, reason in _incomplete(dataset)],
+        checks=worst(checks),
+        failed=[check for check in checks if not check.passed],
+        known=known,
+        count=_count_by_name(checks),
+        passed=sum(check.passed for check in checks),
+        total=len(checks),
+        errors=model_errors(model_error) if model_error is not None else [],
+        variables=_short_dictionary(dictionary, campaign.name),
+        parts=_parts(sizes),
+        files=len(sizes),
+        size=sum(sizes.values()),
+        cost=cost,
+        addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
+        partial=[study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
+        self_affine=any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
+        sides=_known_of(surfaces, campaign.period, "{:.4g}".format),
+        grids=_known_of(surfaces, campaign.grid, str),
+        adhesive=any(material.surface_energy > 0 for material in campaign.materials.values()),
+        both_ways=any(study.unload or study.turning_points for study in campaign.studies.values()),
+        free=any(campaign.boundary(name) == "free" for name in campaign.surfaces),
+    )
+    return text.rstrip() + "\n"
+
+
+def citation(publication: Publication) -> str:
+    """How to cite a deposit, in a line."""
+    authors = "; ".join(author.sorted_name for author in publication.authors)
+    doi = f" https://doi.org/{publication.doi}" if publication.doi else ""
+    return f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set.{doi}"
+
+
+def study_designs(dataset: xr.DataTree) -> list[StudyDesign]:
+    """The design of every study in a campaign dataset."""
+    found = []
+    for name, study in dataset.children.items():
+        status = study["status"].values
+        found.append(
+            StudyDesign(
+                name,
+                *(tuple(study[label].values.tolist()) for label in ("surface", "seed", "rms_slope", "material")),
+                {meaning: int(np.count_nonzero(status == k)) for k, meaning in enumerate(STATUS_MEANINGS)},
+            )
+        )
+    return found
+
+
+def model_errors(tree: xr.DataTree) -> list[ModelError]:
+    """The errors of the model for every entry of boundary elements and every material."""
+    found = []
+    for entry, node in tree.children.items():
+        data = node.to_dataset()
+        for material in data["material"].values.tolist():
+            own = data.sel(material=material)
+            there = np.isfinite(own["area_error_mean"])
+            if not bool(there.any()):
+                continue
+            loads = own["reduced_pressure"].broadcast_like(there).where(there)
+            ranges = [
+                (float(values.min()), float(values.max()))
+                for values in (
+                    loads,
+                    *(own[name] for name in ("area_error_mean", "separation_error_mean", "jaccard_mean")),
+                )
+            ]
+            found.append(ModelError(entry, str(data.attrs["study"]), material, *ranges))
+    return found
+
+
+def _incomplete(dataset) -> list[tuple[object, str]]:
+    """Runs that did not reach the end of their path, and why."""
+    found = []
+    for labels in run_labels(dataset):
+        study = dataset[labels.study]
+        place = {"surface": labels.surface, "seed": labels.seed, "material": labels.material}
+        cell = study["status"].sel(place).sel(rms_slope=labels.rms_slope, method="nearest")
+        if int(cell) == INCOMPLETE:
+            found.append((labels, select_run(dataset, labels).attrs["incomplete"]))
+    return found
+
+
+def _count_by_name(checks: Iterable[Check]) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for check in checks:
+        found[check.name] = found.get(check.name, 0) + 1
+    return found
+
+
+def _short_dictionary(dictionary: Sequence[Entry], campaign: str) -> list[Entry]:
+    """The variables of the campaign dataset along the path, and those that tell runs apart, each once."""
+    found = {}
+    for entry in dictionary:
+        axes = entry.dimensions.split()
+        if entry.file == f"dataset/{campaign}.nc" and "spot" not in axes and "event" not in axes:
+            found.setdefault(entry.variable, entry)
+    return list(found.values())
+
+
+def _parts(sizes: Mapping[str, int]) -> list[Part]:
+    found = []
+    for part, content in _PARTS.items():
+        own = [size for path, size in sizes.items() if path == part or path.startswith(f"{part}/")]
+        if own:
+            folder = part not in sizes
+            found.append(Part(f"{part}/" if folder else part, content, len(own), sum(own)))
+    rest = {path: size for path, size in sizes.items() if path.split("/")[0] not in _PARTS}
+    found.append(Part(", ".join(sorted(rest)), _METADATA, len(rest), sum(rest.values())))
+    return found
+
+
+def _written(campaign: Campaign, section: str) -> dict:
+    """The entries of a section that its author wrote, without the variants that studies made of them."""
+    entries = getattr(campaign, section)
+    return {name: each for name, each in entries.items() if campaign.origin(section, name) == name}
+
+
+def _known_of(surfaces: Iterable[str], ask, form) -> dict[str, str]:
+    """What a campaign knows of its surfaces; nothing of files that nobody has read."""
+    found = {}
+    for name in surfaces:
+        try:
+            found[name] = form(ask(name))
+        except AttributeError:
+            found[name] = ""
+    return found
+
+
+def _few(values: Sequence) -> str:
+    """A list, or its beginning and its length."""
+    shown = [_cell(value) for value in values]
+    return ", ".join(shown) if len(shown) <= _MOST_NAMES else f"{', '.join(shown[:_MOST_NAMES])}, … ({len(shown)})"
+
+
+def _cell(text) -> str:
+    """Text for a cell of a table, or for a line."""
+    return " ".join(str(text).split()).replace("|", "\\|")
+
+
+def _size(number: float) -> str:
+    for factor, unit in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
+        if number >= factor:
+            return f"{number / factor:.3g} {unit}"
+    return f"{number:.0f} B"
+
+
+def _duration(seconds: float) -> str:
+    for factor, unit in ((3600, "h"), (60, "min")):
+        if seconds >= factor:
+            return f"{seconds / factor:.2g} {unit}"
+    return f"{seconds:.2g} s"
+
+
+def _span(values, form="{:.3g}") -> str:
+    """Smallest and largest value, or the only one."""
+    least, most = form.format(min(values)), form.format(max(values))
+    return least if least == most else f"{least} to {most}"
+
+
+def _seeds(values: Sequence[int]) -> str:
+    """Seeds as people write them: `1..50`, or a list."""
+    values = sorted(values)
+    if len(values) > 2 and values == list(range(values[0], values[-1] + 1)):
+        return f"{values[0]}..{values[-1]}"
+    return ", ".join(map(str, values))
