@@ -11,6 +11,7 @@ from icha.cli.project import told
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
+from icha.cli.verify import verify
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -43,7 +44,7 @@ def icha(
     """
 
 
-for command in (new, describe, run, simulate, show, check):
+for command in (new, describe, run, simulate, show, check, verify):
     app.command()(told(command))
 
 

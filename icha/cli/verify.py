@@ -1,0 +1,32 @@
+"""Tell whether a deposit is what it was."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from icha.cli.describe import size
+from icha.cli.project import FAILED, Mistake, counted
+
+
+def verify(
+    deposit: Annotated[Path, typer.Argument(help="Folder of a deposit, or its zip.", show_default=False)],
+) -> None:
+    """Verify a deposit: every file is there, has its checksum, and there are no others.
+
+    Exit status: 0 if it is whole, 1 if not (each flaw is printed), 2 if there is no such file or folder.
+    """
+    from icha.publication.deposit import contents, verify_deposit
+
+    if not deposit.exists():
+        raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")
+    problems = verify_deposit(deposit)
+    for problem in problems:
+        typer.echo(problem)
+    if problems:
+        typer.secho(f"{deposit}: not whole: {counted(len(problems), 'problem')}", err=True, fg="red")
+        raise typer.Exit(FAILED)
+    sizes = contents(deposit)
+    typer.echo(f"{deposit}: whole: {counted(len(sizes), 'file')}, {size(sum(sizes.values()))}")
