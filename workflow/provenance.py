@@ -16,8 +16,6 @@ from icha.publication.crate import SOURCE, Job
 SCRIPTS = "workflow/scripts"
 # A name is cut into parts of this length; all but the last are folders, marked with @.
 _LONGEST = 254
-# Parameters that the jobs of a campaign share: they say to which campaign a result belongs.
-_OF_THE_CAMPAIGN = ("campaign", "license", "title", "summary")
 
 
 def recorded_jobs(
@@ -92,7 +90,8 @@ def _record(records: Path, name: str) -> dict[str, Any]:
 def _settings(params: list[str]) -> tuple[tuple[str, str], ...]:
     """Names and values of a job's settings, of which Snakemake records the representations of the values alone.
 
-    Sections have names within themselves; a value outside of one has none and is left out, as is what all jobs share.
+    Sections have names within themselves; a value outside of one has none and is left out. So are the attributes of
+    datasets, which say to which campaign a result belongs, and paths of this machine.
     """
     settings: dict[str, str] = {}
     for text in params:
@@ -100,8 +99,8 @@ def _settings(params: list[str]) -> tuple[tuple[str, str], ...]:
             value = ast.literal_eval(text)
         except (ValueError, SyntaxError):
             continue
-        if isinstance(value, dict):
-            settings.update((name, text) for name, text in _flat(value) if name not in _OF_THE_CAMPAIGN)
+        if isinstance(value, dict) and "campaign" not in value:
+            settings.update((name, text) for name, text in _flat(value) if not text.startswith("/"))
     return tuple(sorted(settings.items()))
 
 

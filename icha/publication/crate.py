@@ -29,6 +29,7 @@ from icha.publication.licences import known_licence
 
 METADATA = "ro-crate-metadata.json"
 CONFIGURATION = "config.used.yaml"
+README = "README.md"
 SOURCE = "source/"
 WORKFLOW = f"{SOURCE}Snakefile"
 LOCK = f"{SOURCE}uv.lock"
@@ -42,7 +43,7 @@ _WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
 _BIOSCHEMAS = "https://bioschemas.org/profiles"
 # Of the run crates' own terms, the one that is used here (https://w3id.org/ro/terms/workflow-run/context).
 _TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
-_COMPLETED = {"@id": "http://schema.org/CompletedActionStatus"}
+_COMPLETED = "http://schema.org/CompletedActionStatus"
 # What IANA calls the formats of a deposit's files; netCDF has no name there but one that is in use.
 _FORMATS = {
     ".bib": "application/x-bibtex",
@@ -169,6 +170,7 @@ def crate_metadata(
         "#campaign",
         "CreateAction",
         name=f"Campaign {campaign}",
+        description=publication.title,
         instrument=workflow,
         object=[files[path] for path in given],
         result=[files[path] for path in sorted(made)],
@@ -181,7 +183,7 @@ def crate_metadata(
         controls.append(control)
     _add(
         crate,
-        "#organisation",
+        "#organised",
         "OrganizeAction",
         name=f"Campaign {campaign}, organised by {engine['name']}",
         instrument=engine,
@@ -189,8 +191,10 @@ def crate_metadata(
         result=run,
         actionStatus=_COMPLETED,
     )
-    crate.root_dataset["mainEntity"] = workflow
+    _set(crate.root_dataset, mainEntity=workflow)
     crate.root_dataset.append_to("mentions", [run, *actions])
+    if README in files:
+        _set(files[README], about=crate.root_dataset)
     return crate.metadata.generate()
 
 
@@ -260,33 +264,30 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
 
 
 def _add_author(crate: ROCrate, author: Author) -> Entity:
-    name = quote(author.full_name)
     if not author.is_person:
-        return _add(crate, author.ror or f"#organisation/{name}", "Organization", name=author.name)
+        return _add_organisation(crate, author.name, author.ror)
     person = _add(
         crate,
-        f"https://orcid.org/{author.orcid}" if author.orcid else f"#person/{name}",
+        f"https://orcid.org/{author.orcid}" if author.orcid else f"#person/{quote(author.full_name)}",
         "Person",
         name=author.full_name,
         givenName=author.given_names,
         familyName=author.family_names,
     )
     if author.affiliation or author.ror:
-        called = author.affiliation or author.ror
-        person["affiliation"] = _add(crate, author.ror or f"#organisation/{quote(called)}", "Organization", name=called)
+        _set(person, affiliation=_add_organisation(crate, author.affiliation or author.ror, author.ror))
     return person
+
+
+def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
+    return _add(crate, address or f"#organisation/{quote(name)}", "Organization", name=name, url=address)
 
 
 def _funding(crate: ROCrate, publication: Publication) -> tuple[list[Entity], list[Entity]]:
     """Funders, and their grants where they are named."""
     funders, grants = {}, {}
     for each in publication.funding:
-        funder = _add(
-            crate,
-            web_address(each.funder_id) if each.funder_id else f"#organisation/{quote(each.funder)}",
-            "Organization",
-            name=each.funder,
-        )
+        funder = _add_organisation(crate, each.funder, each.funder_id and web_address(each.funder_id))
         funders[funder.id] = funder
         award = each.award_number or each.award_title
         if award:
@@ -319,7 +320,6 @@ def _engine(crate: ROCrate) -> Entity:
         url="https://snakemake.github.io",
         identifier="https://w3id.org/workflowhub/workflow-ro-crate#snakemake",
         version=number,
-        softwareVersion=number,
     )
 
 
@@ -372,6 +372,7 @@ def _add_job(crate: ROCrate, job: Job, files: Mapping[str, File]) -> tuple[Entit
         f"#job/{name}",
         "CreateAction",
         name=f"{job.rule}: {job.outputs[0]}",
+        description=job.description,
         instrument=files[job.script],
         object=[*(files[path] for path in job.inputs), *(_add_value(crate, job, *each) for each in job.parameters)],
         result=[files[path] for path in job.outputs],
@@ -414,5 +415,5 @@ def _set(entity: Entity, kind: list[str] | None = None, **properties: Any) -> No
     if kind:
         entity.properties()["@type"] = kind
     for name, value in properties.items():
-        if value not in (None, "", [], ()):
-            entity[name] = value
+        if value not in (None, "", []):
+            entity[name] = value[0] if isinstance(value, list) and len(value) == 1 else value

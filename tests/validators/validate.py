@@ -243,9 +243,10 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             try:
                 outcome = VALIDATORS[name](folder)
+            except FileNotFoundError as error:
+                outcome = Outcome("could not be run", [f"{error.filename} is missing"])
             except Exception as error:
-                lines = traceback.format_exception(error)
-                outcome = Outcome("could not be run", ["".join(lines).strip()])
+                outcome = Outcome("could not be run", ["".join(traceback.format_exception(error)).strip()])
         good &= not outcome.problems
         verdict = "failed" if outcome.problems else "passed"
         print(f"{name}: {verdict}; {outcome.counted}, {len(outcome.problems)} problems, {len(outcome.remarks)} remarks")
@@ -258,13 +259,11 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
 
 
 def root_of(folder: Path) -> Path:
-    """The folder of the crate in an archive, which may have one folder around it."""
-    if not (folder / CRATE).exists():
-        inner = [path.parent for path in folder.glob(f"*/{CRATE}")]
-        if len(inner) != 1:
-            sys.exit(f"no deposit: there is no {CRATE} in it")
-        return inner[0]
-    return folder
+    """The folder of the crate: the one given, or the only one in it that is a crate, as in archives."""
+    found = [path.parent for path in (folder / CRATE, *folder.glob(f"*/{CRATE}")) if path.exists()]
+    if not found:
+        sys.exit(f"{folder}: is no deposit: there is no {CRATE} in it")
+    return found[0]
 
 
 def main() -> int:
@@ -278,7 +277,7 @@ def main() -> int:
     logging.disable(logging.WARNING)
     most = sys.maxsize if arguments.all else 5
     if arguments.deposit.is_dir():
-        return 0 if validate(arguments.deposit.resolve(), arguments.only, most) else 1
+        return 0 if validate(root_of(arguments.deposit.resolve()), arguments.only, most) else 1
     if not zipfile.is_zipfile(arguments.deposit):
         parser.error(f"{arguments.deposit} is neither a folder nor a zip archive")
     with tempfile.TemporaryDirectory() as scratch:
