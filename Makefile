@@ -12,10 +12,11 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help environment slurm-environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page validators-environment validate clean
+.PHONY: help publish environment slurm-environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
+	@echo "make publish make the deposit of that campaign, and before it what is missing; docs/howto/publish.md"
 	@echo "make validation  run campaign validation (an hour) and write docs/validation.md and docs/error_sources.md from it"
 	@echo "make hysteresis  run campaign hysteresis (twenty minutes) and write docs/hysteresis.md from it"
 	@echo "make test    run the tests"
@@ -51,6 +52,9 @@ slurm-environment: .venv-slurm/.installed
 
 run: environment
 	@icha run $(CONFIG) --cores $(CORES)
+
+publish: environment
+	@icha run $(or $(CONFIG),config/config.yaml) publish --cores $(CORES)
 
 validation hysteresis: environment
 	$(MAKE) run CONFIG=config/campaigns/$@.yaml
