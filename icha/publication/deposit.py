@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
-from icha.checks import Check, read_checks
+from icha.checks import read_checks, refuse_unknown_failures
 from icha.configuration.model import Campaign
 from icha.configuration.publication import Publication
 from icha.costs import Cost
@@ -73,8 +73,8 @@ def make_deposit(
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files = sorted(files)
-    refuse_unknown_failures(read_checks(results / "checks.json"), publication)
-    refuse_changed(results, files)
+    _refuse_unknown_failures(results, publication)
+    _refuse_changed(results, files)
     part = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(part, ignore_errors=True)
     try:
@@ -97,36 +97,18 @@ def make_deposit(
         shutil.rmtree(part, ignore_errors=True)
 
 
-def refuse_unknown_failures(checks: Iterable[Check], publication: Publication) -> None:
-    """Refuse results of which a check failed, but for the runs that the publication lists with a reason.
-
-    Raises
-    ------
-    ValueError
-        Naming the checks that failed, and the listed runs of which none did.
-    """
-    failed = [check for check in checks if not check.passed]
-    known = {failure.run for failure in publication.known_failures}
-    wrong = [f"{check.subject}: {check.name}: {check.description}" for check in failed if check.subject not in known]
-    wrong += [
-        f"publication.known_failures: {run}: no check of it failed; allowed: runs with a failed check"
-        for run in sorted(known - {check.subject for check in failed})
-    ]
-    if wrong:
+def _refuse_unknown_failures(results: Path, publication: Publication) -> None:
+    try:
+        refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
+    except ValueError as error:
         raise ValueError(
-            "not published, for readers would not know of these failures; needed: results without them, or each run "
-            "among publication.known_failures, with its reason:\n" + "\n".join(wrong)
-        )
+            "not published, for readers would not know of failures; needed: results without them, or each run that "
+            f"fails, and no other, among publication.known_failures with its reason:\n{error}"
+        ) from None
 
 
-def refuse_changed(results: Path, files: Iterable[str]) -> None:
-    """Refuse results that are not what their jobs wrote, as far as that is recorded; every byte is looked at.
-
-    Raises
-    ------
-    ValueError
-        Naming the files.
-    """
+def _refuse_changed(results: Path, files: Iterable[str]) -> None:
+    """Refuse results that are not what their jobs wrote, as far as that is recorded; every byte is looked at."""
     changed = [file for file in files if not is_whole(results, file, thorough=True)]
     if changed:
         raise ValueError(

@@ -145,6 +145,7 @@ def readme(
         size=sum(sizes.values()),
         cost=cost,
         addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
+        example=run_labels(dataset)[0],
         partial=[study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
         self_affine=any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
         sides=_known_of(surfaces, campaign.period, "{:.4g}".format),
