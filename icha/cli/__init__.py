@@ -11,6 +11,7 @@ from icha.cli.project import told
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
+from icha.cli.upload import upload
 from icha.cli.verify import verify
 
 app = typer.Typer(
@@ -44,7 +45,7 @@ def icha(
     """
 
 
-for command in (new, describe, run, simulate, show, check, verify):
+for command in (new, describe, run, simulate, show, check, verify, upload):
     app.command()(told(command))
 
 

@@ -1,0 +1,243 @@
+"""Send a deposit to Zenodo, after having said what is sent, and asked."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from icha.cli.project import FAILED, Mistake, counted, shown
+
+TOKEN = "ZENODO_TOKEN"
+# Beside the archive, where Zenodo shows them.
+_BESIDE = ("README.md", "ro-crate-metadata.json")
+
+
+def upload(
+    deposit: Annotated[
+        Path, typer.Argument(help="A deposit's .zip, or its folder with the .zip beside it.", show_default=False)
+    ],
+    sandbox: Annotated[
+        bool, typer.Option("--sandbox", help="To sandbox.zenodo.org, for trying; it has tokens of its own.")
+    ] = False,
+    url: Annotated[
+        str | None,
+        typer.Option(help="To another server that speaks Zenodo's deposit API: https://….", show_default=False),
+    ] = None,
+    new_version_of: Annotated[
+        str | None,
+        typer.Option(metavar="ID", help="As a new version of this published record of yours.", show_default=False),
+    ] = None,
+    draft: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ID",
+            help="Into this draft, such as one that an upload left behind; what is there already is not sent again.",
+            show_default=False,
+        ),
+    ] = None,
+    publish: Annotated[
+        bool, typer.Option("--publish", help="Publish it, too. That cannot be taken back, so it is asked for again.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+) -> None:
+    """Send a deposit to Zenodo as a draft; say before what is sent where, and ask.
+
+    The deposit is verified first. Sent are the zip and, beside it, its README.md and ro-crate-metadata.json; title,
+    authors, licence and so on are those of the deposit. Without --publish it stays a draft, which you look at, change
+    and publish on its page. Needs a token with the scopes deposit:write and deposit:actions in the environment
+    variable ZENODO_TOKEN. Nothing is sent before you agree.
+
+    Exit status: 0 if everything was sent, 1 if not, 2 if it cannot be sent.
+    """
+    from icha.publication.zenodo import SANDBOX, ZENODO, server_address
+
+    if sandbox and url:
+        raise Mistake("--sandbox and --url are two servers; allowed: one of them")
+    if draft and new_version_of:
+        raise Mistake("--draft and --new-version-of are two places; allowed: one of them")
+    try:
+        address = server_address(url or (SANDBOX if sandbox else ZENODO))
+    except ValueError as error:
+        raise Mistake(f"--url: {error}") from None
+    draft, new_version_of = _number("--draft", draft), _number("--new-version-of", new_version_of)
+    token = _token(address)
+    archive = _archive(deposit)
+    with tempfile.TemporaryDirectory() as folder:
+        files, metadata = _contents(archive, Path(folder))
+        _refuse_foreign_doi(metadata, draft)
+        place = f"draft {draft}" if draft else f"a new version of {new_version_of}" if new_version_of else "a new draft"
+        typer.echo(_summary(metadata, files, f"{address}, {place}"))
+        _ask(yes)
+        _send(archive, files, metadata, address, token, draft, new_version_of, publish, yes)
+
+
+def _number(option: str, text: str | None) -> str | None:
+    """The number of a record; taken from its DOI or its page's address, too."""
+    if text is None:
+        return None
+    found = re.fullmatch(r"(?:\S*[./])?(\d+)/?", text)
+    if not found:
+        raise Mistake(f"{option} {text!r}: is no number of a record; allowed: a number such as 1234567")
+    return found[1]
+
+
+def _token(address: str) -> str:
+    token = os.environ.get(TOKEN, "").strip()
+    if not token:
+        raise Mistake(
+            f"{TOKEN} is not set; needed: a token, with the scopes deposit:write and deposit:actions, from "
+            f"{address}/account/settings/applications/tokens/new/, in that environment variable"
+        )
+    if not re.fullmatch(r"[!-~]+", token):
+        raise Mistake(f"{TOKEN} is no token: it has characters in it that none has")
+    return token
+
+
+def _archive(deposit: Path) -> Path:
+    """The zip of a deposit, verified."""
+    from icha.publication.deposit import CHECKSUMS, verify_deposit
+
+    archive = deposit
+    if deposit.is_dir():
+        archive = deposit.resolve().with_name(f"{deposit.resolve().name}.zip")
+        if not archive.is_file():
+            raise Mistake(f"{deposit}: there is no {archive.name} beside it; `icha run … publish` makes both")
+    if not archive.is_file():
+        raise Mistake(f"{deposit}: no such file or folder")
+    wrong = verify_deposit(archive)
+    if not wrong and deposit.is_dir():
+        with zipfile.ZipFile(archive) as content:
+            if content.read(_member(content, CHECKSUMS)) != (deposit / CHECKSUMS).read_bytes():
+                wrong = ["its zip has other checksums than the folder has"]
+    if wrong:
+        raise Mistake(f"{deposit}: the deposit is damaged, and nothing is sent:\n" + "\n".join(wrong))
+    return archive
+
+
+def _member(content: zipfile.ZipFile, name: str) -> str:
+    """The name in the archive of a file at the top of the deposit."""
+    for member in content.namelist():
+        if member.split("/", 1)[1:] == [name]:
+            return member
+    raise Mistake(f"{content.filename}: has no {name}, as a deposit has")
+
+
+def _contents(archive: Path, folder: Path) -> tuple[list[Path], dict]:
+    """The files that are sent, and the metadata for Zenodo."""
+    files = [archive]
+    with zipfile.ZipFile(archive) as content:
+        for name in _BESIDE:
+            with content.open(_member(content, name)) as source, (folder / name).open("wb") as target:
+                shutil.copyfileobj(source, target)
+            files.append(folder / name)
+        return files, json.loads(content.read(_member(content, ".zenodo.json")))
+
+
+def _refuse_foreign_doi(metadata: dict, draft: str | None) -> None:
+    """A DOI that Zenodo has reserved belongs to one draft, and the deposit says it everywhere."""
+    found = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", metadata.get("doi") or "")
+    if found and found[1] != draft:
+        raise Mistake(
+            f"the deposit has the DOI {metadata['doi']}, which is reserved for draft {found[1]}; needed: --draft "
+            f"{found[1]}, or a deposit without publication.doi"
+        )
+
+
+def _summary(metadata: dict, files: list[Path], where: str) -> str:
+    authors = "; ".join(creator.get("name", "") for creator in metadata.get("creators", ()))
+    communities = ", ".join(each.get("identifier", "") for each in metadata.get("communities", ()))
+    rows = [
+        ("to", where),
+        ("title", metadata.get("title")),
+        ("version", metadata.get("version")),
+        ("authors", authors),
+        ("licence", metadata.get("license")),
+        ("community", communities or "none"),
+        *(("file", f"{path.name}, {_size(path.stat().st_size)}") for path in files),
+    ]
+    return "\n".join(f"{name + ':':<11}{value or 'none'}" for name, value in rows)
+
+
+def _size(count: int) -> str:
+    """`15.2 MB (15,234,567 bytes)`."""
+    for unit, factor in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= factor:
+            return f"{count / factor:.1f} {unit} ({count:,} bytes)"
+    return counted(count, "byte")
+
+
+def _ask(yes: bool) -> None:
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise Mistake("there is nobody to ask, and nothing is sent; needed: --yes, or a terminal")
+    if not typer.confirm("Send it?"):
+        typer.echo("Nothing was sent.")
+        raise typer.Exit(FAILED)
+
+
+def _send(archive, files, metadata, address, token, number, new_version_of, publish, yes) -> None:
+    from icha.publication.zenodo import Zenodo, ZenodoError, md5_of
+
+    server, draft = Zenodo(address, token), None
+    try:
+        if number:
+            draft = server.draft(number)
+        else:
+            draft = server.new_version(new_version_of) if new_version_of else server.create()
+        typer.echo(f"draft:     {draft.page}")
+        sums = {path.name: md5_of(path) for path in files}
+        there = {file.name for file in draft.files if file.md5 == sums.get(file.name)}
+        # First, for what is wrong with it is known at once.
+        server.describe(draft, metadata)
+        others = []
+        for file in draft.files:
+            if file.name in there:
+                continue
+            if file.name in sums or new_version_of:
+                server.remove(draft, file)
+            else:
+                others.append(file.name)
+        for path in files:
+            if path.name in there:
+                typer.echo(f"{path.name}: is there already")
+                continue
+            confirmed = server.upload(draft, path, sums[path.name])
+            checked = "its checksum is right" if confirmed else "the server tells no checksum"
+            typer.echo(f"{path.name}: sent, {checked}")
+        if others:
+            typer.echo(f"The draft has other files, too, which are left there: {', '.join(others)}")
+        if draft.doi:
+            typer.echo(f"DOI:       {draft.doi} (reserved)")
+        if publish and (yes or _asked_again()):
+            published = server.publish(draft)
+            typer.echo(f"published: {published.page}\nDOI:       {published.doi}")
+        else:
+            typer.echo("It is a draft. Look at it, and publish it, on its page.")
+    except (ZenodoError, OSError, KeyboardInterrupt) as error:
+        with contextlib.suppress(OSError):
+            typer.secho(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")
+        if draft is not None:
+            server_option = "" if address == "https://zenodo.org" else f" --url {address}"
+            typer.echo(
+                f"A draft is left behind: {draft.page}\nThis goes on with it:   icha upload {shown(archive)}"
+                f"{server_option} --draft {draft.number}",
+                err=True,
+            )
+        raise typer.Exit(FAILED) from None
+
+
+def _asked_again() -> bool:
+    if not sys.stdin.isatty():
+        return False
+    return typer.confirm("Publish it? What is published cannot be deleted.")
