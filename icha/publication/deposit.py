@@ -16,6 +16,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
+import xarray as xr
+
 from icha.checks import read_checks, refuse_unknown_failures
 from icha.configuration.model import Campaign
 from icha.configuration.publication import Publication
@@ -155,18 +157,20 @@ def _describe(part: Path, files: Sequence[str], publication: Publication, campai
     _write(part / "datacite.json", _json(datacite_metadata(publication)))
     _write(part / "data_dictionary.csv", dictionary_csv(dictionary))
     error = part / "aggregated/model_error.nc"
-    page = readme(
-        publication,
-        campaign=campaign,
-        licence=licence,
-        commit=commit,
-        dataset=read_campaign(part / f"dataset/{campaign.name}.nc"),
-        checks=read_checks(part / "checks.json"),
-        model_error=read_campaign(error) if error.is_file() else None,
-        dictionary=dictionary,
-        sizes={path: (part / path).stat().st_size for path in _files(part)},
-        cost=cost,
-    )
+    # The dataset may be large, and little of it is told.
+    with xr.open_datatree(part / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
+        page = readme(
+            publication,
+            campaign=campaign,
+            licence=licence,
+            commit=commit,
+            dataset=dataset,
+            checks=read_checks(part / "checks.json"),
+            model_error=read_campaign(error) if error.is_file() else None,
+            dictionary=dictionary,
+            sizes={path: (part / path).stat().st_size for path in _files(part)},
+            cost=cost,
+        )
     _write(part / "README.md", page)
 
 

@@ -10,15 +10,16 @@ import jinja2
 import numpy as np
 import xarray as xr
 
-from icha.campaign import run_labels, select_run
+from icha.campaign_file import LABELS
 from icha.checks import Check, worst
 from icha.configuration.model import Campaign, SelfAffineSurface
 from icha.configuration.publication import Publication
 from icha.costs import Cost
+from icha.labels import RunLabels
 from icha.publication.citation import web_address
 from icha.publication.dictionary import Entry
 from icha.publication.licences import Licence
-from icha.records import INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
+from icha.records import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 
 _TEMPLATE = "README.md.jinja"
 # What lies in a deposit, in the order of interest: only what is there is listed.
@@ -131,7 +132,9 @@ def readme(
         licence=licence,
         commit=commit,
         designs=designs,
-        incomplete=[(str(labels), reason, known.get(str(labels), "")) for labels, reason in _incomplete(dataset)],
+        incomplete=[
+            (str(run), reason, known.get(str(run), "")) for run, reason in _runs_of_status(dataset, INCOMPLETE)
+        ],
         checks=worst(checks),
         failed=[check for check in checks if not check.passed],
         known=known,
@@ -145,7 +148,7 @@ def readme(
         size=sum(sizes.values()),
         cost=cost,
         addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
-        example=run_labels(dataset)[0],
+        example=(_runs_of_status(dataset, COMPLETE) or _runs_of_status(dataset, INCOMPLETE))[0][0],
         partial=[study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
         self_affine=any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
         sides=_known_of(surfaces, campaign.period, "{:.4g}".format),
@@ -201,15 +204,15 @@ def model_errors(tree: xr.DataTree) -> list[ModelError]:
     return found
 
 
-def _incomplete(dataset) -> list[tuple[object, str]]:
-    """Runs that did not reach the end of their path, and why."""
+def _runs_of_status(dataset: xr.DataTree, *statuses: int) -> list[tuple[RunLabels, str]]:
+    """The runs of these statuses in a campaign dataset, with the reason why they failed, if they did."""
     found = []
-    for labels in run_labels(dataset):
-        study = dataset[labels.study]
-        place = {"surface": labels.surface, "seed": labels.seed, "material": labels.material}
-        cell = study["status"].sel(place).sel(rms_slope=labels.rms_slope, method="nearest")
-        if int(cell) == INCOMPLETE:
-            found.append((labels, select_run(dataset, labels).attrs["incomplete"]))
+    for name, node in dataset.children.items():
+        status, failure = (node[each].transpose(*LABELS).values for each in ("status", "failure"))
+        axes = [node[label].values.tolist() for label in LABELS]
+        for place in np.argwhere(np.isin(status, statuses)).tolist():
+            labels = RunLabels(name, *(axis[k] for axis, k in zip(axes, place, strict=True)))
+            found.append((labels, str(failure[tuple(place)])))
     return found
 
 
