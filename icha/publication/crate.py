@@ -33,6 +33,7 @@ README = "README.md"
 SOURCE = "source/"
 WORKFLOW = f"{SOURCE}Snakefile"
 LOCK = f"{SOURCE}uv.lock"
+PROGRAM_LICENCE = f"{SOURCE}LICENSE"
 
 _RUN_PROFILES = {
     "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
@@ -150,7 +151,7 @@ def crate_metadata(
     _describe(crate, publication, campaign)
 
     shown = {path for path in checksums if not path.startswith(SOURCE)}
-    shown |= {WORKFLOW, LOCK, *(job.script for job in steps)} & set(checksums)
+    shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in steps)} & set(checksums)
     files = {path: _add_file(crate, path, sizes[path], checksums[path]) for path in sorted(shown)}
     source = crate.add(Dataset(crate, dest_path=SOURCE))
     _set(
@@ -210,19 +211,16 @@ def _steps(jobs: Sequence[Job], checksums: Mapping[str, str]) -> list[Job]:
     if twice:
         raise ValueError(f"{twice[0]}: is made by more than one job")
     maker = {path: job for job in jobs for path in job.outputs}
-    flow = TopologicalSorter(
-        {job.outputs: {maker[path].outputs for path in job.inputs if path in maker} for job in jobs}
-    )
-    depth: dict[tuple[str, ...], int] = {}
-    try:
-        for outputs in flow.static_order():
-            before = (depth[maker[path].outputs] for path in maker[outputs[0]].inputs if path in maker)
-            depth[outputs] = 1 + max(before, default=0)
-    except CycleError as error:
-        raise ValueError(f"{error.args[1][0][0]}: is made from itself") from error
+    before = {job.outputs[0]: {maker[path].outputs[0] for path in job.inputs if path in maker} for job in jobs}
+    depth: dict[str, int] = {}
     latest: dict[str, int] = {}
-    for job in jobs:
-        latest[job.rule] = max(latest.get(job.rule, 0), depth[job.outputs])
+    try:
+        for output in TopologicalSorter(before).static_order():
+            depth[output] = 1 + max((depth[earlier] for earlier in before[output]), default=0)
+            rule = maker[output].rule
+            latest[rule] = max(latest.get(rule, 0), depth[output])
+    except CycleError as error:
+        raise ValueError(f"{error.args[1][0]}: is made from itself") from error
     first = {job.rule: job for job in reversed(jobs)}
     return [first[rule] for rule in sorted(latest, key=lambda rule: (latest[rule], rule))]
 
@@ -346,6 +344,7 @@ def _describe_workflow(
         name="ICHA: adhesive rough contact by interacting and coalescing asperities",
         version=commit,
         conformsTo=_add(crate, f"{_BIOSCHEMAS}/ComputationalWorkflow/1.0-RELEASE", "CreativeWork"),
+        license=files.get(PROGRAM_LICENCE),
         programmingLanguage=engine,
         hasPart=list(tools.values()),
         step=[

@@ -1,0 +1,27 @@
+"""The validators of others, in their own environment: `make validators-environment`.
+
+Tests that need them are skipped without it, and fail with `ICHA_REQUIRE_VALIDATORS=1`.
+"""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[1]
+PYTHON = REPOSITORY / ".venv-validators/bin/python"
+
+
+def validated(deposit, *names):
+    """Put a deposit to the validators of these names, or to all; return the finished process."""
+    if not PYTHON.exists():
+        reason = "the validators are not installed: make validators-environment"
+        (pytest.fail if os.environ.get("ICHA_REQUIRE_VALIDATORS") == "1" else pytest.skip)(reason)
+    only = ["--only", *names] if names else []
+    return subprocess.run(
+        [PYTHON, REPOSITORY / "tests/validators/validate.py", deposit, *only],
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
