@@ -6,6 +6,7 @@ public interface for reading them.
 
 import ast
 import json
+import os
 from base64 import urlsafe_b64encode
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
@@ -14,8 +15,6 @@ from typing import Any
 from icha.publication.crate import SOURCE, Job
 
 SCRIPTS = "workflow/scripts"
-# A name is cut into parts of this length; all but the last are folders, marked with @.
-_LONGEST = 254
 
 
 def recorded_jobs(
@@ -68,12 +67,9 @@ def recorded_jobs(
 
 def _record(records: Path, name: str) -> dict[str, Any]:
     """What Snakemake recorded when it made the file `name`."""
-    code = urlsafe_b64encode(name.encode()).decode()
-    parts = [code[start : start + _LONGEST] for start in range(0, len(code), _LONGEST)]
-    file = records.joinpath(*(f"@{part}" for part in parts[:-1]), parts[-1])
     what = "there is no record"
     try:
-        record = json.loads(file.read_text(encoding="utf-8"))
+        record = json.loads(_place(records, name).read_text(encoding="utf-8"))
         if all(record.get(key) for key in ("rule", "log", "code")) and not record.get("incomplete"):
             return record
         what = "there is no complete record"
@@ -85,6 +81,14 @@ def _record(records: Path, name: str) -> dict[str, Any]:
         f"{name}: {what} of how it was made in {records}, so its origin cannot be published; remove this file and run "
         "the campaign again, which makes it anew"
     )
+
+
+def _place(records: Path, name: str) -> Path:
+    """Where the record of a file lies: a name that is too long for the file system is cut, its first parts folders."""
+    code = urlsafe_b64encode(name.encode()).decode()
+    longest = os.pathconf(records, "PC_NAME_MAX") - 1
+    parts = [code[start : start + longest] for start in range(0, len(code), longest)]
+    return records.joinpath(*(f"@{part}" for part in parts[:-1]), parts[-1])
 
 
 def _settings(params: list[str]) -> tuple[tuple[str, str], ...]:

@@ -253,9 +253,8 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
     for each in publication.related_identifiers:
         cited = each.resource is None or each.resource in _PUBLICATIONS
         key = "isBasedOn" if each.relation == "IsDerivedFrom" else "citation" if cited else "mentions"
-        kind = {"Dataset": "Dataset", "Software": "SoftwareApplication"}.get(each.resource, "CreativeWork")
-        if kind == "CreativeWork" and each.resource in _PUBLICATIONS:
-            kind = "ScholarlyArticle"
+        # A dataset, too, is no more than a work here: what is called a Dataset is part of the crate.
+        kind = "ScholarlyArticle" if each.resource in _PUBLICATIONS else "CreativeWork"
         address = web_address(each.identifier)
         related.setdefault(key, []).append(_add(crate, address, kind, name=each.identifier, identifier=address))
     _set(crate.root_dataset, **related)
