@@ -13,6 +13,14 @@ REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
 PARTS += ("pyproject.toml", "uv.lock", "README.md")
 SMOKE = "config/campaigns/smoke.yaml"
+# Files whose tests take minutes, the longest first: begun last, they would keep one core waiting.
+LONG = ("every_case_ends", "reruns", "boundary_elements", "workflow", "slurm", "cli_run", "loops", "dissipation")
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the files that take longest."""
+    rank = {f"test_{name}.py": number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: rank.get(item.path.name, len(LONG)))
 
 
 def snakemake_command(*arguments, configuration=SMOKE):
