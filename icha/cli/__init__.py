@@ -8,6 +8,7 @@ from icha.cli.check import check
 from icha.cli.describe import describe
 from icha.cli.new import new
 from icha.cli.project import told
+from icha.cli.reproduce import reproduce
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
@@ -45,7 +46,7 @@ def icha(
     """
 
 
-for command in (new, describe, run, simulate, show, check, verify, upload):
+for command in (new, describe, run, simulate, show, check, verify, reproduce, upload):
     app.command()(told(command))
 
 

@@ -381,7 +381,7 @@ def lines(comparison: Comparison) -> list[Line]:
     return sorted(made, key=lambda line: (line.item.verdict == WITHIN, -line.item.deviation))
 
 
-def table(comparison: Comparison, most: int = 30) -> str:
+def table(comparison: Comparison, most: int = 20) -> str:
     """The result as text: a line for every kind of file, and one for every variable that is not identical.
 
     Of the latter, at most `most` of those that differ and as many of those within tolerance.
@@ -414,6 +414,9 @@ def table(comparison: Comparison, most: int = 30) -> str:
 def _told(line: Line) -> str:
     if line.worst == line.item.name:
         return f"{line.worst}: {line.item.verdict}, {line.item.detail}"
+    if line.item.verdict == WITHIN and line.item.deviation:
+        # Where is of little interest; the file of `write_json` has it.
+        return f"{line.kind}: {line.item.name.lstrip('/')}: {line.item.verdict}, {line.item.deviation:.2g} at most"
     files = line.worst if line.count == 1 else f"{line.count} files, most in {line.worst}"
     return f"{line.kind}: {line.item.name.lstrip('/')}: {line.item.verdict}, {line.item.detail} ({files})"
 

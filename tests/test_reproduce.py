@@ -1,0 +1,263 @@
+"""`icha reproduce`: a deposit whose program is a small script, for all that may go right and wrong around it."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import zipfile
+from importlib.metadata import version
+
+import pytest
+from typer.testing import CliRunner
+
+from icha.cli import app
+from icha.publication.deposit import verify_deposit
+
+NAME = "mine-1.0.0"
+SOFT, HARD = "load/rough/seed1/slope1/soft", "load/rough/seed2/slope1/hard"
+# Stands for the deposit's `icha`: it makes what it is asked for, a number each, and tells how it was called.
+PROGRAM = """
+import json, os, sys, time, netCDF4, pathlib
+command, configuration, *targets = sys.argv[1:]
+assert command == "run" and "cores" not in targets
+number = float(pathlib.Path("inputs/number.txt").read_text())
+results = pathlib.Path("results/mine")
+runs = ["runs/load/rough/seed1/slope1/soft.nc", "runs/load/rough/seed2/slope1/hard.nc"]
+files = [*runs, "surfaces/rough/seed1.nc", "surfaces/rough/seed2.nc", "dataset/mine.nc"]
+asked = [t.removeprefix("results/mine/") for t in targets if t.endswith(".nc")]
+with open("called.jsonl", "a") as log:
+    log.write(json.dumps([sys.argv[1:], dict(os.environ)]) + "\\n")
+if os.environ.get("PLANTED") == "fails":
+    sys.exit("the program fails")
+surfaces = [f"surfaces/rough/{path.split('/')[3]}.nc" for path in asked]
+for path in [*surfaces, *asked] or files:
+    (results / path).parent.mkdir(parents=True, exist_ok=True)
+    with netCDF4.Dataset(results / path, "w") as file:
+        file.createDimension("step", 3)
+        planted = os.environ.get("PLANTED", "")
+        factor = 1 + float(planted or 0) if path.endswith("soft.nc") and planted != "sleeps" else 1
+        file.createVariable("pressure", "f8", ("step",))[:] = [number, 2.0 * factor, 3.0]
+        if "seed2" in path:
+            file.note = 1000 * "large"
+    print("made", path, flush=True)
+    if os.environ.get("PLANTED") == "sleeps":
+        time.sleep(60)
+(results / "verdict.txt").write_text("passed")
+"""
+MAKEFILE = f"""
+environment:
+	@test "$$PLANTED" != "no network" || (echo "cannot reach the index" && exit 1)
+	@mkdir -p .venv/bin
+	@printf '#!{sys.executable}\\nimport runpy; runpy.run_path("program.py")\\n' > .venv/bin/icha
+	@chmod +x .venv/bin/icha
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A deposit as a folder and as a zip; not to be changed."""
+    folder = tmp_path_factory.mktemp("deposit")
+    deposit = folder / NAME
+    for path, text in {
+        "config.used.yaml": "name: mine\n",
+        "inputs/number.txt": "1.5",
+        "source/Snakefile": "",
+        "source/Makefile": MAKEFILE,
+        "source/uv.lock": lock(version("numpy")),
+        "source/program.py": PROGRAM,
+        "README.md": "# Mine\n",
+    }.items():
+        (deposit / path).parent.mkdir(parents=True, exist_ok=True)
+        (deposit / path).write_text(text)
+    work = folder / "work"
+    shutil.copytree(deposit / "source", work)
+    shutil.copytree(deposit / "inputs", work / "inputs")
+    subprocess.run([sys.executable, "program.py", "run", "config.used.yaml", "all"], cwd=work, check=True)
+    shutil.copytree(work / "results/mine", deposit, dirs_exist_ok=True)
+    seal(deposit)
+    return deposit
+
+
+def lock(numpy):
+    return f'[[package]]\nname = "numpy"\nversion = "{numpy}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
+
+
+def seal(deposit):
+    """Write checksums and the zip."""
+    files = sorted(path.relative_to(deposit).as_posix() for path in deposit.rglob("*") if path.is_file())
+    sums = [f"{hashlib.sha256((deposit / f).read_bytes()).hexdigest()}  {f}\n" for f in files if f != "SHA256SUMS"]
+    (deposit / "SHA256SUMS").write_text("".join(sums))
+    with zipfile.ZipFile(deposit.with_name(f"{NAME}.zip"), "w") as archive:
+        for file in sorted({*files, "SHA256SUMS"}):
+            archive.write(deposit / file, f"{NAME}/{file}")
+
+
+@pytest.fixture
+def deposit(made, tmp_path):
+    """One of one's own."""
+    shutil.copytree(made.parent, tmp_path / "own", ignore=shutil.ignore_patterns("work"))
+    return tmp_path / "own" / NAME
+
+
+@pytest.fixture
+def reproduce(monkeypatch, tmp_path, capfd):
+    """Call the command; return its exit status and all that it and its programs said."""
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+
+    def call(*arguments, planted=""):
+        monkeypatch.setenv("PLANTED", planted)
+        done = CliRunner().invoke(app, ["reproduce", *map(str, arguments)])
+        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+        out, err = capfd.readouterr()
+        return done.exit_code, done.output + out + err
+
+    call.temporary = tmp_path / "temporary"
+    return call
+
+
+def calls(folder):
+    return [json.loads(line) for line in (folder / "source/called.jsonl").read_text().splitlines()]
+
+
+@pytest.mark.parametrize("ending", ["", ".zip"])
+def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, made, reproduce):
+    deposit = made.with_name(NAME + ending)
+    before = {path: path.stat().st_mtime_ns for path in made.rglob("*")}
+    status, said = reproduce(deposit)
+    assert status == 0, said
+    assert "identical: 6 files, every value" in said and "made dataset/mine.nc" in said
+    assert list(reproduce.temporary.iterdir()) == []
+    assert verify_deposit(deposit) == [] and {path: path.stat().st_mtime_ns for path in made.rglob("*")} == before
+
+
+def test_nothing_of_the_caller_s_environment_gets_in(made, reproduce, tmp_path, monkeypatch):
+    leaking = ("VIRTUAL_ENV", "PYTHONPATH", "PYTHONHOME_", "SNAKEMAKE_PROFILE", "UV_PROJECT_ENVIRONMENT", "MAKEFLAGS")
+    for name in leaking:
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setenv("PATH", os.pathsep.join([f"{sys.prefix}/bin", os.environ["PATH"]]))
+    assert reproduce(made, "--folder", tmp_path / "again", "--cores", "3")[0] == 0
+    ((arguments, environment),) = calls(tmp_path / "again")
+    assert arguments == ["run", "config.used.yaml", "all", "--cores", "3"]
+    assert not set(leaking) & set(environment) and "PLANTED" in environment
+    if sys.prefix != sys.base_prefix:
+        assert f"{sys.prefix}/bin" not in environment["PATH"].split(os.pathsep)
+
+
+@pytest.mark.parametrize("planted, status, told", [
+    ("1e-9", 0, "within tolerance: 6 files, every value to 1e-06"),
+    ("1e-3", 1, "different: not everything is reproduced"),
+])  # fmt: skip
+def test_differences_are_told_by_variable(planted, status, told, made, reproduce, tmp_path):
+    ended, said = reproduce(made, "--json", tmp_path / "out.json", planted=planted)
+    assert ended == status and told in said, said
+    assert "runs: pressure: " in said
+    written = json.loads((tmp_path / "out.json").read_text())
+    (differing,) = [file for file in written["files"] if file["verdict"] != "identical"]
+    assert differing["path"] == f"runs/{SOFT}.nc"
+    # What differs is kept to be looked at.
+    kept = list(reproduce.temporary.iterdir())
+    assert len(kept) == status
+    if kept:
+        assert f"computed in {kept[0]}/source/results/mine" in said
+
+
+def test_single_runs(made, reproduce, tmp_path):
+    status, said = reproduce(made, "--only", "smallest", "--folder", tmp_path / "again")
+    assert status == 0 and "identical: 2 files" in said, said
+    assert calls(tmp_path / "again")[-1][0] == ["run", "config.used.yaml", f"results/mine/runs/{SOFT}.nc"]
+    status, said = reproduce(made, "--only", SOFT, "--only", f"runs/{HARD}.nc", "--folder", tmp_path / "again")
+    assert status == 0 and "identical: 4 files" in said  # two runs, and the surface of each
+    assert calls(tmp_path / "again")[-1][0][2:] == [f"results/mine/runs/{run}.nc" for run in (SOFT, HARD)]
+
+
+def test_a_damaged_deposit_is_refused(deposit, reproduce):
+    with (deposit / "dataset/mine.nc").open("ab") as file:
+        file.write(b"x")
+    status, said = reproduce(deposit)
+    assert status == 2 and "damaged" in said and "dataset/mine.nc" in said
+    whole = deposit.with_name(f"{NAME}.zip")
+    whole.write_bytes(whole.read_bytes()[:-100])
+    assert reproduce(whole)[0] == 2
+    assert reproduce(deposit.with_name("none"))[0] == 2
+    (deposit / "dataset/mine.nc").unlink()
+    (deposit / "source/uv.lock").unlink()
+    seal(deposit)
+    status, said = reproduce(deposit)
+    assert status == 2 and "has no source/uv.lock" in said
+    assert list(reproduce.temporary.iterdir()) == []
+
+
+def test_wrong_use_is_refused_before_anything_is_done(made, reproduce, tmp_path):
+    status, said = reproduce(made, "--only", "load/rough/seed3/slope1/soft")
+    assert status == 2 and "has no such run; allowed: smallest, or one of its 2 runs" in said and SOFT in said
+    assert reproduce(made, "--cores", "none")[0] == 2
+    status, said = reproduce(made, "--folder", made / "again")
+    assert status == 2 and "is in the deposit" in said
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/file").write_text("mine")
+    status, said = reproduce(made, "--folder", tmp_path / "other")
+    assert status == 2 and "has other files in it" in said
+    (tmp_path / "other/file").rename(tmp_path / "other/SHA256SUMS")
+    status, said = reproduce(made, "--folder", tmp_path / "other")
+    assert status == 2 and "belongs to another deposit" in said
+    assert [path.name for path in (tmp_path / "other").iterdir()] == ["SHA256SUMS"]
+    assert list(reproduce.temporary.iterdir()) == []
+
+
+def test_an_environment_that_cannot_be_installed(made, reproduce, tmp_path):
+    folder = tmp_path / "again"
+    status, said = reproduce(made, "--folder", folder, planted="no network")
+    assert status == 1 and "cannot reach the index" in said and f"log: {folder}/environment.log" in said
+    assert "--environment here" in said and not (folder / "source/called.jsonl").exists()
+    # With network, the same call goes on.
+    assert reproduce(made, "--folder", folder)[0] == 0
+
+
+def test_a_program_that_fails(made, reproduce, tmp_path):
+    status, said = reproduce(made, "--folder", tmp_path / "again", planted="fails")
+    assert status == 1 and "the program fails" in said
+    assert f"nothing was computed; this goes on:   icha reproduce {made} --folder" in said
+
+
+def test_the_environment_that_is_here_has_to_agree_with_the_lock_file(deposit, reproduce):
+    (deposit / "source/uv.lock").write_text(lock("0.1"))
+    seal(deposit)
+    status, said = reproduce(deposit, "--environment", "here")
+    assert status == 2 and f"numpy: {version('numpy')} is installed, 0.1 is locked" in said
+    assert list(reproduce.temporary.iterdir()) == []
+
+
+def test_what_was_stopped_goes_on(made, reproduce, tmp_path):
+    folder = tmp_path / "again"
+    program = [
+        sys.executable,
+        "-c",
+        "from icha.cli import main; main()",
+        "reproduce",
+        str(made),
+        "--folder",
+        str(folder),
+    ]
+    process = subprocess.Popen(
+        program,
+        env=os.environ | {"PLANTED": "sleeps"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    while "made" not in (line := process.stdout.readline()):
+        assert line
+    process.send_signal(signal.SIGTERM)
+    said = process.communicate(timeout=50)[0]
+    assert process.returncode == 1 and "stopped; this goes on:   icha reproduce" in said
+    ours = subprocess.run(["pgrep", "-f", f"{folder}/source/.venv/bin/icha"], capture_output=True, text=True).stdout
+    assert not ours, ours
+    copied = (folder / "source/program.py").stat().st_mtime_ns
+    status, said = reproduce(made, "--folder", folder)
+    assert status == 0 and "identical: 6 files" in said
+    assert (folder / "source/program.py").stat().st_mtime_ns == copied and len(calls(folder)) == 2
