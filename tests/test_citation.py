@@ -120,6 +120,13 @@ def test_texts_are_html_only_where_html_is_asked_for():
     assert datacite_metadata(ALL)["descriptions"][0]["description"] == ALL.summary
 
 
+def test_a_licence_that_the_citation_file_format_does_not_know_is_given_by_its_address(tmp_path):
+    newer = LEAST.model_copy(update={"license": "CC-BY-3.0-IGO"})
+    cff = yaml.safe_load(citation_cff(newer, COMMIT))
+    assert "license" not in cff and cff["license-url"] == "https://spdx.org/licenses/CC-BY-3.0-IGO.html"
+    assert validated(written(tmp_path / "deposit", newer), "cffconvert").returncode == 0
+
+
 def test_who_publishes_is_not_made_up():
     assert datacite_metadata(ALL)["publisher"] == {"name": "Zenodo"}
     assert datacite_metadata(LEAST)["publisher"] == {"name": ":tba"}

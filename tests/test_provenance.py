@@ -15,7 +15,11 @@ USED = f"{RESULTS}/config.used.yaml"
 SCAN = "/somewhere/scan 1.npy"
 MADE = {name: name.removeprefix(f"{RESULTS}/") for name in (SURFACE, RUN, *FIGURE)}
 GIVEN = {USED: "config.used.yaml", SCAN: "inputs/scan 1.npy"}
-SETTINGS = {"material": {"contact_modulus": 2e6, "label": "soft"}, "seed": 1, "path": "/somewhere/scan 1.npy"}
+SETTINGS = {
+    "material": {"contact_modulus": 2e6, "label": "soft", "tint": None},
+    "seed": 1,
+    "path": "/somewhere/scan 1.npy",
+}
 
 
 @pytest.fixture

@@ -112,7 +112,7 @@ def _flat(section: dict, above: str = "") -> Iterator[tuple[str, str]]:
     for key, value in section.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{above}{key}.")
-        else:
+        elif value is not None:
             yield f"{above}{key}", value if isinstance(value, str) else repr(value)
 
 

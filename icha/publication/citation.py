@@ -69,6 +69,7 @@ def citation_cff(publication: Publication, commit: str) -> str:
     publication : what is to be cited; complete (`icha.configuration.publication.needed`).
     commit : the state of the program that made the data.
     """
+    licence = known_licence(publication.license)
     content = {
         "cff-version": "1.2.0",
         "message": "If you use these data, please cite them as below.",
@@ -78,7 +79,9 @@ def citation_cff(publication: Publication, commit: str) -> str:
         "authors": [_cff_author(author) for author in publication.authors],
         "version": publication.version,
         "date-released": publication.date,
-        "license": known_licence(publication.license).identifier,
+        # Of licences, the format knows those that SPDX had in 2021; an address can be given of any.
+        "license": licence.identifier if licence.text else None,
+        "license-url": None if licence.text else licence.address,
         "commit": commit,
         "doi": publication.doi,
         "keywords": publication.keywords,
@@ -199,7 +202,7 @@ def _datacite_creator(author: Author) -> dict[str, Any]:
         "givenName": author.given_names,
         "familyName": author.family_names,
     }
-    organisation = author.ror and {"schemeUri": _ROR}
+    ror = author.ror and {"schemeUri": _ROR}
     if author.orcid:
         creator["nameIdentifiers"] = [
             {
@@ -208,13 +211,13 @@ def _datacite_creator(author: Author) -> dict[str, Any]:
                 "schemeUri": "https://orcid.org",
             }
         ]
-    elif author.ror and not author.is_person:
-        creator["nameIdentifiers"] = [{"nameIdentifier": author.ror, "nameIdentifierScheme": "ROR"} | organisation]
-    if author.affiliation or (author.ror and author.is_person):
-        affiliation = {"name": author.affiliation or author.ror}
-        if author.ror and author.is_person:
-            affiliation |= {"affiliationIdentifier": author.ror, "affiliationIdentifierScheme": "ROR"} | organisation
-        creator["affiliation"] = [affiliation]
+    if ror and not author.is_person:
+        creator["nameIdentifiers"] = [{"nameIdentifier": author.ror, "nameIdentifierScheme": "ROR"} | ror]
+    elif ror:
+        identified = {"affiliationIdentifier": author.ror, "affiliationIdentifierScheme": "ROR"} | ror
+        creator["affiliation"] = [{"name": author.affiliation or author.ror} | identified]
+    elif author.affiliation:
+        creator["affiliation"] = [{"name": author.affiliation}]
     return _given(creator)
 
 
