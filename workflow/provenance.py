@@ -9,6 +9,7 @@ import json
 import os
 from base64 import urlsafe_b64encode
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -116,6 +117,7 @@ def _flat(section: dict, above: str = "") -> Iterator[tuple[str, str]]:
             yield f"{above}{key}", value if isinstance(value, str) else repr(value)
 
 
+@cache
 def _description(script: Path) -> str:
     """The first paragraph of a script's docstring."""
     text = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
