@@ -91,11 +91,10 @@ def committed_source(project: str | os.PathLike) -> Source:
             f"{project}: a deposit holds files only; needed: the files themselves in the place of these links and "
             f"submodules:\n{_listed(odd)}"
         )
-    changed = [
-        name
-        for name, (_, digest) in files.items()
-        if not name.startswith(f"{CONFIGURATIONS}/") and _digest(project / name, len(digest)) != digest
-    ]
+    program = {name: digest for name, (_, digest) in files.items() if not name.startswith(f"{CONFIGURATIONS}/")}
+    changed = [name for name, digest in program.items() if _digest(project / name, len(digest)) != digest]
+    # Attributes may want other ends of lines in the folder than are committed; git knows.
+    changed = [name for name in changed if _digest_by_git(project, name) != program[name]]
     added = [name for name in _others(project) if name not in files]
     if changed or added:
         listed = [*(f"changed: {name}" for name in changed), *(f"not committed: {name}" for name in added)]
@@ -146,6 +145,13 @@ def _digest(path: Path, length: int) -> str | None:
         while block := file.read(2**20):
             digest.update(block)
     return digest.hexdigest()
+
+
+def _digest_by_git(project: Path, name: str) -> str | None:
+    """The object that git would commit for a file, by the attributes of its path; None if there is no such file."""
+    if (project / name).is_symlink() or not (project / name).is_file():
+        return None
+    return (_git(project, "hash-object", "--", name) or b"").decode("ascii").strip()
 
 
 def _git(project: Path, *arguments: str) -> bytes | None:

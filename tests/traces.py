@@ -1,0 +1,106 @@
+"""Everything that is written in the files of a folder, decoded as far as anyone could decode it.
+
+Traces of a machine or a person may be hidden from a plain search: compressed in a PDF, encoded in a page, in chunks of
+a PNG or attributes of a netCDF file.
+"""
+
+import base64
+import binascii
+import io
+import re
+import struct
+import zipfile
+import zlib
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+
+_DATA_ADDRESS = re.compile(rb"base64,([A-Za-z0-9+/=\s]{8,})")
+_PDF_STREAM = re.compile(rb"stream\r?\n(.*?)endstream", re.DOTALL)
+# A day is the date of publication; a time of day is nobody's business.
+TIMES = {
+    "ISO 8601": re.compile(rb"\b(19|20)\d\d-[01]\d-[0-3]\d[T ][0-2]\d:[0-5]\d"),
+    "PDF": re.compile(rb"D:(19|20)\d{10}"),
+    "asctime": re.compile(rb"\b(Mon|Tue|Wed|Thu|Fri|Sat|Sun),? +(\d+ )?[A-Z][a-z]{2} +\d+ (\d{4} )?\d\d:\d\d:\d\d"),
+    "netCDF or PNG": re.compile(rb"\b(19|20)\d\d:[01]\d:[0-3]\d [0-2]\d:[0-5]\d"),
+}
+
+
+def written_in(path):
+    """The bytes of a file and of everything that is packed into it, each with where it is."""
+    yield from _written(str(path), Path(path).read_bytes())
+
+
+def _written(where, content):
+    yield where, content
+    if content.startswith(b"%PDF"):
+        for number, stream in enumerate(_PDF_STREAM.findall(content)):
+            try:
+                yield f"{where}, stream {number}", zlib.decompressobj().decompress(stream)
+            except zlib.error:
+                yield f"{where}, stream {number}", stream
+    elif content.startswith(b"\x89PNG\r\n\x1a\n"):
+        yield f"{where}, chunks", _png_text(content)
+    elif content.startswith(b"\x89HDF"):
+        with netCDF4.Dataset("in memory", memory=content) as file:
+            yield f"{where}, as netCDF", _netcdf_text(file).encode()
+    elif content.startswith(b"PK\x03\x04"):
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            for info in archive.infolist():
+                if info.date_time != (1980, 1, 1, 0, 0, 0) or info.extra or info.comment or info.create_system != 3:
+                    yield f"{where}, {info.filename}", b"9999-12-31T23:59 in the entry of the archive"
+                yield from _written(f"{where}, {info.filename}", archive.read(info))
+    else:
+        for number, data in enumerate(_DATA_ADDRESS.findall(content)):
+            try:
+                yield from _written(f"{where}, data {number}", base64.b64decode(data))
+            except binascii.Error:
+                pass
+
+
+def _png_text(content):
+    """Names of all chunks but those of the picture, and what is in them."""
+    found, place = [], 8
+    while place < len(content):
+        (length,) = struct.unpack(">I", content[place : place + 4])
+        kind, data = content[place + 4 : place + 8], content[place + 8 : place + 8 + length]
+        if kind == b"tIME":
+            data += b" 9999-12-31T23:59 in a chunk of its own"
+        elif kind in (b"zTXt", b"iTXt"):
+            for begin in (m.start() for m in re.finditer(rb"\x78[\x01\x5e\x9c\xda]", data)):
+                try:
+                    data += zlib.decompressobj().decompress(data[begin:])
+                except zlib.error:
+                    pass
+        if kind not in (b"IDAT", b"PLTE", b"IHDR"):
+            found += [kind, data]
+        place += 12 + length
+    return b"\n".join(found)
+
+
+def _netcdf_text(group):
+    lines = [f"{name} {group.getncattr(name)}" for name in group.ncattrs()]
+    for variable in group.variables.values():
+        lines += [f"{variable.name} {name} {variable.getncattr(name)}" for name in variable.ncattrs()]
+        if variable.dtype == np.dtype("S1"):
+            variable.set_auto_chartostring(False)
+            lines.append(np.ma.filled(variable[...], b" ").tobytes().decode("utf-8", "replace"))
+        elif variable.dtype is str:
+            lines += np.ravel(variable[...]).astype(str).tolist()
+    for inner in group.groups.values():
+        lines.append(_netcdf_text(inner))
+    return "\n".join(lines)
+
+
+def traces(files, words, now=None):
+    """Where words (bytes) or times of day are written in some files, or seconds since 1970 within those of `now`."""
+    found = []
+    for path in files:
+        for where, content in written_in(path):
+            found += [f"{word!r} in {where}" for word in words if word in content]
+            found += [f"time ({kind}) in {where}" for kind, pattern in TIMES.items() if pattern.search(content)]
+            if now is not None:
+                seconds = re.findall(rb"(?<![\d.])(1\d{9})(?!\d)", content)
+                found += [f"time {each!r} in {where}" for each in seconds if now[0] <= int(each) <= now[1]]
+    return found
