@@ -8,12 +8,14 @@ import shutil
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 import yaml
 from conftest import REPOSITORY, SMOKE, snakemake, snakemake_command
+from traces import traces
 
 from icha.configuration.expansion import campaign_sha256
 from icha.configuration.load import load_configuration
@@ -141,6 +143,14 @@ def test_no_paths_users_or_hosts_in_results(smoke):
         content = (smoke / "results/smoke" / name).read_bytes()
         for word in words:
             assert word.encode() not in content, f"{word} in {name}"
+
+
+def test_nothing_in_the_deposit_tells_where_or_when_it_was_made(smoke):
+    deposit = smoke / "results/smoke/publish/smoke-0.0.1"
+    files = [path for path in deposit.rglob("*") if path.is_file() and path.relative_to(deposit).parts[0] != "source"]
+    words = [f"{folder}/".encode() for folder in (smoke, REPOSITORY, Path.home())]
+    now = time.time()
+    assert traces(files, words, (now - 86400, now)) == []
 
 
 def test_killed_runs_are_finished_with_the_same_bytes(smoke, tmp_path):

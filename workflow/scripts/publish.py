@@ -5,18 +5,19 @@ from pathlib import Path
 
 from job import logged
 
-from icha.cli.plan import whole_cost
-from icha.configuration.load import load_configuration
-from icha.publication.deposit import make_deposit
-from icha.publication.environment import refuse_other_environment
-from icha.publication.source import committed_source
-
 
 def publish(archive, *, results, files, named_files, project):
     """Write the deposit of `files` below the folder `results` to `archive`, and to the folder of that name beside it.
 
     `named_files` are the files that the configuration names, by their places beside the configuration as used.
     """
+    # What is imported at the top is imported for every job of a campaign.
+    from icha.cli.plan import whole_cost
+    from icha.configuration.load import load_configuration
+    from icha.publication.deposit import make_deposit
+    from icha.publication.environment import refuse_other_environment
+    from icha.publication.source import committed_source
+
     refuse_other_environment(Path(project))
     used = "config.used.yaml"
     places = {file: str(Path(file).relative_to(results)) for file in files}
