@@ -66,11 +66,12 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> list[Entry]:
     for name in sorted(files):
         if not name.endswith(".nc"):
             continue
+        kind = kind_of(name)
         with netCDF4.Dataset(folder / name) as file:
             file.set_auto_maskandscale(False)
             for group in _groups(file):
                 for variable in group.variables.values():
-                    key = (kind_of(name), group.path, *_described(variable))
+                    key = (kind, group.path, *_described(variable))
                     so_far = found.setdefault(key, [0, None, None])
                     smallest, largest = _range(variable)
                     so_far[0] += 1
