@@ -179,7 +179,9 @@ def _conventions_of(path: Path) -> list[Conformance]:
     from compliance_checker.base import BaseCheck
     from compliance_checker.suite import CheckSuite
     from flat import flat_files
+    from remembered import remember
 
+    remember()
     suite = CheckSuite()
     suite.load_all_available_checkers()
     answers = []

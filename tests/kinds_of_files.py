@@ -1,0 +1,79 @@
+"""Every kind of netCDF file that a campaign writes, small, made by the package itself."""
+
+from pathlib import Path
+
+import compared_campaign as compared
+import numpy as np
+import small_campaign as small
+
+import icha
+from icha.aggregation import compare_campaign
+from icha.campaign import RunLabels
+from icha.campaign_file import write_campaign
+from icha.records import read_campaign, write_dataset, write_surface
+from icha.reference.boundary_elements import boundary_elements
+from icha.reference.dataset import reference_dataset
+from icha.reference.error_sources import error_sources
+from icha.reference.loops import boundary_element_loop
+from icha.reference.one_asperity import hertz_asperity, one_asperity
+from icha.roughness import spectral_moments
+
+HARD = icha.Material(contact_modulus=1e9, surface_energy=0.0, interaction_range=1e-8)
+# Its attraction reaches far enough for the grid of the small surface.
+STICKY = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=0.6e-6)
+ATTRIBUTES = {"campaign": "small", "license": "CC0-1.0", "config_sha256": "0" * 64}
+PUBLISHED = {
+    "title": "Small campaign",
+    "summary": "For tests.",
+    "creator_name": "Ada Example, Bo Example",
+    "creator_type": "person, person",
+    "product_version": "1.0.0",
+}
+LOOP = RunLabels("loops", "rough", 1, 1.0, "soft")
+
+
+def cycle():
+    """A run in and back, with events."""
+    path = icha.Path(reduced_pressures=[5e-4, 1e-3], unload=True, max_step=0.5)
+    return icha.simulate(small.surface(), small.MATERIALS["soft"], path, seed=1)
+
+
+def incomplete(run):
+    """A run of which the first steps and the first snapshot are known."""
+    own = np.flatnonzero(run["spot_snapshot"].values == 0)
+    first = run.isel(step=slice(0, 3), snapshot=slice(0, 1), spot=own)
+    return first.assign_attrs(incomplete="the path ends early")
+
+
+def write_campaign_of(path: Path, looped) -> None:
+    """A campaign of two studies: one of loading, with a run that failed and one that is missing, and one back again."""
+    (failed, run), *others = small.runs()
+    pairs = [(failed, incomplete(run)), *others[:-1], (LOOP, looped)]
+    design = [*(labels for labels, _ in small.runs()), LOOP]
+    write_campaign(pairs, path, design=design, attrs=ATTRIBUTES | PUBLISHED)
+
+
+def write_all(folder: Path) -> list[Path]:
+    """Write a file of every kind to a folder; all of them."""
+    surface, looped = small.surface(), cycle()
+    datasets = {
+        "run": small.run(),
+        "run_without_snapshots": icha.simulate(surface, small.MATERIALS["hertz"], icha.Path(reduced_pressures=[1e-3])),
+        "cycle": looped,
+        "theories": reference_dataset(
+            small.SPECTRUM, spectral_moments(surface), {(1.0, "soft"): small.MATERIALS["soft"]}
+        ),
+        "boundary_elements": boundary_elements(surface, HARD, 1e-2, seed=1),
+        "boundary_elements_adhesive": boundary_elements(surface, STICKY, 1e-2, seed=1),
+        "loop": boundary_element_loop(surface, STICKY, largest_reduced_pressure=1e-2, separation_step=0.3, seed=1),
+        "error_sources": error_sources(surface, HARD, [1e-2], seed=1),
+        "hertz_asperity": hertz_asperity(),
+        "one_asperity": one_asperity(1.5, approaches=[3.0, 1.5], period=10.0),
+    }
+    for name, data in datasets.items():
+        write_dataset(data.assign_attrs(ATTRIBUTES), folder / f"{name}.nc")
+    write_surface(folder / "surface.nc", surface, name="rough", seed=1, spectrum=small.SPECTRUM, attrs=ATTRIBUTES)
+    write_campaign_of(folder / "campaign.nc", looped)
+    write_dataset(compare_campaign(read_campaign(folder / "campaign.nc"), attrs=ATTRIBUTES), folder / "aggregated.nc")
+    write_dataset(compared.errors(), folder / "model_error.nc")
+    return sorted(folder.glob("*.nc"))

@@ -1,0 +1,266 @@
+"""Files are for the tools of others: plain netCDF4, plain xarray and ncdump agree on them, checkers accept them."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import kinds_of_files as kinds
+import netCDF4
+import numpy as np
+import pint
+import pytest
+
+HERE = Path(__file__).parent
+VALIDATORS = HERE.parent / ".venv-validators" / "bin" / "python"
+GROUPS = {"run.nc": "/", "campaign.nc": "/slopes"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("kinds")
+    kinds.write_all(folder)
+    return folder
+
+
+def groups_of(data):
+    yield data
+    for group in data.groups.values():
+        yield from groups_of(group)
+
+
+def every_variable(folder):
+    """Every variable of every file, with where it is."""
+    for path in sorted(folder.glob("*.nc")):
+        with netCDF4.Dataset(path) as data:
+            for group in groups_of(data):
+                for name, variable in group.variables.items():
+                    yield f"{path.name}:{group.path.rstrip('/')}/{name}", variable
+
+
+# --- three readers ----------------------------------------------------------------------------------------------
+
+
+def by_netcdf4(path, group):
+    """Values by plain netCDF4: masked where missing, texts as one text each."""
+    with netCDF4.Dataset(path) as data:
+        own = data if group == "/" else data[group]
+        return {name: variable[...] for name, variable in own.variables.items()}
+
+
+# Nothing of the package is there: what is read is read without it.
+BY_XARRAY = """
+import pickle, sys
+sys.modules["icha"] = None
+import matplotlib
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import xarray as xr
+path, group, picture = sys.argv[1:]
+data = xr.open_dataset(path, group=group).load()
+place = {"surface": 0, "seed": 0, "rms_slope": 1, "material": 0}
+one = data.isel({name: k for name, k in place.items() if name in data.dims})
+figure, axes = plt.subplots(1, 2)
+one.contact_area_fraction.plot(ax=axes[0], x="step")
+one.gap_density.isel(snapshot=1).plot(ax=axes[1], x="gap_bin_centre", xscale="log")
+figure.savefig(picture)
+line = axes[1].lines[0].get_xydata()
+pickle.dump(({name: v.values for name, v in data.variables.items()}, line, list(data.coords)), sys.stdout.buffer)
+"""
+
+
+def by_xarray(path, group, picture):
+    """Values, the line of a plot and the names of the coordinates, by xarray in a process without the package."""
+    import pickle
+
+    command = [sys.executable, "-c", BY_XARRAY, str(path), group, str(picture)]
+    return pickle.loads(subprocess.run(command, check=True, capture_output=True, cwd=path.parent).stdout)
+
+
+def ncdump():
+    program = shutil.which("ncdump")
+    if program is None:
+        if os.environ.get("ICHA_REQUIRE_NCDUMP") == "1":
+            pytest.fail("ncdump is not installed (Debian's package netcdf-bin)")
+        pytest.skip("ncdump is not installed (Debian's package netcdf-bin)")
+    return program
+
+
+def by_ncdump(path, group):
+    """Every variable's list of values as ncdump prints them; fill values as None."""
+    options = ["-p", "9,17", *([] if group == "/" else ["-g", group.strip("/")])]
+    text = subprocess.run([ncdump(), *options, str(path)], check=True, capture_output=True, text=True).stdout
+    data = text.rsplit("data:\n", 1)[1]
+    return {
+        name: [None if each == "_" else each for each in re.findall(r'"[^"]*"|[^\s,;]+', values)]
+        for name, values in re.findall(r"^ +(\w+) =\s+(.*?) ;$", data, flags=re.MULTILINE | re.DOTALL)
+    }
+
+
+@pytest.mark.parametrize(("file", "group"), GROUPS.items())
+def test_netcdf4_and_xarray_read_the_same_and_plot_it(folder, tmp_path, file, group):
+    plain = by_netcdf4(folder / file, group)
+    labelled, line, coordinates = by_xarray(folder / file, group, tmp_path / "plot.png")
+    assert set(plain) == set(labelled)
+    for name, values in plain.items():
+        other = labelled[name]
+        if other.dtype.kind in "OUT":
+            np.testing.assert_array_equal(values.astype(str), other.astype(str), err_msg=name)
+            continue
+        missing = np.ma.getmaskarray(values)
+        np.testing.assert_array_equal(missing, np.isnan(other), err_msg=name)
+        np.testing.assert_array_equal(np.ma.getdata(values)[~missing], other[~missing], err_msg=name)
+    assert {"gap_bin_centre", "pressure_bin_centre"} <= set(coordinates)
+    place = (0, 0, 1, 0)[: plain["gap_density"].ndim - 2]
+    shown = [plain["gap_bin_centre"][place[:3]], plain["gap_density"][(*place, 1)]]
+    if file == "campaign.nc":  # the run that failed lacks its second snapshot
+        assert plain["failure"][place] == "the path ends early" and shown[1].mask.all()
+    np.testing.assert_array_equal(line, np.transpose([np.ma.filled(each, np.nan) for each in shown]))
+    assert (tmp_path / "plot.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(("file", "group"), GROUPS.items())
+def test_ncdump_prints_what_netcdf4_reads(folder, file, group):
+    printed = by_ncdump(folder / file, group)
+    plain = by_netcdf4(folder / file, group)
+    assert set(printed) == set(plain)
+    for name, values in plain.items():
+        flat = np.ravel(values)
+        if flat.dtype.kind in "SU":
+            # It may print the empty text of the last in a row as nothing.
+            texts = [text.strip('"') for text in printed[name]]
+            assert [text for text in texts if text] == [str(text) for text in flat if text], name
+            continue
+        missing = np.ma.getmaskarray(flat)
+        assert [each is None for each in printed[name]] == missing.tolist(), name
+        numbers = np.array([0.0 if each is None else float(each) for each in printed[name]])
+        np.testing.assert_array_equal(numbers[~missing], np.ma.getdata(flat)[~missing].astype(float), err_msg=name)
+
+
+def test_missing_values_and_texts_are_what_was_written(folder):
+    """Of the study with a failed run, by plain netCDF4."""
+    plain = by_netcdf4(folder / "campaign.nc", "/slopes")
+    labels = [dict(zip(plain["material"], range(2), strict=True))[name] for name in ("soft", "hertz")]
+    failed, whole = ((0, 0, 1, material) for material in labels)
+    assert plain["step_count"][failed] == 3 and plain["status"][failed] == 1 and plain["status"][whole] == 0
+    assert np.ma.getmaskarray(plain["nominal_pressure"][failed]).tolist() == [False] * 3 + [True] * (
+        plain["nominal_pressure"].shape[-1] - 3
+    )
+    assert plain["branch"][failed].tolist()[:4] == ["loading"] * 3 + [""]
+    assert not np.ma.getmaskarray(plain["nominal_pressure"][whole]).any()
+
+
+# --- conventions ------------------------------------------------------------------------------------------------
+
+
+def test_bounds_enclose_their_bins_and_meet(folder):
+    seen = set()
+    for path in sorted(folder.glob("*.nc")):
+        with netCDF4.Dataset(path) as data:
+            for group in groups_of(data):
+                for name, variable in group.variables.items():
+                    if "bounds" not in variable.ncattrs():
+                        continue
+                    seen.add(name)
+                    bounds = group.variables[variable.bounds]
+                    assert bounds.dimensions == (*variable.dimensions, "bound"), (path.name, name)
+                    assert (bounds.units, bounds.long_name) == (variable.units, variable.long_name)
+                    low, high = np.moveaxis(np.ma.filled(bounds[...], np.nan), -1, 0)
+                    middle = np.ma.filled(variable[...], np.nan)
+                    known = ~np.isnan(middle)
+                    assert ((low < middle) & (middle < high))[known].all(), (path.name, name)
+                    np.testing.assert_array_equal(low[..., 1:], high[..., :-1])
+                    if (edges := name.replace("_centre", "_edges")) in group.variables and edges != name:
+                        whole = np.concatenate([low, high[..., -1:]], axis=-1)
+                        np.testing.assert_array_equal(whole, np.ma.filled(group.variables[edges][...], np.nan))
+    assert seen == {"gap_bin_centre", "pressure_bin_centre", "psd_wavevector"}
+
+
+def test_density_over_bounds_is_the_whole_area(folder):
+    """Both distributions together are one, with the contact area as what lies in contact."""
+    with netCDF4.Dataset(folder / "run.nc") as run:
+        areas = {
+            kind: np.sum(run[f"{kind}_density"][...] * np.diff(run[f"{kind}_bin_bounds"][...])[:, 0], axis=1)
+            for kind in ("gap", "pressure")
+        }
+        touching = run["contact_area_fraction"][...][run["snapshot_step"][...]]
+        overlapping = run["overlap_fraction"][...]
+        np.testing.assert_allclose(areas["pressure"], touching, rtol=0.02)
+        np.testing.assert_allclose(areas["gap"] + overlapping, 1 - touching, rtol=0.02)
+
+
+def test_ragged_arrays_can_be_followed_by_what_they_index(folder):
+    """Every index lies on the dimension that it names, and counts what the runs count themselves."""
+    with netCDF4.Dataset(folder / "campaign.nc") as data:
+        for group in data.groups.values():
+            indices = {
+                name: variable
+                for name, variable in group.variables.items()
+                if "instance_dimension" in variable.ncattrs()
+            }
+            expected = {f"spot_{label}" for label in ("surface", "seed", "rms_slope", "material", "snapshot")}
+            if "event" in group.dimensions:
+                expected |= {f"event_{label}" for label in ("surface", "seed", "rms_slope", "material", "step")}
+            assert set(indices) == expected
+            for variable in indices.values():
+                size = group.dimensions[variable.instance_dimension].size
+                assert variable.dtype.kind == "i" and np.all((variable[...] >= 0) & (variable[...] < size))
+            counted = np.zeros(group["snapshot_step"].shape, int)
+            own = ("surface", "seed", "rms_slope", "material", "snapshot")
+            np.add.at(counted, tuple(group[f"spot_{label}"][...] for label in own), 1)
+            steps = group["snapshot_step"][...]
+            for place in np.argwhere(~np.ma.getmaskarray(steps)):
+                *labels, _ = place
+                assert counted[tuple(place)] == group["spot_count"][(*labels, steps[tuple(place)])]
+
+
+def test_pint_reads_all_units(folder):
+    registry = pint.UnitRegistry()
+    units = {variable.units for _, variable in every_variable(folder)}
+    assert {"1", "m", "Pa", "N", "m^-1", "Pa^-1", "Pa m^-1", "J m^-2", "rad m^-1", "m^4"} <= units
+    for unit in units:
+        registry.Unit(unit)
+    assert registry.Unit("Pa m^-1").is_compatible_with("kg m**-2 s**-2")
+
+
+def test_every_file_says_what_it_is(folder):
+    wanted = {"title", "summary", "keywords", "Conventions", "source", "history", "processing_level"}
+    for path in sorted(folder.glob("*.nc")):
+        with netCDF4.Dataset(path) as data:
+            for group in groups_of(data):
+                assert wanted <= set(group.ncattrs()), (path.name, group.path)
+                assert group.Conventions.startswith("CF-1.11")
+                text = " ".join(str(group.getncattr(name)) for name in group.ncattrs())
+                assert not re.search(r"\d\d:\d\d|/home/|/tmp/|/root/", text), (path.name, group.path)
+
+
+# What the checker recommends and the files do not follow: every variable here has units and long_name, bounds, too;
+# bins that differ from run to run stand along further dimensions, where it takes an interval for a polygon with too few
+# corners; and bins of runs that are missing are missing.
+_RECOMMENDED = (
+    r"Bounds variable .* have the following matching attributes \[('long_name'|'units'|, )+\]",
+    r"Boundary variables .* should not have the attributes: '\[('_FillValue'|'units'|, )+\]'",
+    r"Dimension \w+_bin_bounds of boundary variable .* must have at least \d elements to form a simplex",
+)
+_CHECK = """
+import pathlib, sys, warnings
+warnings.simplefilter("ignore")
+sys.path.insert(0, sys.argv[1])
+import validate
+sys.exit(not validate.validate(pathlib.Path(sys.argv[2]), ["compliance-checker", "cf-units"], 1000))
+"""
+
+
+def test_checkers_accept_every_kind_of_file(folder):
+    if not VALIDATORS.exists():
+        if os.environ.get("ICHA_REQUIRE_VALIDATORS") == "1":
+            pytest.fail("there is no .venv-validators: make validators-environment")
+        pytest.skip("there is no .venv-validators: make validators-environment")
+    command = [VALIDATORS, "-c", _CHECK, HERE / "validators", folder]
+    found = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert found.returncode == 0, found.stdout + found.stderr
+    remarks = [line for line in found.stdout.splitlines() if line.lstrip().startswith("remark")]
+    assert "compliance-checker: passed" in found.stdout and "cf-units: passed" in found.stdout
+    assert [line for line in remarks if not any(re.search(each, line) for each in _RECOMMENDED)] == []
