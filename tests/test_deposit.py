@@ -508,6 +508,21 @@ def test_whole_deposits_are_said_to_be_whole(published):
     assert nothing.exit_code == 2 and "nothing.zip: no such file or folder" in nothing.output
 
 
+def test_computed_again_it_has_the_same_bytes(published, tmp_path):
+    """By its own source, elsewhere, without the repository: every file of the results."""
+    archive = published.with_name(f"{published.name}.zip")
+    asked = ["--environment", "here", "--folder", str(tmp_path / "again"), "--json", str(tmp_path / "out.json")]
+    done = CliRunner().invoke(app, ["reproduce", str(archive), *asked])
+    assert done.exit_code == 0, done.output
+    files = json.loads((tmp_path / "out.json").read_text())["files"]
+    assert {file["path"].split("/")[0] for file in files} == {
+        *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
+        *("report.html", "checks.json", "verdict.txt"),
+    }
+    assert len(files) == sum(file.endswith((".nc", ".png", ".pdf")) for file in contents(published)) + 3
+    assert {file["verdict"] for file in files} == {"identical"} and not any(file["variables"] for file in files)
+
+
 def test_whatever_is_done_to_the_folder_is_said(own):
     figure, run = own / "figures/fig5_multi_slope.png", own / f"runs/{RUN}.nc"
     content = bytearray(figure.read_bytes())
