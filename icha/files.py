@@ -7,12 +7,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+# As much as libraries want to write at once; a disk on which less is free is full.
+_PROBE = 2**20
+
 
 @contextmanager
 def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     """Give a temporary path beside `path`; move it there when the block ends well, remove it when it does not.
 
     The folder is created if need be.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written to. Libraries for data files have other errors for a full disk, which say
+        nothing of it: whatever the block raises, this one is raised instead where that is the case.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -20,5 +29,22 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     try:
         yield temporary
         os.replace(temporary, path)
+    except Exception as error:
+        reason = _why_not_writable(path)
+        if reason is not None:
+            raise OSError(reason.errno, reason.strerror, str(path.parent)) from error
+        raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _why_not_writable(path: Path) -> OSError | None:
+    """What the system says to some data in the folder of `path`."""
+    probe = path.with_name(f".{path.name}.probe")
+    try:
+        probe.write_bytes(bytes(_PROBE))
+    except OSError as error:
+        return error
+    finally:
+        probe.unlink(missing_ok=True)
+    return None

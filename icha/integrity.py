@@ -4,7 +4,8 @@ The record of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path
 and time of change. A file of the same size and time is trusted, any other one is hashed; what the storage itself has
 spoilt changes neither, and is found where a file is hashed in any case (`thorough`). A result may be a folder, too.
 
-Results without a record, those of older versions for one, are taken as they are.
+A record without its result says that the result was there, or was about to be, and is to be made again. Results without
+a record, those of older versions for one, are taken as they are.
 """
 
 from __future__ import annotations
@@ -43,15 +44,15 @@ def write_record(results: str | os.PathLike, path: str) -> None:
     _write(results, path, Record(_sha256(file), size, mtime_ns))
 
 
-def forget(results: str | os.PathLike, path: str) -> None:
-    """Drop the record of a result that is about to be written, if it has one."""
-    _record_file(results, path).unlink(missing_ok=True)
+def begin(results: str | os.PathLike, path: str) -> None:
+    """Record that a result is about to be written; until it is recorded, whatever is there counts as whole."""
+    _write(results, path, _BEGUN)
 
 
 def distrust(results: str | os.PathLike, path: str) -> None:
     """Have a result hashed by whoever looks at it next, whatever its size and time."""
     record = _read(results, path)
-    if record is not None:
+    if record not in (None, _BEGUN):
         _write(results, path, record._replace(mtime_ns=0))
 
 
@@ -68,7 +69,7 @@ def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -
         record = _read(results, path)
     except ValueError:
         return not file.exists()
-    if record is None:
+    if record in (None, _BEGUN):
         return True
     try:
         size, mtime_ns = _size_and_time(file)
@@ -91,6 +92,11 @@ def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
     return [path for path in recorded(results) if not is_whole(results, path, thorough=thorough)]
 
 
+def lost(results: str | os.PathLike) -> list[str]:
+    """Paths of all results of a campaign that are recorded but are not there, sorted."""
+    return [path for path in recorded(results) if not os.path.exists(os.path.join(results, path))]
+
+
 def recorded(results: str | os.PathLike) -> Iterator[str]:
     """Paths of all results that have a record, whether they are there or not, sorted."""
     top = os.path.join(results, FOLDER)
@@ -103,7 +109,9 @@ def recorded(results: str | os.PathLike) -> Iterator[str]:
 
 
 def set_aside(results: str | os.PathLike, path: str) -> Path:
-    """Rename a result to `<name>.damaged`, or `.damaged2` and so on, and drop its record; return the new path.
+    """Rename a result to `<name>.damaged`, or `.damaged2` and so on; return the new path.
+
+    Its record stays: the result is lost now, and to be made again.
 
     Raises
     ------
@@ -115,8 +123,11 @@ def set_aside(results: str | os.PathLike, path: str) -> Path:
     while (aside := file.with_name(f"{file.name}.damaged{number if number > 1 else ''}")).exists():
         number += 1
     file.rename(aside)
-    forget(results, path)
     return aside
+
+
+# No file has this digest.
+_BEGUN = Record("", 0, 0)
 
 
 def _record_file(results, path) -> Path:

@@ -15,10 +15,11 @@ from typer.testing import CliRunner
 from icha.cli import app
 from icha.cli.events import Watch, last_line, reason_of
 from icha.cli.live import LiveView, duration
-from icha.cli.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, damaged_files, failed_runs, plan, time_on, total
+from icha.cli.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
 from icha.cli.show import sparkline
 from icha.configuration.expansion import run_cases, run_sha256
 from icha.configuration.load import load_configuration
+from icha.integrity import damaged, write_record
 from icha.records import write_dataset, write_surface
 
 
@@ -229,11 +230,12 @@ def test_files_that_were_cut_off_are_damaged_and_to_do_again(project):
     for path in (whole, cut, *empty):
         (results / path).parent.mkdir(parents=True, exist_ok=True)
         write_dataset(small.run().assign_attrs(config_sha256=sha256), results / path)
-    assert damaged_files(campaign, results) == []
+        write_record(results, path)
+    assert damaged(results) == []
     (results / cut).write_bytes((results / cut).read_bytes()[:-100])
     for path in empty:
         (results / path).write_bytes(b"")
-    assert set(damaged_files(campaign, results)) == {cut, *empty}
+    assert set(damaged(results)) == {cut, *empty}
     states = {item.path: item.state for item in plan(campaign, results)}
     assert states[whole] == DONE and states[cut] == DAMAGED and states["surfaces/rough/seed2.nc"] == DAMAGED
     sums = total(item for item in plan(campaign, results) if item.is_run)

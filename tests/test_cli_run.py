@@ -104,7 +104,9 @@ def test_damaged_files_are_made_again(project):
     assert all(f"damaged, to be made again: results/tiny/{path}\n" in told for path in paths)
     done = run(project, "dataset")
     for path in paths:
-        assert f"damaged, made again: results/tiny/{path}\n" in done.stdout
+        aside = (results / path).with_name((results / path).name + ".damaged")
+        assert f"damaged, to be made again: results/tiny/{path} (what was there is {aside.name} now)\n" in done.stdout
+        assert len(aside.read_bytes()) < len(before[path])
         assert (results / path).read_bytes() == before[path]
     # No job fails but the verdict on the run that cannot be completed.
     assert "1 job failed:\n  Verdict" in done.stdout

@@ -8,7 +8,7 @@ import shutil
 
 import pytest
 
-from icha.integrity import damaged, distrust, forget, is_whole, recorded, set_aside, write_record
+from icha.integrity import begin, damaged, distrust, is_whole, lost, recorded, set_aside, write_record
 
 PATH = "runs/load/seed1.nc"
 CONTENT = random.Random(7).randbytes(5000)
@@ -85,17 +85,28 @@ def test_a_damaged_file_is_set_aside_and_nothing_is_lost(results):
         wrong = (results / PATH).read_bytes()
         assert set_aside(results, PATH) == (results / PATH).with_name(name)
         assert (results / PATH).with_name(name).read_bytes() == wrong
-        assert not (results / PATH).exists() and list(recorded(results)) == ["checks.json"]
+        assert not (results / PATH).exists()
+        assert lost(results) == [PATH] and damaged(results) == []
 
 
 def test_results_without_record_and_records_without_result_are_no_damage(results):
+    assert lost(results) == []
     (results / "checks.json").unlink()
-    forget(results, PATH)
-    flip(results / PATH, 0)
     (results / "verdict.txt").write_text("all well\n")
-    assert is_whole(results, "verdict.txt", thorough=True)
+    assert is_whole(results, "verdict.txt", thorough=True) and is_whole(results, "checks.json", thorough=True)
+    assert damaged(results, thorough=True) == [] and lost(results) == ["checks.json"]
+
+
+def test_a_result_that_was_not_finished_is_neither_damaged_nor_forgotten(results):
+    begin(results, PATH)
+    (results / PATH).write_bytes(b"another one")  # and the job was killed before it could record it
     assert damaged(results, thorough=True) == []
-    forget(results, PATH)
+    (results / PATH).unlink()
+    assert lost(results) == [PATH]
+    (results / PATH).write_bytes(CONTENT)
+    write_record(results, PATH)
+    flip(results / PATH, 0)
+    assert damaged(results) == [PATH]
 
 
 @pytest.mark.parametrize("content", [b"", b'{"sha256": "', b"[1]", b'{"sha256": "a"}', b"\xff\xfe", b"null"])
@@ -103,7 +114,7 @@ def test_a_record_that_cannot_be_read_vouches_for_nothing(results, content):
     (results / f"checksums/{PATH}.json").write_bytes(content)
     assert damaged(results) == [PATH]
     set_aside(results, PATH)
-    assert damaged(results) == []
+    assert damaged(results) == [] and lost(results) == [PATH]
 
 
 def test_a_folder_is_one_result(results):

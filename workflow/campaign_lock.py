@@ -4,6 +4,7 @@ Snakemake's own lock is a file, which stays behind when the program is killed; e
 `--unlock` that nobody dares to give. This lock belongs to the process and ends with it, however it ends.
 """
 
+import contextlib
 import fcntl
 import os
 from pathlib import Path
@@ -13,9 +14,12 @@ _held = []
 
 def hold_lock(path: str) -> None:
     """Hold the lock `path` until this process ends; end it now, with a message, if another one holds it."""
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    # Opened so that starting jobs do not inherit it: what they leave behind must not keep the lock.
-    file = open(path, "a+", encoding="ascii")
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        # Opened so that starting jobs do not inherit it: what they leave behind must not keep the lock.
+        file = open(path, "a+", encoding="ascii")
+    except OSError:
+        return  # where nothing can be written nothing will be computed
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -26,7 +30,8 @@ def hold_lock(path: str) -> None:
         ) from None
     except OSError:
         return  # a file system without locks: nothing to hold
-    file.truncate(0)
-    file.write(f"{os.getpid()}\n")
-    file.flush()
     _held.append(file)
+    with contextlib.suppress(OSError):  # a full disk
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n")
+        file.flush()

@@ -131,8 +131,11 @@ def _run(request: dict, out: int, error: int) -> None:
 
         traceback.print_exc()
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            try:
+                stream.flush()
+            except OSError:  # a full disk
+                status = status or 1
         os._exit(status)
 
 

@@ -26,20 +26,21 @@ def describe(
     """
     from rich.console import Console
 
-    from icha.cli.plan import damaged_files, plan
+    from icha.cli.plan import plan
+    from icha.integrity import damaged
 
     path = configuration_path(config)
     campaign = read_configuration(path).campaign
     home = (folder or find_project() or Path.cwd()).resolve()
     results = home / "results" / campaign.name
-    items, damaged = plan(campaign, results), damaged_files(campaign, results)
+    items, spoilt = plan(campaign, results), damaged(results)
     count = _count(cores)
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(f"[bold]{campaign.name}[/]: {campaign.title}", highlight=False)
     console.print(f"configuration: {shown(path)}\n", highlight=False)
     if runs:
         _list(console, items)
-    _summary(console, items, damaged, count)
+    _summary(console, items, spoilt, count)
 
 
 def _count(cores: str | None) -> int:

@@ -43,6 +43,10 @@ class LiveView:
             for line in reason_of(job, self.folder)[:3]:
                 self._console.print(Text(f"    {line}", style="red"), overflow="fold")
 
+    def tell(self, text: str) -> None:
+        """Print a line above the table, where it stays."""
+        self._console.print(Text(text, style="yellow"), soft_wrap=True)
+
     def remark(self, text: str) -> None:
         """Say `text` beside the campaign's name from now on."""
         self._remark = text
@@ -101,6 +105,10 @@ class PlainView:
         self._say(f"[{count}, {time_left(watch)}] {what}{job.title} ({duration(job.seconds)})")
         for line in reason_of(job, self.folder)[:3] if failed else ():
             self._say(f"    {line}")
+
+    def tell(self, text: str) -> None:
+        """Print a line."""
+        self._say(text)
 
     def remark(self, text: str) -> None:
         """Say it."""

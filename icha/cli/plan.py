@@ -21,6 +21,7 @@ from icha.configuration.expansion import (
     surface_cases,
 )
 from icha.configuration.model import Campaign, SelfAffineSurface
+from icha.integrity import is_whole
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
 # So many of the files that are there are compared with what was expected of them.
@@ -56,8 +57,8 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
     """All files of a campaign but those that are made of others at little cost, in the order of the configuration.
 
     A run counts as done if its file is there and was made with the present settings (`config_sha256`); whether the
-    program has changed since is known to Snakemake only. Other files count as done if they are there. A file that
-    cannot be opened is damaged, and to be made again.
+    program has changed since is known to Snakemake only. Other files count as done if they are there. What is not what
+    was written, by its record (`icha.integrity`), is damaged, and to be made again.
 
     Parameters
     ----------
@@ -75,8 +76,7 @@ def _items(campaign, results) -> Iterator[Item]:
         return _asperities(campaign, surface, results / "surfaces" / surface)
 
     def there(part, path, cost, threads=1):
-        file = results / path
-        state = TO_DO if not file.is_file() else DAMAGED if path.endswith(".nc") and is_damaged(file) else DONE
+        state = TO_DO if not (results / path).is_file() else DONE if is_whole(results, path) else DAMAGED
         return Item(part, path, state, cost, threads)
 
     def threads(surface):
@@ -88,6 +88,8 @@ def _items(campaign, results) -> Iterator[Item]:
     for case in run_cases(campaign):
         path = f"runs/{case.path}.nc"
         state, reason = run_state(results / path, run_sha256(campaign, case))
+        if not is_whole(results, path):
+            state, reason = DAMAGED, ""
         settings = _described(run_settings(campaign, case), case.rms_slope)
         cost = sweep_cost(grid(case.surface), asperities(case.surface), settings)
         yield Item(f"study {case.study}", path, state, cost, threads(case.surface), reason)
@@ -205,36 +207,6 @@ def read_attributes(file: Path) -> dict[str, str]:
         if error.errno is not None:  # no permission, for one: that says nothing of the content
             raise
         raise DamagedFile(file) from None
-
-
-def is_damaged(file: Path) -> bool:
-    """Whether a file that is there cannot be opened as netCDF-4, for it is empty or only a part."""
-    try:
-        read_attributes(file)
-    except DamagedFile:
-        return True
-    return False
-
-
-def damaged_files(campaign: Campaign, results: Path) -> list[str]:
-    """Paths of all netCDF files of a campaign that are there but damaged, also of those that `plan` leaves out."""
-    surfaces = list(surface_cases(campaign))
-    references = (
-        *dict.fromkeys(name for name, _ in surfaces),
-        *(f"boundary_elements/{case.path}" for case in solution_cases(campaign)),
-        *(f"loops/{case.path}" for case in loop_cases(campaign)),
-        *(f"error_sources/{case.path}" for case in source_cases(campaign)),
-        *(f"one_asperity/{name}" for name in asperity_cases(campaign)),
-    )
-    files = (
-        *(f"surfaces/{name}/seed{seed}.nc" for name, seed in surfaces),
-        *(f"runs/{case.path}.nc" for case in run_cases(campaign)),
-        *(f"references/{name}.nc" for name in references),
-        f"dataset/{campaign.name}.nc",
-        f"aggregated/{campaign.name}.nc",
-        "aggregated/model_error.nc",
-    )
-    return [file for file in files if (results / file).is_file() and is_damaged(results / file)]
 
 
 def _text(attribute) -> str:

@@ -24,6 +24,8 @@ PLUGINS = Path(__file__).parent / "plugin"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # Lines of a reason that are printed at the end.
 _MOST_LINES = 12
+# What Snakemake says in any case, before it says why it ends.
+_BEFORE_REASONS = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
 
 
 def run(
@@ -78,7 +80,6 @@ def run(
         # In the place of profiles/default, which would be found by itself.
         *(["--workflow-profile", str(_profile(profile, home))] if profile else []),
     ]
-    _remove_damaged(campaign, folder / "results" / campaign.name, dry_run)
     if dry_run:
         _rehearse([*command, "--dry-run"], home, campaign, asked)
         return
@@ -115,16 +116,6 @@ def _profile(asked: str, home: Path) -> Path:
     raise Mistake(f"--profile {asked}: no folder with a config.yaml; there are: {', '.join(there)}")
 
 
-def _remove_damaged(campaign, results: Path, dry_run: bool) -> None:
-    """Remove files that cannot be opened: what a job has written is whole, and for Snakemake they are up to date."""
-    from icha.cli.plan import damaged_files
-
-    for path in damaged_files(campaign, results):
-        if not dry_run:
-            (results / path).unlink()
-        typer.secho(f"damaged, {'to be ' if dry_run else ''}made again: {shown(results / path)}", fg="yellow")
-
-
 def _rehearse(command: list[str], home: Path, campaign, asked: list[str]) -> None:
     """Let Snakemake say what it would do, or why it cannot."""
     done = subprocess.run(command, cwd=home, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -152,7 +143,7 @@ def _refuse_unknown(said: str, asked: list[str], campaign) -> None:
 def _last_words(said: str) -> list[str]:
     """Why Snakemake has ended without a failed job: the last lines that it said after its plan, and no traceback."""
     lines = [line for line in said.splitlines() if line.strip()]
-    plan = [number for number, line in enumerate(lines) if re.match(r"Building DAG of jobs|total +\d+$", line)]
+    plan = [number for number, line in enumerate(lines) if re.match(_BEFORE_REASONS, line)]
     lines = lines[plan[-1] + 1 :] if plan else lines
     calls = [number for number, line in enumerate(lines) if line.startswith("Traceback")]
     if calls:
@@ -167,7 +158,10 @@ def _log_file(folder: Path, campaign: str) -> Path:
         logs.mkdir(parents=True, exist_ok=True)
         file, name = tempfile.mkstemp(prefix=f"icha-{campaign}-", suffix=".log", dir=logs)
     except OSError as error:
-        raise Mistake(f"{folder} cannot be written to: {error}") from None
+        raise Mistake(
+            f"{folder} cannot be written to: {error.strerror}; make room there or make it writable, or work in another "
+            f"folder: --directory FOLDER"
+        ) from None
     os.close(file)
     return Path(name)
 
@@ -222,6 +216,9 @@ def _listen(reading: int, watch, view, stopped: list) -> None:
     with open(reading, encoding="utf-8") as events:
         for line in events:
             event = json.loads(line)
+            if event["event"] == "remark":
+                view.tell(event["text"])
+                continue
             job = watch.take(event)
             failed = event["event"] == "job_error"
             # Jobs that were stopped have not failed.

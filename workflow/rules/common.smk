@@ -1,11 +1,13 @@
 # What all rules share: the campaign, the names of its results, and the fingerprints of the code.
 
+import os
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(workflow.basedir, "workflow")))
 
 import warm
+from before_jobs import before_execution, refuse_unwritable, set_damaged_aside
 from campaign_lock import hold_lock
 from command_line import campaign_configuration
 from fingerprint import code_fingerprint, imported_modules
@@ -247,12 +249,25 @@ def warm_modules():
     return ["snakemake.logging", "snakemake.iocontainers", *modules, *late, *figures]
 
 
+def prepare(dry_run):
+    """Take hold of the campaign, and see whether what is there is what was written; what is to be made again."""
+    if not dry_run:
+        hold_lock(f".snakemake/{CAMPAIGN.name}.lock")
+    # Others, of which nothing is made but the deposit, are made again when they are asked for.
+    made_of = {CONFIG_USED, *COPIED, *SURFACES, *RUNS, *REFERENCES, DATASET, COMPARISON, *MODEL_ERROR, CHECKS}
+    return made_of.intersection(set_damaged_aside(RESULTS, dry_run))
+
+
+before_execution(workflow, RESULTS, prepare)
+# Jobs end with the process that started them, however that does.
+os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
+
 # On a node of a cluster, where no hooks are called, for the jobs of one batch.
 if workflow.remote_exec:
     warm.start(warm_modules())
 
 
 onstart:
-    hold_lock(f".snakemake/{CAMPAIGN.name}.lock")
+    refuse_unwritable(RESULTS)
     if workflow.local_exec:
         warm.start(warm_modules())

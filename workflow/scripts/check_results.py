@@ -1,6 +1,6 @@
 """Check the results of a campaign: identities, residuals, monotonicity, completeness."""
 
-from job import logged
+from job import guarded
 
 from icha.checks import check_campaign, check_solution, worst, write_checks
 from icha.labels import SolutionLabels
@@ -22,7 +22,7 @@ def check_results(dataset, solutions, output, *, labels, solution_labels):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         check_results(
             snakemake.input.dataset,
             snakemake.input.solutions,

@@ -1,6 +1,6 @@
 """Compare the runs of every study at common loads."""
 
-from job import logged
+from job import guarded
 
 from icha.aggregation import compare_campaign
 from icha.records import read_campaign, write_dataset
@@ -12,5 +12,5 @@ def compare_runs(dataset, output, *, attributes):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         compare_runs(snakemake.input[0], snakemake.output[0], attributes=snakemake.params.attributes)

@@ -3,7 +3,7 @@
 import importlib
 import textwrap
 
-from job import logged
+from job import guarded
 
 from icha.configuration.measurement import read_columns
 from icha.figures.select import NothingToDraw
@@ -59,7 +59,7 @@ def _measured(kind, file, settings):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         inputs = dict(snakemake.input.items())
         measured = inputs.pop("measurements", [])
         draw_figure(

@@ -1,6 +1,6 @@
 """Find where the error of the model comes from, on one surface with one material."""
 
-from job import logged
+from job import guarded
 
 from icha.material import Material
 from icha.records import read_surface, write_dataset
@@ -14,7 +14,7 @@ def find_error_sources(surface, output, *, rms_slope, material, attributes, **se
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         find_error_sources(
             snakemake.input.surface,
             snakemake.output[0],

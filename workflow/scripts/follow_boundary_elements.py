@@ -1,6 +1,6 @@
 """Press one surface against one material and pull it off again, by boundary elements."""
 
-from job import logged
+from job import guarded
 
 from icha.material import Material
 from icha.records import read_surface, write_dataset
@@ -14,7 +14,7 @@ def follow_boundary_elements(surface, output, *, rms_slope, material, attributes
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         follow_boundary_elements(
             snakemake.input.surface,
             snakemake.output[0],

@@ -1,12 +1,21 @@
-"""What the scripts of all jobs share: where they write what they have to say, and how they fail."""
+"""What the scripts of all jobs share: where they write what they have to say, how they fail, and records of results."""
 
+import contextlib
 import json
 import os
 import resource
+import select
 import sys
+import threading
 import traceback
 from contextlib import contextmanager
 from pathlib import Path
+
+from icha import integrity
+from icha.files import whole_file
+
+# Set by the Snakefile: the process that wants the job.
+SNAKEMAKE = "ICHA_SNAKEMAKE"
 
 
 def _failures_of_solvers():
@@ -20,28 +29,88 @@ def _failures_of_solvers():
 
 
 @contextmanager
-def logged(log):
-    """Send all output to the file `log`; an error ends the job with its message there.
+def guarded(snakemake):
+    """Surround the work of a job: its inputs must be what was written, its outputs are recorded, its errors told.
 
-    The errors that users can mend say all in their message. The traceback of any other one is for the developers
-    and is kept beside the log; so is what the job took, which Snakemake cannot see of one that was handed over.
+    All output goes to the job's log; an error ends the job with its message there. The errors that users can mend say
+    all in their message. The traceback of any other one is for the developers and is kept beside the log; so is what
+    the job took, which Snakemake cannot see of one that was handed over.
     """
-    with open(log, "w", encoding="utf-8", buffering=1) as file:
+    _end_with_snakemake()
+    log = snakemake.log[0]
+    results = log.partition("/logs/")[0]
+    outputs = [_result(results, path) for path in snakemake.output]
+    terminal = os.dup(2)
+    try:
+        with open(log, "w", encoding="utf-8") as file:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+        for path in outputs:
+            integrity.begin(results, path)
+        _refuse_damaged(results, snakemake.input)
+        yield
+        for path in outputs:
+            integrity.write_record(results, path)
         sys.stdout.flush()
-        sys.stderr.flush()
-        os.dup2(file.fileno(), 1)
-        os.dup2(file.fileno(), 2)
-        try:
-            yield
-        except Exception as error:
-            expected = (ValueError, OSError, *_failures_of_solvers())
-            print(f"Error: {error}" if isinstance(error, expected) else f"Error: {error!r}, which was not expected")
-            if not isinstance(error, expected):
-                with open(f"{log}.traceback", "w", encoding="utf-8") as details:
-                    traceback.print_exc(file=details)
-                print(f"Details for the developers: {log}.traceback")
-            sys.exit(1)
-        finally:
-            took = resource.getrusage(resource.RUSAGE_SELF)
-            usage = {"cpu_seconds": round(took.ru_utime + took.ru_stime, 3), "megabytes": took.ru_maxrss // 1024}
-            Path(log).with_suffix(".usage.json").write_text(json.dumps(usage) + "\n", encoding="ascii")
+    except Exception as error:
+        expected = (ValueError, OSError, *_failures_of_solvers())
+        if isinstance(error, expected):
+            _say(f"Error: {error}", terminal)
+        else:
+            _say(f"Error: {error!r}, which was not expected", terminal)
+            with contextlib.suppress(OSError), open(f"{log}.traceback", "w", encoding="utf-8") as details:
+                traceback.print_exc(file=details)
+                _say(f"Details for the developers: {log}.traceback", terminal)
+        sys.exit(1)
+    finally:
+        took = resource.getrusage(resource.RUSAGE_SELF)
+        usage = {"cpu_seconds": round(took.ru_utime + took.ru_stime, 3), "megabytes": took.ru_maxrss // 1024}
+        with contextlib.suppress(OSError), whole_file(Path(log).with_suffix(".usage.json")) as temporary:
+            temporary.write_text(json.dumps(usage) + "\n", encoding="ascii")
+
+
+def _result(results, path):
+    """What is recorded of an output: itself, but the folder whose files it lists if it is a list of checksums."""
+    file = Path(path).relative_to(results)
+    return str(file.parent if file.name == "SHA256SUMS" else file)
+
+
+def _refuse_damaged(results, inputs):
+    """Raise an error that names all inputs that are not what was written; the next call will find them, too."""
+    paths = [os.path.relpath(path, results) for path in inputs if path.startswith(f"{results}/")]
+    wrong = [path for path in paths if not integrity.is_whole(results, path, thorough=True)]
+    for path in wrong:
+        with contextlib.suppress(OSError):
+            integrity.distrust(results, path)
+    if wrong:
+        names = ", ".join(f"{results}/{path}" for path in wrong)
+        raise ValueError(
+            f"{names}: not what was written, by its checksum; give the same command again, which sets it aside as "
+            f"*.damaged and makes it again"
+        )
+
+
+def _say(text, terminal):
+    """Print to the log; to the terminal if that cannot be written, on a full disk for one."""
+    try:
+        print(text, flush=True)
+    except OSError:
+        os.dup2(terminal, 1)
+        os.dup2(terminal, 2)
+        sys.stdout.flush()  # what had been kept back
+
+
+def _end_with_snakemake():
+    """End this process when Snakemake ends: nobody would know of the results, and the next call makes them, too."""
+    try:
+        snakemake = os.pidfd_open(int(os.environ[SNAKEMAKE]))
+    except (AttributeError, KeyError, ValueError, OSError):
+        return  # not on Linux, or not where its processes can be seen
+
+    def wait():
+        select.select([snakemake], [], [])
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()

@@ -1,6 +1,6 @@
 """Say whether every check of the results passed; fail if one did not."""
 
-from job import logged
+from job import guarded
 
 from icha.checks import read_checks, told
 from icha.files import whole_file
@@ -23,5 +23,5 @@ def judge_results(checks, output):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         judge_results(snakemake.input[0], snakemake.output[0])

@@ -1,6 +1,6 @@
 """Put all runs of a campaign into one file."""
 
-from job import logged
+from job import guarded
 
 from icha.campaign_file import write_campaign
 
@@ -11,7 +11,7 @@ def make_dataset(runs, output, *, labels, attributes):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         make_dataset(
             snakemake.input,
             snakemake.output[0],

@@ -1,6 +1,6 @@
 """Write what theories say of a surface, and published points."""
 
-from job import logged
+from job import guarded
 
 from icha.material import Material
 from icha.records import read_spectral_moments, write_dataset
@@ -21,7 +21,7 @@ def make_references(surface, output, *, settings, adhesive, attributes):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         make_references(
             snakemake.input.surface,
             snakemake.output[0],

@@ -4,7 +4,7 @@ import importlib
 from pathlib import Path
 
 import yaml
-from job import logged
+from job import guarded
 
 from icha.checks import read_checks
 from icha.files import whole_file
@@ -74,7 +74,7 @@ def write_times(table, page, benchmarks):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         times_page = Path(snakemake.params.benchmarks, "index.html")
         pictures = iter(snakemake.input.figures)
         make_report(

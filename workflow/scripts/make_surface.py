@@ -1,6 +1,6 @@
 """Make a topography, by spectral synthesis or from a file, and write it at rms slope 1."""
 
-from job import logged
+from job import guarded
 
 from icha.configuration.height_map import read_height_map
 from icha.records import write_surface
@@ -27,7 +27,7 @@ def make_surface(output, *, name, seed, settings, height_map=None, attributes):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         make_surface(
             snakemake.output[0],
             name=snakemake.wildcards.surface,

@@ -1,6 +1,6 @@
 """Compare the runs of a campaign with the boundary-element solutions beside them."""
 
-from job import logged
+from job import guarded
 
 from icha.labels import SolutionLabels
 from icha.model_error import model_error
@@ -14,7 +14,7 @@ def measure_model_error(campaign, solutions, output, *, labels, attributes):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         measure_model_error(
             snakemake.input.campaign,
             snakemake.input.solutions,

@@ -1,6 +1,6 @@
 """Press one asperity by the model and by boundary elements."""
 
-from job import logged
+from job import guarded
 
 from icha.records import write_dataset
 from icha.reference.one_asperity import hertz_asperity, one_asperity
@@ -16,7 +16,7 @@ def press_one_asperity(output, *, tabor_parameter, attributes, progress):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         press_one_asperity(
             snakemake.output[0],
             tabor_parameter=snakemake.params.tabor_parameter,

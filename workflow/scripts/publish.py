@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from job import logged
+from job import guarded
 
 
 def publish(archive, *, results, files, named_files, project):
@@ -46,7 +46,7 @@ def _recorded_jobs(workflow, made, given):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         publish(
             snakemake.output.archive,
             results=snakemake.params.results,

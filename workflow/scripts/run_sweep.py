@@ -1,6 +1,6 @@
 """Press one surface against one material along a loading path."""
 
-from job import logged
+from job import guarded
 
 from icha.material import Material
 from icha.path import Path
@@ -24,7 +24,7 @@ def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, p
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         run_sweep(
             snakemake.input.surface,
             snakemake.output[0],

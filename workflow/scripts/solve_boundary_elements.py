@@ -1,6 +1,6 @@
 """Press one surface against one material at one load, by boundary elements."""
 
-from job import logged
+from job import guarded
 
 from icha.material import Material
 from icha.records import read_surface, write_dataset
@@ -15,7 +15,7 @@ def solve_boundary_elements(surface, output, *, rms_slope, material, attributes,
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         solve_boundary_elements(
             snakemake.input.surface,
             snakemake.output[0],

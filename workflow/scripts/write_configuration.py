@@ -2,7 +2,7 @@
 
 import shutil
 
-from job import logged
+from job import guarded
 
 from icha.files import whole_file
 
@@ -17,6 +17,6 @@ def write_configuration(output, *, text, copies):
 
 
 if "snakemake" in globals():
-    with logged(snakemake.log[0]):
+    with guarded(snakemake):
         output, *copies = snakemake.output
         write_configuration(output, text=snakemake.params.text, copies=dict(zip(copies, snakemake.input, strict=True)))

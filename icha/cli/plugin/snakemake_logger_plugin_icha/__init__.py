@@ -34,10 +34,13 @@ class LogHandler(LogHandlerBase):
     def emit(self, record):
         """Write one line, if the record is of an event that is wanted."""
         name = str(getattr(record, "event", None) or "")
-        if name not in _FIELDS:
+        if name in _FIELDS:
+            event = {"event": name} | {field: getattr(record, field, None) for field in _FIELDS[name]}
+        elif text := getattr(record, "remark", None):  # the Snakefile's own, for people
+            event = {"event": "remark", "text": text}
+        else:
             return
-        values = {field: getattr(record, field, None) for field in _FIELDS[name]}
         try:
-            self._events.write(json.dumps({"event": name, **values}, default=str) + "\n")
+            self._events.write(json.dumps(event, default=str) + "\n")
         except OSError:
             pass  # nobody looks any more
