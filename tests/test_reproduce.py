@@ -162,7 +162,7 @@ def test_differences_are_told_by_variable(planted, status, told, made, reproduce
     kept = list(reproduce.temporary.iterdir())
     assert len(kept) == status
     if kept:
-        assert f"computed in {kept[0]}/source/results/mine" in said
+        assert f"what was computed again: {kept[0]}/source/results/mine" in said
 
 
 def test_single_runs(made, reproduce, tmp_path):
@@ -220,7 +220,7 @@ def test_an_environment_that_cannot_be_installed(made, reproduce, tmp_path):
 def test_a_program_that_fails(made, reproduce, tmp_path):
     status, said = reproduce(made, "--folder", tmp_path / "again", planted="fails")
     assert status == 1 and "the program fails" in said
-    assert f"nothing was computed; this goes on:   icha reproduce {made} --folder" in said
+    assert f"nothing was computed; the same command with --folder {tmp_path / 'again'} goes on" in said
 
 
 def test_the_environment_that_is_here_has_to_agree_with_the_lock_file(deposit, reproduce):
@@ -254,7 +254,7 @@ def test_what_was_stopped_goes_on(made, reproduce, tmp_path):
         assert line
     process.send_signal(signal.SIGTERM)
     said = process.communicate(timeout=50)[0]
-    assert process.returncode == 1 and "stopped; this goes on:   icha reproduce" in said
+    assert process.returncode == 1 and f"stopped; the same command with --folder {folder} goes on" in said
     ours = subprocess.run(["pgrep", "-f", f"{folder}/source/.venv/bin/icha"], capture_output=True, text=True).stdout
     assert not ours, ours
     copied = (folder / "source/program.py").stat().st_mtime_ns

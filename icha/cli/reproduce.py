@@ -78,7 +78,7 @@ def reproduce(
         folder = Path(tempfile.mkdtemp(prefix="icha-reproduce-"))
     folder = folder.resolve()
     _begin(folder, deposit, checksums)
-    goes_on = f"this goes on:   icha reproduce {deposit} --folder {shown(folder)}"
+    goes_on = f"the same command with --folder {shown(folder)} goes on from here"
     try:
         with _stopped_by_signals():
             project, original = _prepare(folder, deposit)
@@ -102,7 +102,7 @@ def reproduce(
     if temporary and good and not keep:
         shutil.rmtree(folder)
     else:
-        typer.echo(f"computed in {shown(made)}")
+        typer.echo(f"what was computed again: {shown(made)}")
     if not good:
         raise typer.Exit(FAILED)
 
@@ -305,6 +305,7 @@ def _program(project: Path, folder: Path, environment: str) -> tuple[list[str], 
 def _run(program, project: Path, targets: list[str], cores: str | None) -> int:
     """Run the campaign, which says itself how it goes; return its exit status."""
     command, variables = program
+    typer.echo(f"computing in {shown(project)}, which paths are relative to")
     asked = ["run", CONFIGURATION, *targets, *(["--cores", cores] if cores else [])]
     sys.stdout.flush()
     return _call([*command, *asked], cwd=project, env=variables, stdin=subprocess.DEVNULL)
@@ -316,8 +317,10 @@ def _call(command: list[str], **how) -> int:
     try:
         return process.wait()
     except KeyboardInterrupt:
+        # What ignores one of them, started in the background of a script for one, heeds the other.
+        ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGINT)
+            os.killpg(process.pid, signal.SIGTERM if ignored else signal.SIGINT)
         process.wait()
         raise
 
