@@ -72,8 +72,3 @@ def collected(title: str, summary: str, level: str, origins: Iterable[Mapping[st
     )
     further = [word for word in keywords if word not in KEYWORDS]
     return discovery(title, summary, level, sources=sources, references="; ".join(references), keywords=further)
-
-
-def identified(attrs: Mapping[str, str], path: str) -> dict[str, str]:
-    """Global attributes with the identifier of a file of a campaign: the campaign's name and the path below it."""
-    return {**attrs, "id": f"{attrs['campaign']}/{path}"}

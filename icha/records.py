@@ -32,7 +32,7 @@ from icha.netcdf import (
 from icha.roughness import SpectralMoments, radial_power_spectrum, ring_edges, spectral_moments
 from icha.surface import PERIODIC, Surface
 
-# Larger arrays are heights: a fifth less space would take half a minute for 8192 nodes a side.
+# Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
 _COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 # Bytes of an array from which on it is not read as a whole.
 _LEFT_IN_FILE = 2**26

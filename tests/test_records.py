@@ -67,7 +67,7 @@ def as_xarray_would(dataset):
             encodings[name] = {"_FillValue": netCDF4.default_fillvals["f8"]}
             if variable.encoding.get("dtype") == np.dtype("int32"):
                 encodings[name] = {"dtype": "int32", "_FillValue": 1 - 2**31}
-        if variable.dtype.kind in "iuf" and variable.size >= 4096:
+        if variable.dtype.kind in "iuf" and variable.size >= 1024:
             encodings[name] |= {"zlib": True, "complevel": 4, "shuffle": True}
     return encodings
 
@@ -158,7 +158,7 @@ def test_heights_of_a_large_surface_are_kept_plain_and_to_the_last_bit(tmp_path)
         np.testing.assert_array_equal(file["height"][::97], surface.heights[::97])
     write_surface(tmp_path / "small.nc", small.surface(), name="rough", seed=1)
     with netCDF4.Dataset(tmp_path / "small.nc") as file:
-        assert file["height"].filters()["zlib"] == (small.surface().grid >= 64)
+        assert file["height"].filters()["zlib"] == (small.surface().grid >= 32)
 
 
 def test_no_fill_values_and_no_coordinate_in_pascal(tmp_path):

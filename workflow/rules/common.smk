@@ -74,8 +74,15 @@ PUBLICATION = CAMPAIGN.published()
 # Without a version nothing is made: see publish.smk.
 DEPOSIT = f"{RESULTS}/publish/{CAMPAIGN.name}-{PUBLICATION.version or 'without_version'}"
 
-# Attributes of every dataset of the campaign.
-ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
+
+def attributes_of(wildcards, output):
+    """Attributes of every dataset of the campaign: `id` is its path without the ending, the same on every machine."""
+    path = Path(output[0]).relative_to(RESULTS).with_suffix("")
+    return {
+        "id": f"{CAMPAIGN.name}/{path.as_posix()}",
+        "campaign": CAMPAIGN.name,
+        "license": PUBLICATION.license,
+    }
 
 
 wildcard_constraints:

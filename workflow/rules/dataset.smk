@@ -46,7 +46,7 @@ rule campaign_dataset:
     params:
         labels=LABELS,
         size=len(RUNS),
-        attributes=ATTRIBUTES
+        attributes=lambda wildcards, output: attributes_of(wildcards, output)
         | discovery_attributes(PUBLICATION)
         | {"title": CAMPAIGN.title, "summary": CAMPAIGN.summary, "config_sha256": campaign_sha256(CAMPAIGN)},
         code=code_of("make_dataset.py"),
@@ -72,7 +72,7 @@ rule comparison:
         mem_mb=4000,
         runtime=30,
     params:
-        attributes=ATTRIBUTES,
+        attributes=attributes_of,
         code=code_of("compare_runs.py"),
     message:
         "Comparison of the runs"
@@ -98,7 +98,7 @@ rule model_error:
         runtime=30,
     params:
         labels=SOLUTION_LABELS,
-        attributes=ATTRIBUTES,
+        attributes=attributes_of,
         code=code_of("measure_model_error.py"),
     message:
         "Error of the model against boundary elements"

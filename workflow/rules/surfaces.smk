@@ -18,7 +18,7 @@ rule surface:
         runtime=30,
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
-        attributes=ATTRIBUTES,
+        attributes=attributes_of,
         code=code_of("make_surface.py"),
     message:
         "Surface {wildcards.surface}, seed {wildcards.seed}"
