@@ -220,6 +220,17 @@ def test_files_that_are_missing_extra_damaged_or_drawn_otherwise(folders):
     (rerun / FILE).write_bytes((rerun / FILE).read_bytes()[:-1000])
     (found,) = [file for file in compare_folders(deposit, rerun).files if file.path == FILE]
     assert found.verdict == DIFFERENT and "the rerun's cannot be opened" in found.detail
+    # A file that can be opened, and of whose values some cannot be read.
+    for folder in (deposit, rerun):
+        with netCDF4.Dataset(folder / FILE, "w") as file:
+            file.createDimension("step", 1000)
+            file.createVariable("pressure", "f8", ("step",), zlib=True, fletcher32=True)[:] = np.sqrt(np.arange(1000))
+    whole = (rerun / FILE).read_bytes()
+    spoilt = bytearray(whole)
+    spoilt[-2000:-1900] = bytes(100)
+    (rerun / FILE).write_bytes(spoilt)
+    (found,) = [file for file in compare_folders(deposit, rerun).files if file.path == FILE]
+    assert found.verdict == DIFFERENT and "cannot be read" in found.detail
 
 
 def test_checks_have_to_be_passed_alike(tmp_path):

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -106,10 +106,7 @@ class Comparison(NamedTuple):
 
 
 def compare_folders(
-    deposit: str | os.PathLike,
-    rerun: str | os.PathLike,
-    paths: Iterable[str] | None = None,
-    say: Callable[[str], None] = lambda path: None,
+    deposit: str | os.PathLike, rerun: str | os.PathLike, paths: Iterable[str] | None = None
 ) -> Comparison:
     """Compare the results in two folders.
 
@@ -117,15 +114,10 @@ def compare_folders(
     ----------
     deposit, rerun : folders with `dataset/`, `runs/`, … in them.
     paths : the files that are compared, relative to both; all of `RESULTS` that are in either if left out.
-    say : told of every file before it is compared.
     """
     deposit, rerun = Path(deposit), Path(rerun)
     paths = sorted({*_results(deposit), *_results(rerun)} if paths is None else {*paths})
-    found = []
-    for path in paths:
-        say(path)
-        found.append(compare_files(deposit / path, rerun / path, path))
-    return Comparison(tuple(found))
+    return Comparison(tuple(compare_files(deposit / path, rerun / path, path) for path in paths))
 
 
 def _results(folder: Path) -> Iterator[str]:
@@ -169,6 +161,8 @@ def _compare_datasets(deposit, rerun, path):
             except OSError as error:
                 return File(path, DIFFERENT, f"the {whose}'s cannot be opened: {error.strerror or error}")
         items = tuple(_compare_groups(*opened, ""))
+    except RuntimeError as error:  # the library's, for what it cannot read
+        return File(path, DIFFERENT, f"one of the two cannot be read: {error}")
     finally:
         for dataset in opened:
             dataset.close()
