@@ -358,6 +358,23 @@ def test_what_fails_for_the_moment_is_tried_again(server, deposit, monkeypatch):
     assert server.files[deposit.name] == deposit.read_bytes()
 
 
+def test_a_file_that_is_removed_although_the_server_says_that_it_failed(server, deposit, monkeypatch):
+    monkeypatch.setattr(zenodo, "_PATIENCE", zenodo._PATIENCE.new(total=0))
+
+    def remove(handler):
+        del server.files["README.md"]
+        handler.answer(500)
+
+    server.files["README.md"] = b"of another version"
+    server.failures.append(("DELETE", "README", remove))
+    assert upload(deposit, "--url", server.address, "--draft", "77", "--yes")[0] == 0
+    assert server.files["README.md"] == FILES["README.md"]
+    server.files["README.md"] = b"of another version"
+    server.failures.append(("DELETE", "README", refuse(500)))
+    status, said = upload(deposit, "--url", server.address, "--draft", "77", "--yes")
+    assert status == 1 and "has failed (500" in said
+
+
 def test_it_does_not_try_for_ever(server, tmp_path):
     server.failures += [("GET", "", refuse(503, {"message": "maintenance"}))] * 20
     client = Zenodo(server.address, TOKEN, zenodo._PATIENCE.new(backoff_factor=0))

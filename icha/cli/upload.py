@@ -198,8 +198,6 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
         typer.echo(f"draft:     {draft.page}")
         sums = {path.name: md5_of(path) for path in files}
         there = {file.name for file in draft.files if file.md5 == sums.get(file.name)}
-        # First, for what is wrong with it is known at once.
-        server.describe(draft, metadata)
         others = []
         for file in draft.files:
             if file.name in there:
@@ -208,6 +206,8 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
                 server.remove(draft, file)
             else:
                 others.append(file.name)
+        # Before the files, for what is wrong with it is known at once.
+        server.describe(draft, metadata)
         for path in files:
             if path.name in there:
                 typer.echo(f"{path.name}: is there already")
