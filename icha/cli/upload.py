@@ -181,13 +181,13 @@ def _ask(yes: bool) -> None:
         return
     if not sys.stdin.isatty():
         raise Mistake("there is nobody to ask, and nothing is sent; needed: --yes, or a terminal")
-    if not typer.confirm("Send it?"):
+    if not _confirmed("Send it?"):
         typer.echo("Nothing was sent.")
         raise typer.Exit(FAILED)
 
 
 def _send(archive, files, metadata, address, token, number, new_version_of, publish, yes) -> None:
-    from icha.publication.zenodo import Zenodo, ZenodoError, md5_of
+    from icha.publication.zenodo import ZENODO, Zenodo, ZenodoError, md5_of
 
     server, draft = Zenodo(address, token), None
     try:
@@ -219,7 +219,7 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
             typer.echo(f"The draft has other files, too, which are left there: {', '.join(others)}")
         if draft.doi:
             typer.echo(f"DOI:       {draft.doi} (reserved)")
-        if publish and (yes or _asked_again()):
+        if publish and (yes or _confirmed("Publish it? What is published cannot be deleted.")):
             published = server.publish(draft)
             typer.echo(f"published: {published.page}\nDOI:       {published.doi}")
         else:
@@ -228,7 +228,7 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
         with contextlib.suppress(OSError):
             typer.secho(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")
         if draft is not None:
-            server_option = "" if address == "https://zenodo.org" else f" --url {address}"
+            server_option = "" if address == ZENODO else f" --url {address}"
             typer.echo(
                 f"A draft is left behind: {draft.page}\nThis goes on with it:   icha upload {shown(archive)}"
                 f"{server_option} --draft {draft.number}",
@@ -237,7 +237,10 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
         raise typer.Exit(FAILED) from None
 
 
-def _asked_again() -> bool:
-    if not sys.stdin.isatty():
+def _confirmed(question: str) -> bool:
+    """The answer of who sits at the terminal; that there is none, and Ctrl-C, are a no."""
+    try:
+        return sys.stdin.isatty() and typer.confirm(question)
+    except typer.Abort:
+        typer.echo()
         return False
-    return typer.confirm("Publish it? What is published cannot be deleted.")
