@@ -12,7 +12,7 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment slurm-environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page validators-environment validate clean
+.PHONY: help publish environment slurm-environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page faults validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -27,6 +27,7 @@ help:
 	@echo "make linkcheck  check the documentation's links to other sites"
 	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
+	@echo "make faults  kill, damage and starve a small campaign (about half an hour, as root); docs/faults.md"
 	@echo "make slurm-environment  install Snakemake with its executor for Slurm in .venv-slurm; docs/howto/cluster.md"
 	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  put a deposit to the validators of others, without network"
 	@echo "make clean   remove results, Snakemake's records and the built documentation (not the environment)"
@@ -97,6 +98,10 @@ benchmarks: environment .venv-benchmarks/.installed
 
 benchmarks-page: environment
 	python benchmarks/page.py
+
+faults: environment
+	python benchmarks/faults.py $(OPTIONS)
+	python benchmarks/faults_page.py
 
 # The validators have an environment of their own, for some of them need an old jsonschema.
 .venv-validators/.installed: .venv-tools/bin/uv tests/validators/requirements.txt

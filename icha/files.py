@@ -30,7 +30,7 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, path)
     except Exception as error:
-        reason = _why_not_writable(path)
+        reason = why_not_writable(path.parent)
         if reason is not None:
             raise OSError(reason.errno, reason.strerror, str(path.parent)) from error
         raise
@@ -38,9 +38,9 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _why_not_writable(path: Path) -> OSError | None:
-    """What the system says to some data in the folder of `path`."""
-    probe = path.with_name(f".{path.name}.probe")
+def why_not_writable(folder: Path) -> OSError | None:
+    """What the system says against data in a folder, if anything; they are removed again."""
+    probe = folder / f".{os.getpid()}.probe"
     try:
         probe.write_bytes(bytes(_PROBE))
     except OSError as error:

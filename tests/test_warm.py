@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -128,6 +129,26 @@ def test_the_process_ends_with_the_one_that_started_it_and_leaves_nothing(starte
     starter.process.kill()
     wait_until(lambda: not alive(starter.server))
     wait_until(lambda: not starter.folder.exists())
+
+
+def test_the_process_ends_while_it_is_still_importing(tmp_path):
+    (tmp_path / "slow.py").write_text(
+        "import time\nprint('here', flush=True)\nfor _ in range(6000):\n    time.sleep(0.1)\n"
+    )
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    listener = socket.socket(socket.AF_UNIX)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    listener.bind(str(folder / "jobs"))
+    command = [sys.executable, str(WORKFLOW / "warm.py"), str(listener.fileno()), str(folder), "slow"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    server = subprocess.Popen(command, env=environment, pass_fds=[listener.fileno()], text=True, **pipes)
+    assert server.stdout.readline() == "here\n"
+    server.stdin.close()
+    server.wait(30)
+    assert not folder.exists()
+    server.stdout.close()
+    listener.close()
 
 
 def test_an_environments_own_sitecustomize_is_still_imported(tmp_path):

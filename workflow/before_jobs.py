@@ -3,13 +3,13 @@
 import functools
 import json
 import os
-import tempfile
 from base64 import urlsafe_b64decode
 from pathlib import Path
 
 from snakemake.logging import logger
 
 from icha import integrity
+from icha.files import why_not_writable
 
 
 def before_execution(workflow, results: str, prepare) -> None:
@@ -76,10 +76,11 @@ def refuse_unwritable(results: str) -> None:
     for folder in (results, ".snakemake"):
         try:
             Path(folder).mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
-                file.write(bytes(4096))
+            reason = why_not_writable(Path(folder))
         except OSError as error:
-            raise SystemExit(_unwritable(folder, error.strerror)) from None
+            reason = error
+        if reason is not None:
+            raise SystemExit(_unwritable(folder, reason.strerror))
     for folder, _, _ in os.walk(results):
         if not os.access(folder, os.W_OK | os.X_OK):
             raise SystemExit(_unwritable(folder, "Permission denied"))

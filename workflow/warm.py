@@ -10,6 +10,7 @@ script that finds no such process, on a cluster for one, runs by itself. The pro
 
 import array
 import contextlib
+import fcntl
 import importlib
 import json
 import os
@@ -59,11 +60,12 @@ def start(modules: list[str]) -> None:
 def serve(listener: socket.socket, folder: str, modules: list[str]) -> None:
     """Import `modules`, then fork for every connection until standard input closes."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # forks are not waited for
-    for name in modules:
-        # What is missing here, a job will say.
-        with contextlib.suppress(Exception):
-            importlib.import_module(name)
     try:
+        with _ended_by_closing(sys.stdin):
+            for name in modules:
+                # What is missing here, a job will say.
+                with contextlib.suppress(Exception):
+                    importlib.import_module(name)
         while True:
             ready, _, _ = select.select([listener, sys.stdin], [], [])
             if sys.stdin in ready:
@@ -78,6 +80,22 @@ def serve(listener: socket.socket, folder: str, modules: list[str]) -> None:
             for leftover in Path(folder).iterdir():
                 leftover.unlink()
             os.rmdir(folder)
+
+
+@contextlib.contextmanager
+def _ended_by_closing(pipe):
+    """End the process if a pipe closes while the block is at work."""
+    former = signal.signal(signal.SIGIO, lambda *_: sys.exit())
+    flags = fcntl.fcntl(pipe, fcntl.F_GETFL)
+    fcntl.fcntl(pipe, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(pipe, fcntl.F_SETFL, flags | os.O_ASYNC)
+    if select.select([pipe], [], [], 0)[0]:
+        sys.exit()
+    try:
+        yield
+    finally:
+        fcntl.fcntl(pipe, fcntl.F_SETFL, flags)
+        signal.signal(signal.SIGIO, former)
 
 
 def _attend(connection: socket.socket) -> None:

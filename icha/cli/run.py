@@ -231,6 +231,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
     from icha.cli.events import reason_of
     from icha.cli.live import duration
     from icha.cli.plan import failed_runs
+    from icha.files import why_not_writable
 
     results = folder / "results" / campaign.name
     ended = len(watch.done) + len(watch.failed)
@@ -259,6 +260,9 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
             )
             if logs:
                 typer.echo(f"    log: {logs}")
+    if status and results.is_dir() and (reason := why_not_writable(results)):
+        # Logs are there as well, so jobs may not have been able to say it.
+        _heading(f"{shown(results)} cannot be written to: {reason.strerror}. The same command goes on once it can.")
     kept_back = watch.job_count - ended
     if stopped or status < 0:
         _heading("Stopped before the end. The same command goes on from here.")

@@ -1,0 +1,119 @@
+"""Write docs/faults.md from what benchmarks/faults.py kept; nothing is tried here."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+WENT_ON, REFUSED = "went on", "said what to do"
+
+HEAD = """# What becomes of a campaign that is disturbed
+
+<!-- Written by benchmarks/faults_page.py from benchmarks/results/faults.json. -->
+
+Computers are switched off, disks fill up and files get damaged. What must not come of it is a wrong number that nobody
+notices. So a campaign of {results} files with every kind of result, its deposit among them, was disturbed
+{trials} times. After each disturbance these have to hold:
+
+- no result is there that is not, byte for byte, that of an undisturbed campaign: nothing half-written passes for whole;
+- no process of the disturbed call is left running after {moment:.0f} s;
+- what was complete is not computed again (after kills);
+- the same command, given again with nothing else done, goes on to the end, and all results have the bytes of the
+  undisturbed campaign; or, where it cannot, it says what is to be done, before it computes anything.
+
+{verdict}
+
+{table}
+
+*Went on*: it ended, or was ended by the next call, with identical bytes. *Said what to do*: it was refused or failed
+with a message that names the reason; once that was gone, the same command ended with identical bytes. *Wrong*: any
+other end.
+"""
+
+PARTS = {
+    "kill": """## Kills
+
+`kill -9`, which no program can heed, at random moments: of Snakemake alone, of Snakemake with all of its session, of a
+job, and of the process from which jobs are forked. Calls that go on after a kill are killed in their turn, up to three
+times in a row. A job ends with the Snakemake that wants it, so the next call never meets jobs of the last one.""",
+    "full disk": """## Full disks
+
+Results, or the whole working folder, on a disk that is full from the start, too small for what is computed, or filled
+by something else while the campaign runs.""",
+    "read-only": """## Where nothing can be written
+
+Results, or the whole working folder, on a disk that is mounted read-only, and results without permission to write. A
+finished campaign is found finished; what is missing or damaged there is a message, and nothing is computed. Where
+Snakemake's own records are read-only, there is a message in any case, for it cannot start without writing there.""",
+    "damage": """## Damaged files
+
+A file of a finished campaign is emptied, cut in half, loses its last byte, or has one bit flipped at its start, in its
+middle or at its end; each kind by itself in some of these ways, and all at once. Whatever was damaged is set aside
+under another name. *By the disk* means that size and time of the file do not betray it: the job that reads it finds
+out.""",
+    "two at once": """## Two calls at once
+
+Of one campaign in one folder, the second call after a random pause, and of two campaigns in one folder.""",
+}
+
+TAIL = """## How
+
+`make faults` makes all trials, from the committed state of the program, and writes this page; it takes about half an
+hour and needs Linux and the right to mount disks (root, or user namespaces). Moments and bits are drawn at random with
+seed {seed}. Power cuts are not among the trials: files are not forced to the disk one by one, and what a power cut
+leaves of them is found by its checksum like any other damage.
+"""
+
+
+def page(kept: dict) -> str:
+    """The page as Markdown."""
+    rows = kept["rows"]
+    trials = sum(row["trials"] for row in rows)
+    wrong = sum(_wrong(row) for row in rows)
+    verdict = (
+        f"All {trials} trials ended so." if not wrong else f"**{wrong} of {trials} trials did not end so:** see below."
+    )
+    text = HEAD.format(
+        results=kept["results"], trials=trials, moment=kept["moment"], verdict=verdict, table=_totals(rows)
+    )
+    for part, words in PARTS.items():
+        own = [row for row in rows if row["part"] == part]
+        text += f"\n{words}\n\n{_table(own)}\n"
+        messages = dict.fromkeys(message for row in own for message in row["messages"])
+        if messages:
+            text += "\nWhat was said:\n\n```text\n" + "\n".join(messages) + "\n```\n"
+        violations = [f"- {row['fault']}: {violation}" for row in own for violation in row["violations"]]
+        if violations:
+            text += "\nWhat was wrong:\n\n" + "\n".join(violations) + "\n"
+    return text + "\n" + TAIL.format(seed=kept["seed"])
+
+
+def _wrong(row):
+    return row["trials"] - row[WENT_ON] - row[REFUSED]
+
+
+def _totals(rows):
+    lines = []
+    for part in PARTS:
+        own = [row for row in rows if row["part"] == part]
+        sums = [sum(count(row) for row in own) for count in _COUNTS]
+        lines.append([part, *map(str, sums)])
+    return _lines([["disturbance", "trials", WENT_ON, REFUSED, "wrong"], *lines])
+
+
+_COUNTS = (lambda row: row["trials"], lambda row: row[WENT_ON], lambda row: row[REFUSED], _wrong)
+
+
+def _table(rows):
+    lines = [[row["fault"], *(str(count(row)) for count in _COUNTS)] for row in rows]
+    return _lines([["of what", "trials", WENT_ON, REFUSED, "wrong"], *lines])
+
+
+def _lines(rows):
+    return "\n".join("| " + " | ".join(row) + " |" for row in [rows[0], ["---"] + ["---:"] * 4, *rows[1:]])
+
+
+if __name__ == "__main__":
+    written = json.loads((HERE / "results/faults.json").read_text(encoding="utf-8"))
+    (HERE.parent / "docs/faults.md").write_text(page(written), encoding="utf-8")
