@@ -7,7 +7,7 @@ from icha.configuration.publication import needed
 
 
 def refuse_unpublishable(configuration: Configuration, project: str) -> None:
-    """End the program with a message if a deposit lacks metadata, its source is not committed, or its lock not kept to."""
+    """End the program with a message if metadata are missing, the source is not committed, or the lock not kept to."""
     # For this target only.
     from icha.publication.environment import refuse_other_environment
     from icha.publication.licences import known_licence
