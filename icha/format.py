@@ -209,6 +209,10 @@ def _flaws_of_run(run):
         for edges, bins in (("gap_edge", "gap_bin"), ("pressure_edge", "pressure_bin")):
             if run.sizes[edges] != run.sizes[bins] + 1:
                 yield f"{edges}: {run.sizes[edges]} edges of {run.sizes[bins]} bins; allowed: one more than bins"
+                continue
+            own = run[f"{bins}_edges"].values
+            if not np.array_equal(run[f"{bins}_bounds"].values, np.column_stack([own[:-1], own[1:]])):
+                yield f"{bins}_bounds: are not the edges in {bins}_edges; allowed: lower and upper edge of every bin"
 
 
 def _flaws_of_steps(data, scalars):

@@ -57,6 +57,7 @@ def changed(run, name, **attrs):
         (lambda run: run.assign(contact_area_fraction=run["contact_area_fraction"] + 1), "out of range"),
         (lambda run: run.assign(spot_snapshot=run["spot_snapshot"] + 5), "spot_snapshot: 5 is out of range"),
         (lambda run: run.assign(gap_bin_edges=run["gap_bin_edges"][::-1]), "gap_bin_edges: do not increase"),
+        (lambda run: run.assign(pressure_bin_bounds=run["pressure_bin_bounds"] * 2), "pressure_bin_bounds: are not"),
         (lambda run: run.assign(extra=xr.Variable((), 1.0)), "extra: has no attribute units"),
         (lambda run: run.assign(rms_height=run["rms_height"] * np.nan), "rms_height: 1 of 1 values are not finite"),
         (lambda run: run.assign_attrs(history="Thu May 2 10:11:12 2024: ncks"), "attribute history: 'Thu May"),
@@ -80,6 +81,9 @@ def test_spoilt_surfaces_and_campaigns_are_found(files):
     assert any("height: is (31, 32)" in flaw for flaw in flaws(SURFACE, surface.isel(y=slice(1, None))))
     assert any("boundary: 'round'" in flaw for flaw in flaws(SURFACE, surface.assign_attrs(boundary="round")))
     _, tree = kind_of(files / "campaign.nc")
+    tree.attrs |= {"creator_name": "A. Maker", "date_created": "today"}
+    refused = [flaw for flaw in flaws(CAMPAIGN, tree) if "nothing that tells who made" in flaw]
+    assert len(refused) == 1 and refused[0].startswith("attribute date_created is there")
     study = tree["slopes"].to_dataset()
     spoilt = study["nominal_pressure"].copy()
     spoilt[0, 0, 0, 0, 0] = np.nan

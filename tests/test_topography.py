@@ -682,6 +682,7 @@ def test_surface_files_of_all_kinds_have_their_power_spectrum(tmp_path):
     q, power = file["psd_wavevector"].values, file["power_spectrum"].values
     assert file["power_spectrum"].attrs["units"] == "m^4" and file["psd_wavevector"].attrs["units"] == "rad m^-1"
     # The integral over the plane of wave vectors, ring by ring, is the mean square height.
-    edges = np.concatenate([[0.5 * 2 * np.pi], 0.5 * (q[1:] + q[:-1]), [q[-1]]])
-    variance = np.sum(np.pi * np.diff(edges**2) * power)
+    low, high = file["psd_wavevector_bounds"].values.T
+    assert np.all((low < q) & (q < high)) and file["psd_wavevector"].attrs["bounds"] == "psd_wavevector_bounds"
+    variance = np.sum(np.pi * (high**2 - low**2) * power)
     assert variance == pytest.approx(float(file["rms_height"]) ** 2, rel=0.1)
