@@ -94,12 +94,18 @@ def _refuse_damaged(results, inputs):
 
 def _say(text, terminal):
     """Print to the log; to the terminal if that cannot be written, on a full disk for one."""
+    line = f"{text}\n".encode()
     try:
-        print(text, flush=True)
+        sys.stdout.flush()
+        if os.write(1, line) == len(line):
+            return
     except OSError:
-        os.dup2(terminal, 1)
-        os.dup2(terminal, 2)
+        pass
+    os.dup2(terminal, 1)
+    os.dup2(terminal, 2)
+    with contextlib.suppress(OSError):
         sys.stdout.flush()  # what had been kept back
+        os.write(terminal, line)
 
 
 def _end_with_snakemake():
