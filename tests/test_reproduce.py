@@ -20,7 +20,8 @@ NAME = "mine-1.0.0"
 SOFT, HARD = "load/rough/seed1/slope1/soft", "load/rough/seed2/slope1/hard"
 # Stands for the deposit's `icha`: it makes what it is asked for, a number each, and tells how it was called.
 PROGRAM = """
-import json, os, sys, time, netCDF4, pathlib
+import json, os, signal, sys, time, netCDF4, pathlib
+signal.signal(signal.SIGTERM, signal.default_int_handler)
 command, configuration, *targets = sys.argv[1:]
 assert command == "run" and "cores" not in targets
 number = float(pathlib.Path("inputs/number.txt").read_text())
@@ -44,7 +45,12 @@ for path in [*surfaces, *asked] or files:
             file.note = 1000 * "large"
     print("made", path, flush=True)
     if os.environ.get("PLANTED") == "sleeps":
-        time.sleep(60)
+        try:
+            time.sleep(60)
+        except KeyboardInterrupt:
+            time.sleep(0.5)
+            pathlib.Path("ended").touch()
+            sys.exit(1)
 (results / "verdict.txt").write_text("passed")
 """
 MAKEFILE = f"""
@@ -233,6 +239,11 @@ def test_the_environment_that_is_here_has_to_agree_with_the_lock_file(deposit, r
 
 def test_what_was_stopped_goes_on(made, reproduce, tmp_path):
     folder = tmp_path / "again"
+    # What was left by one that was killed while it copied is no part of it.
+    assert reproduce(made, "--folder", folder, planted="fails")[0] == 1
+    (folder / "source").rename(folder / ".source.part")
+    (folder / ".source.part/program.py").unlink()
+    (folder / ".source.part/Makefile.orig").touch()
     program = [
         sys.executable,
         "-c",
@@ -257,6 +268,7 @@ def test_what_was_stopped_goes_on(made, reproduce, tmp_path):
     assert process.returncode == 1 and f"stopped; the same command with --folder {folder} goes on" in said
     ours = subprocess.run(["pgrep", "-f", f"{folder}/source/.venv/bin/icha"], capture_output=True, text=True).stdout
     assert not ours, ours
+    assert (folder / "source/ended").exists() and not list(folder.rglob("Makefile.orig"))
     copied = (folder / "source/program.py").stat().st_mtime_ns
     status, said = reproduce(made, "--folder", folder)
     assert status == 0 and "identical: 6 files" in said

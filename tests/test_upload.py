@@ -220,6 +220,7 @@ def test_it_stays_a_draft_that_another_call_publishes_without_sending_it_twice(s
     assert "other files, too, which are left there: photo.jpg" in said
     sent = [path for method, path, _ in server.requests if method == "PUT" and "/files/" in path]
     assert sent == ["/api/files/b-77/README.md"] and server.files["README.md"] == FILES["README.md"]
+    assert set(server.files) == SENT | {"photo.jpg"}
     status, said = upload(deposit, "--url", server.address, "--draft", "77", "--yes")
     assert status == 1 and "77 is published already" in said and "--new-version-of 77" in said
 
