@@ -55,7 +55,7 @@ run: environment
 	@icha run $(CONFIG) --cores $(CORES)
 
 publish: environment
-	@icha run $(or $(CONFIG),config/config.yaml) publish --cores $(CORES)
+	@icha run $(CONFIG) publish --cores $(CORES)
 
 validation hysteresis: environment
 	$(MAKE) run CONFIG=config/campaigns/$@.yaml

@@ -104,6 +104,9 @@ def run(
             log.unlink(missing_ok=True)
             raise
     _tell(status, stopped, watch, campaign, folder, log)
+    if not status and "publish" in asked:
+        deposit = f"{campaign.name}-{campaign.published().version}.zip"
+        print(f"deposit: {shown(folder / 'results' / campaign.name / 'publish' / deposit)}")
     if status:
         raise typer.Exit(FAILED)
 
