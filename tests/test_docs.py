@@ -276,7 +276,7 @@ def check_snakemake(arguments):
 
 @EVERY
 def test_every_command_exists(page):
-    known = {"git", "cd", "source", "cp", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
+    known = {"git", "cd", "source", "cp", "export", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
     for line, (program, *arguments) in commands(page):
         where = f"{page.name}, block at line {line}: {program} {shlex.join(arguments)}"
         program = Path(program).name
