@@ -83,4 +83,5 @@ rule report:
 
 rule publish:
     input:
+        f"{DEPOSIT}/SHA256SUMS",
         f"{DEPOSIT}.zip",

@@ -165,12 +165,15 @@ class Place:
                 yield path
 
     def times(self) -> dict[str, int]:
-        """When each result was written, of the jobs that Snakemake knows to have ended."""
-        unfinished = {file for file in self._unfinished()}
+        """When each result was written, of the jobs that Snakemake knows to have ended well."""
+        unfinished = tuple(self._unfinished())
+        deposit = self.results / f"publish/{CAMPAIGN}-1.0"
+        if not (deposit / "SHA256SUMS").is_file():  # of a job that failed Snakemake removes this, its output
+            unfinished += (f"{RESULTS}/publish/{deposit.name}/",)
         return {
             str(path): (self.results / path).stat().st_mtime_ns
             for path in self.result_files()
-            if not any(f"{RESULTS}/{path}".startswith(file) for file in unfinished)
+            if not f"{RESULTS}/{path}".startswith(unfinished)
         }
 
     def _unfinished(self):

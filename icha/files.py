@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 # As much as libraries want to write at once; a disk on which less is free is full.
@@ -35,7 +35,7 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
             raise OSError(reason.errno, reason.strerror, str(path.parent)) from error
         raise
     finally:
-        temporary.unlink(missing_ok=True)
+        _remove(temporary)
 
 
 def why_not_writable(folder: Path) -> OSError | None:
@@ -46,5 +46,10 @@ def why_not_writable(folder: Path) -> OSError | None:
     except OSError as error:
         return error
     finally:
-        probe.unlink(missing_ok=True)
+        _remove(probe)
     return None
+
+
+def _remove(file: Path) -> None:
+    with suppress(OSError):  # it is not there, or was never, for the folder is read-only
+        file.unlink()

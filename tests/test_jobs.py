@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from conftest import REPOSITORY
 
+from icha.files import whole_file, why_not_writable
 from icha.integrity import is_whole, lost, write_record
 
 RESULTS = "results/tiny"
@@ -118,3 +119,15 @@ with whole_file({str(tmp_path / "folder/large.nc")!r}) as temporary:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPOSITORY)
     assert f"OSError: [Errno 27] File too large: '{tmp_path}/folder'" in done.stderr.splitlines()[-1]
     assert list((tmp_path / "folder").iterdir()) == []
+
+
+def test_what_cannot_be_removed_does_not_hide_the_reason(tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(30, "Read-only file system")
+
+    for what in ("write_bytes", "unlink"):
+        monkeypatch.setattr(Path, what, refuse)
+    assert why_not_writable(tmp_path).errno == 30
+    with pytest.raises(OSError, match="Read-only file system") as raised, whole_file(tmp_path / "a.txt"):
+        raise RuntimeError("a library's own words")
+    assert raised.value.filename == str(tmp_path)
