@@ -245,7 +245,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
     elif ended:
         took = duration(watch.clock() - watch.started)
         print(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}")
-    incomplete = failed_runs(campaign, results) if status else {}
+    incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
     if incomplete:
         _heading(f"{counted(len(incomplete), 'run')} could not be computed to the end:")
         for path, reason in incomplete.items():

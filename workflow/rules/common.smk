@@ -75,14 +75,8 @@ PUBLICATION = CAMPAIGN.published()
 DEPOSIT = f"{RESULTS}/publish/{CAMPAIGN.name}-{PUBLICATION.version or 'without_version'}"
 
 
-def attributes_of(wildcards, output):
-    """Attributes of every dataset of the campaign: `id` is its path without the ending, the same on every machine."""
-    path = Path(output[0]).relative_to(RESULTS).with_suffix("")
-    return {
-        "id": f"{CAMPAIGN.name}/{path.as_posix()}",
-        "campaign": CAMPAIGN.name,
-        "license": PUBLICATION.license,
-    }
+# Attributes of every dataset of the campaign, but for its `id`, which is its path (see workflow/scripts/job.py).
+ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
 
 
 wildcard_constraints:
@@ -95,6 +89,11 @@ wildcard_constraints:
     slope=r"[0-9.e+-]+",
     pressure=r"[0-9.e+-]+",
     material="[A-Za-z0-9_.+-]+",
+
+
+def as_it_is(value):
+    """A value as a parameter of a rule: what users have written may hold braces, which are no wildcards."""
+    return lambda wildcards: value
 
 
 def code_of(script, *modules):

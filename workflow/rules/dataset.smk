@@ -5,10 +5,10 @@
 
 rule configuration:
     input:
-        list(COPIED.values()),
+        as_it_is(list(COPIED.values())),
     output:
         CONFIG_USED,
-        list(COPIED),
+        [copy.replace("{", "{{").replace("}", "}}") for copy in COPIED],
     log:
         f"{LOGS}/configuration.log",
     benchmark:
@@ -20,7 +20,7 @@ rule configuration:
         mem_mb=200,
         runtime=2,
     params:
-        text=CONFIG_TEXT,
+        text=as_it_is(CONFIG_TEXT),
         code=code_of("write_configuration.py"),
     message:
         "Writing the configuration as used"
@@ -46,9 +46,11 @@ rule campaign_dataset:
     params:
         labels=LABELS,
         size=len(RUNS),
-        attributes=lambda wildcards, output: attributes_of(wildcards, output)
-        | discovery_attributes(PUBLICATION)
-        | {"title": CAMPAIGN.title, "summary": CAMPAIGN.summary, "config_sha256": campaign_sha256(CAMPAIGN)},
+        attributes=as_it_is(
+            ATTRIBUTES
+            | discovery_attributes(PUBLICATION)
+            | {"title": CAMPAIGN.title, "summary": CAMPAIGN.summary, "config_sha256": campaign_sha256(CAMPAIGN)}
+        ),
         code=code_of("make_dataset.py"),
     message:
         "Campaign dataset of {params.size} runs"
@@ -72,7 +74,7 @@ rule comparison:
         mem_mb=4000,
         runtime=30,
     params:
-        attributes=attributes_of,
+        attributes=as_it_is(ATTRIBUTES),
         code=code_of("compare_runs.py"),
     message:
         "Comparison of the runs"
@@ -98,7 +100,7 @@ rule model_error:
         runtime=30,
     params:
         labels=SOLUTION_LABELS,
-        attributes=attributes_of,
+        attributes=as_it_is(ATTRIBUTES),
         code=code_of("measure_model_error.py"),
     message:
         "Error of the model against boundary elements"
@@ -149,6 +151,7 @@ rule verdict:
         mem_mb=200,
         runtime=5,
     params:
+        known=as_it_is({failure.run: failure.reason for failure in PUBLICATION.known_failures}),
         code=code_of("judge_results.py"),
     message:
         "Verdict on the checks"

@@ -4,14 +4,13 @@
 def what_is_published(wildcards):
     """The files of a deposit; ends the program where there can be none, before anything is computed."""
     refuse_unpublishable(CONFIGURATION, workflow.basedir)
-    # The verdict fails with the checks; with failures that are known, they are compared with these by the deposit.
-    judged = [CHECKS] if PUBLICATION.known_failures else [CHECKS, VERDICT]
     return [
         CONFIG_USED,
         *INPUTS,
         DATASET,
         COMPARISON,
-        *judged,
+        CHECKS,
+        VERDICT,
         REPORT,
         *FIGURES,
         *SURFACES,
@@ -39,7 +38,7 @@ rule deposit:
         runtime=30,
     params:
         results=RESULTS,
-        named_files=NAMED_FILES,
+        named_files=as_it_is(NAMED_FILES),
         project=workflow.basedir,
         # The source is part of the deposit, comments and all.
         commit=lambda wildcards: committed_source(workflow.basedir).commit,

@@ -28,7 +28,7 @@ rule reference:
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
         adhesive=lambda wildcards: adhesive_contacts(wildcards.surface),
-        attributes=attributes_of,
+        attributes=as_it_is(ATTRIBUTES),
         code=code_of("make_references.py"),
     message:
         "Theories and literature for surface {wildcards.surface}"
@@ -53,7 +53,7 @@ rule boundary_elements:
         runtime=240,
     params:
         settings=lambda wildcards: solution_settings(CAMPAIGN, solution_of(wildcards)),
-        attributes=attributes_of,
+        attributes=as_it_is(ATTRIBUTES),
         code=code_of("solve_boundary_elements.py"),
     message:
         "Boundary elements {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
@@ -79,7 +79,7 @@ rule boundary_element_loop:
         runtime=480,
     params:
         settings=lambda wildcards: loop_settings(CAMPAIGN, loop_of(wildcards)),
-        attributes=attributes_of,
+        attributes=as_it_is(ATTRIBUTES),
         code=code_of("follow_boundary_elements.py"),
     message:
         "Boundary elements both ways {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, "
@@ -105,7 +105,7 @@ rule error_sources:
         runtime=480,
     params:
         settings=lambda wildcards: source_settings(CAMPAIGN, sources_of(wildcards)),
-        attributes=attributes_of,
+        attributes=as_it_is(ATTRIBUTES),
         code=code_of("find_error_sources.py"),
     message:
         "Sources of the error {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
@@ -129,7 +129,7 @@ rule one_asperity:
         runtime=120,
     params:
         tabor_parameter=lambda wildcards: asperity_cases(CAMPAIGN)[wildcards.asperity],
-        attributes=attributes_of,
+        attributes=as_it_is(ATTRIBUTES),
         code=code_of("press_one_asperity.py"),
     message:
         "One asperity: {wildcards.asperity}"

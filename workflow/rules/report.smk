@@ -26,7 +26,7 @@ rule report_page:
         runtime=10,
     params:
         figures=list(CAMPAIGN.figures.drawn()),
-        citations=[measurement.citation for measurement in CAMPAIGN.measurements.values()],
+        citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         benchmarks=BENCHMARKS,
         code=code_of("make_report.py", *(f"icha.figures.{name}" for name in CAMPAIGN.figures.drawn())),
     message:

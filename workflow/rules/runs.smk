@@ -18,7 +18,7 @@ rule run:
         runtime=minutes_of,
     params:
         settings=settings_of,
-        attributes=lambda wildcards, output: attributes_of(wildcards, output)
+        attributes=lambda wildcards: ATTRIBUTES
         | {
             "study": wildcards.study,
             "config_sha256": run_sha256(CAMPAIGN, case_of(wildcards)),

@@ -18,7 +18,7 @@ rule surface:
         runtime=30,
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
-        attributes=attributes_of,
+        attributes=as_it_is(ATTRIBUTES),
         code=code_of("make_surface.py"),
     message:
         "Surface {wildcards.surface}, seed {wildcards.seed}"

@@ -1,6 +1,6 @@
 """Compare the runs of every study at common loads."""
 
-from job import guarded
+from job import attributes, guarded
 
 from icha.aggregation import compare_campaign
 from icha.records import read_campaign, write_dataset
@@ -13,4 +13,4 @@ def compare_runs(dataset, output, *, attributes):
 
 if "snakemake" in globals():
     with guarded(snakemake):
-        compare_runs(snakemake.input[0], snakemake.output[0], attributes=snakemake.params.attributes)
+        compare_runs(snakemake.input[0], snakemake.output[0], attributes=attributes(snakemake))

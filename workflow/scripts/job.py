@@ -37,8 +37,7 @@ def guarded(snakemake):
     the job took, which Snakemake cannot see of one that was handed over.
     """
     _end_with_snakemake()
-    log = snakemake.log[0]
-    results = log.partition("/logs/")[0]
+    log, results = snakemake.log[0], _results(snakemake)
     outputs = [_result(results, path) for path in snakemake.output]
     terminal = os.dup(2)
     try:
@@ -69,6 +68,18 @@ def guarded(snakemake):
         usage = {"cpu_seconds": round(took.ru_utime + took.ru_stime, 3), "megabytes": took.ru_maxrss // 1024}
         with contextlib.suppress(OSError), whole_file(Path(log).with_suffix(".usage.json")) as temporary:
             temporary.write_text(json.dumps(usage) + "\n", encoding="ascii")
+
+
+def attributes(snakemake):
+    """Attributes of the dataset that a job writes: those of the rule, and `id`, the same wherever it is computed."""
+    own = snakemake.params.attributes
+    path = Path(snakemake.output[0]).relative_to(_results(snakemake)).with_suffix("")
+    return {"id": f"{own['campaign']}/{path.as_posix()}"} | own
+
+
+def _results(snakemake):
+    """The campaign's folder of results."""
+    return snakemake.log[0].partition("/logs/")[0]
 
 
 def _result(results, path):

@@ -1,6 +1,6 @@
 """Put all runs of a campaign into one file."""
 
-from job import guarded
+from job import attributes, guarded
 
 from icha.campaign_file import write_campaign
 
@@ -16,5 +16,5 @@ if "snakemake" in globals():
             snakemake.input,
             snakemake.output[0],
             labels=snakemake.params.labels,
-            attributes=snakemake.params.attributes,
+            attributes=attributes(snakemake),
         )

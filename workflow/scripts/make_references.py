@@ -1,6 +1,6 @@
 """Write what theories say of a surface, and published points."""
 
-from job import guarded
+from job import attributes, guarded
 
 from icha.material import Material
 from icha.records import read_spectral_moments, write_dataset
@@ -27,5 +27,5 @@ if "snakemake" in globals():
             snakemake.output[0],
             settings=snakemake.params.settings,
             adhesive=snakemake.params.adhesive,
-            attributes=snakemake.params.attributes,
+            attributes=attributes(snakemake),
         )

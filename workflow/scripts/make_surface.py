@@ -1,6 +1,6 @@
 """Make a topography, by spectral synthesis or from a file, and write it at rms slope 1."""
 
-from job import guarded
+from job import attributes, guarded
 
 from icha.configuration.height_map import read_height_map
 from icha.records import write_surface
@@ -34,5 +34,5 @@ if "snakemake" in globals():
             seed=int(snakemake.wildcards.seed),
             settings=snakemake.params.settings,
             height_map=snakemake.input.get("height_map"),
-            attributes=snakemake.params.attributes,
+            attributes=attributes(snakemake),
         )

@@ -1,6 +1,6 @@
 """Compare the runs of a campaign with the boundary-element solutions beside them."""
 
-from job import guarded
+from job import attributes, guarded
 
 from icha.labels import SolutionLabels
 from icha.model_error import model_error
@@ -20,5 +20,5 @@ if "snakemake" in globals():
             snakemake.input.solutions,
             snakemake.output[0],
             labels=snakemake.params.labels,
-            attributes=snakemake.params.attributes,
+            attributes=attributes(snakemake),
         )

@@ -1,6 +1,6 @@
 """Press one asperity by the model and by boundary elements."""
 
-from job import guarded
+from job import attributes, guarded
 
 from icha.records import write_dataset
 from icha.reference.one_asperity import hertz_asperity, one_asperity
@@ -20,6 +20,6 @@ if "snakemake" in globals():
         press_one_asperity(
             snakemake.output[0],
             tabor_parameter=snakemake.params.tabor_parameter,
-            attributes=snakemake.params.attributes,
+            attributes=attributes(snakemake),
             progress=lambda line: print(line, flush=True),
         )

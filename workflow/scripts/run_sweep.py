@@ -1,6 +1,6 @@
 """Press one surface against one material along a loading path."""
 
-from job import guarded
+from job import attributes, guarded
 
 from icha.material import Material
 from icha.path import Path
@@ -29,6 +29,6 @@ if "snakemake" in globals():
             snakemake.input.surface,
             snakemake.output[0],
             **snakemake.params.settings,
-            attributes=snakemake.params.attributes,
+            attributes=attributes(snakemake),
             progress=lambda line: print(line, flush=True),
         )

@@ -1,6 +1,6 @@
 """Press one surface against one material at one load, by boundary elements."""
 
-from job import guarded
+from job import attributes, guarded
 
 from icha.material import Material
 from icha.records import read_surface, write_dataset
@@ -20,6 +20,6 @@ if "snakemake" in globals():
             snakemake.input.surface,
             snakemake.output[0],
             **snakemake.params.settings,
-            attributes=snakemake.params.attributes,
+            attributes=attributes(snakemake),
             progress=lambda line: print(line, flush=True),
         )
