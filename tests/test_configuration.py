@@ -27,7 +27,7 @@ from icha.configuration.expansion import (
     surface_cases,
     surface_settings,
 )
-from icha.configuration.load import ConfigurationError, load_configuration
+from icha.configuration.load import ConfigurationError, load_configuration, read_yaml
 from icha.configuration.problems import warnings
 from icha.configuration.schema import json_schema, readme_with_tables
 from icha.configuration.units import to_number, to_si
@@ -558,6 +558,11 @@ BAD = {
     ),
     "default of no kind of surface": ("defaults", {"surfaces": {"hrust": 0.8}}, "defaults.surfaces.hrust: unknown key"),
     "unknown section of defaults": ("defaults", {"figures": {}}, "defaults.figures: unknown key; allowed: materials"),
+    "braces in the name of a file": (
+        "surfaces.rough",
+        {"kind": "measured", "path": "scans/a{1}.txt"},
+        "surfaces.rough.path: 'scans/a{1}.txt' has braces in its name; allowed: a file without { and } in its name",
+    ),
     "no ORCID": (
         "publication",
         {"authors": [CARBERRY | {"orcid": "1"}]},
@@ -1065,6 +1070,11 @@ def test_measurements_that_cannot_be_drawn(table, changes, message, load, tmp_pa
     with pytest.raises(ConfigurationError, match=r"measurements\.lab") as error:
         load({"measurements": {"lab": _measurement(**changes)}})
     assert message in str(error.value)
+
+
+def test_dates_are_text_until_they_are_checked(tmp_path):
+    (tmp_path / "one.yaml").write_text("publication: {date: 2026-02-30}")
+    assert read_yaml(tmp_path / "one.yaml") == {"publication": {"date": "2026-02-30"}}
 
 
 def test_schema_and_tables_are_those_of_the_model():

@@ -118,6 +118,19 @@ def test_the_spectrum_runs_surfaces_and_all_that_needs_them(project):
     assert set(jobs) == ALL_RULES - {"configuration", "one_asperity"}
 
 
+def test_other_authors_run_the_dataset_which_names_them_and_no_sweep(project):
+    replace(project / "config/campaigns/smoke.yaml", "name: ICHA developers", "name: A team")
+    jobs, _ = planned(project)
+    assert {"configuration", "campaign_dataset", "report_page"} <= set(jobs)
+    assert not {"surface", "run", *BESIDE_RUNS} & set(jobs)
+
+
+def test_another_licence_runs_all_that_names_it(project):
+    replace(project / "config/campaigns/smoke.yaml", "license: CC-BY-4.0", "license: CC0-1.0")
+    jobs, _ = planned(project)
+    assert jobs["run"] == 12 and jobs["surface"] == 3 and set(jobs) >= BESIDE_RUNS | {"campaign_dataset", "comparison"}
+
+
 def test_a_figure_runs_itself_and_the_report(project):
     add_statement(project / "icha/figures/fig3_distributions.py")
     jobs, messages = planned(project)

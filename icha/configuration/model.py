@@ -29,6 +29,7 @@ from icha.configuration.values import (
     MEASURED,
     ROUNDING,
     AreaFraction,
+    File,
     Flag,
     Label,
     Length,
@@ -124,7 +125,7 @@ class FileSurface(Section):
     random: ClassVar[bool] = False
 
     kind: Literal["file"] = Field(description="Surface read from a file.")
-    path: Text = Field(
+    path: File = Field(
         description="File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a "
         "variable `height`. Relative to the configuration file. Heights point towards the elastic body."
     )
@@ -351,7 +352,7 @@ class Column(Section):
 class Measurement(Section):
     """Measured contact areas, drawn over the figure of the study that they belong to."""
 
-    path: Text = Field(description="CSV file with a line of headings. Relative to the configuration file.")
+    path: File = Field(description="CSV file with a line of headings. Relative to the configuration file.")
     label: Text = Field(description="What the legend calls it.")
     citation: Text = Field(description="Where the numbers come from; printed in the report.")
     study: Name = Field(description="Name of the study that it is compared with.")

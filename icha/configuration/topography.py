@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from icha.configuration.units import PATTERN, conversion_factor, to_si
-from icha.configuration.values import MAX_GRID, Length, Section, Text, integer, number, quantity
+from icha.configuration.values import MAX_GRID, File, Length, Section, Text, integer, number, quantity
 
 
 def _unit_of_length(value: Any) -> float:
@@ -80,7 +80,7 @@ class MeasuredSurface(Section):
     random: ClassVar[bool] = False
 
     kind: Literal["measured"] = Field(description="Topography from a measurement.")
-    path: Text = Field(description="File of the topography. Relative to the configuration file.")
+    path: File = Field(description="File of the topography. Relative to the configuration file.")
     format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = Field(
         default="auto",
         description="What the file is: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y z "

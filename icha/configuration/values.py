@@ -130,6 +130,17 @@ Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=80)]
 # A name, or that of a variant made by a study's `vary`.
 Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_.+-]+$", max_length=200)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
+
+
+def _file(value: str) -> str:
+    """Refuse names that cannot be those of results, where a file is kept beside the configuration."""
+    if re.search(r"[{}]", re.split(r"[/\\]", value)[-1]):
+        raise ValueError("has braces in its name; allowed: a file without { and } in its name")
+    return value
+
+
+# The path of a file.
+File = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_file)]
 Length = quantity("m", "100 um")
 Modulus = quantity("Pa", "25 MPa")
 SurfaceEnergy = quantity("J/m^2", "50 mJ/m^2", minimum=0)

@@ -8,7 +8,7 @@ rule configuration:
         as_it_is(list(COPIED.values())),
     output:
         CONFIG_USED,
-        [copy.replace("{", "{{").replace("}", "}}") for copy in COPIED],
+        list(COPIED),
     log:
         f"{LOGS}/configuration.log",
     benchmark:
