@@ -558,10 +558,10 @@ BAD = {
     ),
     "default of no kind of surface": ("defaults", {"surfaces": {"hrust": 0.8}}, "defaults.surfaces.hrust: unknown key"),
     "unknown section of defaults": ("defaults", {"figures": {}}, "defaults.figures: unknown key; allowed: materials"),
-    "braces in the name of a file": (
+    "braces in a path": (
         "surfaces.rough",
-        {"kind": "measured", "path": "scans/a{1}.txt"},
-        "surfaces.rough.path: 'scans/a{1}.txt' has braces in its name; allowed: a file without { and } in its name",
+        {"kind": "measured", "path": "scans{1}/a.txt"},
+        "surfaces.rough.path: 'scans{1}/a.txt' has braces; allowed: the path of a file without { and } in it",
     ),
     "no ORCID": (
         "publication",

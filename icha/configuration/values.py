@@ -133,9 +133,9 @@ Text = Annotated[str, Field(strict=True, min_length=1)]
 
 
 def _file(value: str) -> str:
-    """Refuse names that cannot be those of results, where a file is kept beside the configuration."""
-    if re.search(r"[{}]", re.split(r"[/\\]", value)[-1]):
-        raise ValueError("has braces in its name; allowed: a file without { and } in its name")
+    """Refuse paths that workflows take for patterns."""
+    if re.search(r"[{}]", value):
+        raise ValueError("has braces; allowed: the path of a file without { and } in it")
     return value
 
 
