@@ -7,7 +7,11 @@ from __future__ import annotations
 
 import datetime
 import re
+import unicodedata
+from collections.abc import Callable
+from itertools import combinations
 from typing import Annotated, Any, Literal
+from urllib.parse import quote
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
@@ -63,17 +67,61 @@ RESOURCES = (
     "Text",
     "Workflow",
 )
-_DOI = re.compile(r"10\.\d{4,9}/\S+")
-_ARXIV = re.compile(r"arXiv:(\d{4}\.\d{4,5}|[a-z-]+(\.[A-Z]{2})?/\d{7})(v\d+)?")
-_URL = re.compile(r"https?://[^\s/]+\.[^\s]+")
+_DOI = re.compile(r"10\.[0-9]{4,9}/.+", re.DOTALL)
+_ARXIV = re.compile(r"arXiv:([0-9]{4}\.[0-9]{4,5}|[a-z-]+(\.[A-Z]{2})?/[0-9]{7})(v[0-9]+)?")
+_URL = re.compile(r"https?://[^\s/]+\..+", re.DOTALL)
 _DOI_SITE = re.compile(r"https?://(dx\.)?doi\.org/", re.IGNORECASE)
+_ROR_SITE = re.compile(r"https?://ror\.org/", re.IGNORECASE)
+# The digits of Crockford's base 32.
+_BASE_32 = "0123456789abcdefghjkmnpqrstvwxyz"
+_ROR = re.compile(rf"0([{_BASE_32}]{{6}})([0-9]{{2}})")
+_FIRST_DAY, _LAST_DAY = "1900-01-01", "2199-12-31"
+
+
+def _readable(value: Any, breaks: str, allowed: str) -> Any:
+    """Refuse text without a visible character, and characters that formats of metadata cannot hold (XML 1.0, 2.2)."""
+    if isinstance(value, str):
+        for char in value:
+            if char == "\n" and not breaks:
+                raise ValueError(f"holds a line break; allowed: {allowed}; in YAML, >- and |- end it without one")
+            foreign = unicodedata.category(char) in ("Cc", "Cs", "Zl", "Zp") or char in "\ufffe\uffff"
+            if foreign and char not in breaks:
+                raise ValueError(f"holds the control character {char!r}; allowed: {allowed}")
+        if not any(char.isprintable() and not char.isspace() for char in value):
+            raise ValueError(f"is blank; allowed: {allowed}")
+    return value
+
+
+def _line(value: Any) -> Any:
+    return _readable(value, "", "text of one line")
+
+
+def _prose(value: Any) -> Any:
+    return _readable(value, "\n", "text, with or without line breaks")
+
+
+def _once(what: str, same: Callable[[Any, Any], bool], shown: Callable[[Any], str]) -> AfterValidator:
+    """Refuse a list with two entries that mean the same."""
+
+    def check(entries):
+        for entry, other in combinations(entries, 2):
+            if same(entry, other):
+                raise ValueError(f"{shown(other)!r} is given twice; allowed: every {what} once")
+        return entries
+
+    return AfterValidator(check)
+
+
+def _alike(*names: str | None) -> tuple[str, ...]:
+    """Names as they are compared: capitals, spaces and the encoding of accents make no other name."""
+    return tuple(" ".join(unicodedata.normalize("NFC", name or "").split()).casefold() for name in names)
 
 
 def _orcid(value: str) -> str:
     """Refuse an ORCID of the wrong form or with a wrong check digit (ISO 7064 mod 11-2); an address is taken for it."""
     plain = re.sub(r"^https?://orcid\.org/", "", value) if isinstance(value, str) else value
     example = "allowed: four groups of four digits of which the last is a check digit, such as '0000-0002-1825-0097'"
-    if not isinstance(plain, str) or not re.fullmatch(r"\d{4}-\d{4}-\d{4}-\d{3}[\dX]", plain):
+    if not isinstance(plain, str) or not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain):
         raise ValueError(f"is no ORCID; {example}")
     digits = plain.replace("-", "")
     total = 0
@@ -86,43 +134,93 @@ def _orcid(value: str) -> str:
 
 
 def _ror(value: Any) -> str:
-    """Refuse what is no identifier of the Research Organization Registry."""
-    plain = re.sub(r"^https?://ror\.org/", "", value) if isinstance(value, str) else ""
-    if not re.fullmatch(r"0[a-hj-km-np-tv-z0-9]{6}\d{2}", plain):
-        raise ValueError("is no ROR identifier; allowed: one of https://ror.org, such as 'https://ror.org/03yrm5c26'")
+    """Refuse what is no identifier of the Research Organization Registry, by its check digits (ISO 7064 mod 97-10)."""
+    plain = _ROR_SITE.sub("", value).lower() if isinstance(value, str) else ""
+    example = "allowed: one of https://ror.org, such as 'https://ror.org/03yrm5c26'"
+    found = _ROR.fullmatch(plain)
+    if not found:
+        raise ValueError(f"is no ROR identifier; {example}")
+    number = 0
+    for digit in found[1]:
+        number = 32 * number + _BASE_32.index(digit)
+    if int(found[2]) != 98 - number * 100 % 97:
+        raise ValueError(f"is no ROR identifier: its check digits are wrong; {example}")
     return f"https://ror.org/{plain}"
+
+
+def _addressable(value: str) -> str:
+    """Refuse characters that a web address cannot have (RFC 3986)."""
+    for char in value:
+        if char in ' <>"{}|\\^`':
+            raise ValueError(f"holds {char!r}, which no web address can; allowed: none, or {quote(char)!r} for it")
+        if char.isspace() or not char.isprintable():
+            raise ValueError(f"holds {char!r}, which no web address can; allowed: characters that are seen")
+    return value
+
+
+def _plain_doi(value: Any) -> str | None:
+    plain = re.sub(r"^doi:", "", _DOI_SITE.sub("", value)) if isinstance(value, str) else ""
+    return _addressable(plain) if _DOI.fullmatch(plain) else None
 
 
 def _doi(value: Any) -> str:
     """Refuse what is no DOI; take its address for itself."""
-    plain = re.sub(r"^doi:", "", _DOI_SITE.sub("", value)) if isinstance(value, str) else ""
-    if not _DOI.fullmatch(plain):
+    plain = _plain_doi(value)
+    if plain is None:
         raise ValueError("is no DOI; allowed: a DOI such as '10.1007/s11249-017-0900-2'")
     return plain
 
 
 def _identifier(value: Any) -> str:
     """Refuse what is neither a DOI nor an arXiv identifier nor a web address; take a DOI's address for itself."""
-    if isinstance(value, str):
-        plain = re.sub(r"^doi:", "", _DOI_SITE.sub("", value))
-        for pattern, text in ((_DOI, plain), (_ARXIV, value), (_URL, value)):
-            if pattern.fullmatch(text):
-                return text
+    plain = _plain_doi(value)
+    if plain is not None:
+        return plain
+    if isinstance(value, str) and (_ARXIV.fullmatch(value) or _URL.fullmatch(value)):
+        return _addressable(value)
     raise ValueError(
         "is no identifier; allowed: a DOI such as '10.1007/s11249-017-0900-2', 'arXiv:1234.56789', or a web address"
     )
 
 
+def _funder(value: Any) -> str:
+    """Refuse what is neither a ROR identifier nor a DOI; take a DOI's address for itself."""
+    if isinstance(value, str) and (_ROR_SITE.match(value) or _ROR.fullmatch(value.lower())):
+        return _ror(value)
+    plain = _plain_doi(value)
+    if plain is None:
+        raise ValueError(
+            "is neither a ROR identifier nor a DOI; allowed: one of them, such as 'https://ror.org/00k4n6c32' or "
+            "'10.13039/501100000780'"
+        )
+    return plain
+
+
+def _community(value: Any) -> str:
+    """Refuse what cannot name a community of Zenodo."""
+    if not isinstance(value, str) or not re.fullmatch(r"[a-z0-9_-]+", value):
+        raise ValueError(
+            "is no community of Zenodo; allowed: what its address ends with: lower-case letters, digits, - and _"
+        )
+    return value
+
+
+def _day_as_text(value: Any) -> Any:
+    """The text of a day, or of a time, that YAML has made one."""
+    return value.isoformat() if isinstance(value, datetime.date) else value
+
+
 def _date(value: Any) -> str:
-    """Refuse what is not a day of the calendar."""
-    if isinstance(value, datetime.date) and not isinstance(value, datetime.datetime):
-        return value.isoformat()
+    """Refuse what is not a day of the calendar, or one of another age."""
     try:
-        if isinstance(value, str) and re.fullmatch(r"\d{4}-\d{2}-\d{2}", value):
-            return datetime.date.fromisoformat(value).isoformat()
+        if not isinstance(value, str) or not re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", value):
+            raise ValueError
+        datetime.date.fromisoformat(value)
     except ValueError:
-        pass
-    raise ValueError("is no date; allowed: year, month and day, such as 2026-01-31")
+        raise ValueError("is no date; allowed: year, month and day, such as 2026-01-31") from None
+    if not _FIRST_DAY <= value <= _LAST_DAY:
+        raise ValueError(f"is no day of a publication; allowed: from {_FIRST_DAY} to {_LAST_DAY}")
+    return value
 
 
 def _version(value: Any) -> str:
@@ -143,22 +241,35 @@ Orcid = Annotated[
     str, BeforeValidator(_orcid), _text(r"^(https://orcid\.org/)?\d{4}-\d{4}-\d{4}-\d{3}[\dX]$", "0000-0002-1825-0097")
 ]
 Ror = Annotated[
-    str, BeforeValidator(_ror), _text(r"^(https://ror\.org/)?0[a-z0-9]{6}\d{2}$", "https://ror.org/03yrm5c26")
+    str, BeforeValidator(_ror), _text(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$", "https://ror.org/03yrm5c26")
 ]
 Doi = Annotated[str, BeforeValidator(_doi), _text(r"10\.\d{4,9}/", "10.1007/s11249-017-0900-2")]
 Identifier = Annotated[str, BeforeValidator(_identifier), _text(r"^\S+$", "10.1007/s11249-017-0900-2")]
-Date = Annotated[str, BeforeValidator(_date), _text(r"^\d{4}-\d{2}-\d{2}$", "2026-01-31")]
+FunderId = Annotated[
+    str,
+    BeforeValidator(_funder),
+    _text(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$|10\.\d{4,9}/", "https://ror.org/00k4n6c32"),
+]
+Community = Annotated[str, BeforeValidator(_community), _text(r"^[a-z0-9_-]+$", "contact-mechanics")]
+# Of validators before, the last one comes first.
+Date = Annotated[
+    str, BeforeValidator(_date), BeforeValidator(_day_as_text), _text(r"^\d{4}-\d{2}-\d{2}$", "2026-01-31")
+]
 Version = Annotated[str, BeforeValidator(_version), _text(r"^[0-9A-Za-z][0-9A-Za-z.+_-]*$", "1.0.0")]
+
+
+Line = Annotated[Text, BeforeValidator(_line)]
+Prose = Annotated[Text, BeforeValidator(_prose)]
 
 
 class Author(Section):
     """Who made the data: a person, by `family_names` and `given_names`, or an organisation, by `name`."""
 
-    family_names: Text | None = Field(default=None, description="Family names of a person.")
-    given_names: Text | None = Field(default=None, description="Given names of a person.")
-    name: Text | None = Field(default=None, description="Name of an organisation or a team.")
+    family_names: Line | None = Field(default=None, description="Family names of a person.")
+    given_names: Line | None = Field(default=None, description="Given names of a person.")
+    name: Line | None = Field(default=None, description="Name of an organisation or a team.")
     orcid: Orcid | None = Field(default=None, description="ORCID of a person, such as `0000-0002-1825-0097`.")
-    affiliation: Text | None = Field(default=None, description="Institution of a person.")
+    affiliation: Line | None = Field(default=None, description="Institution of a person.")
     ror: Ror | None = Field(
         default=None, description="ROR identifier of the institution, such as `https://ror.org/03yrm5c26`."
     )
@@ -168,11 +279,13 @@ class Author(Section):
         person = self.family_names is not None or self.given_names is not None
         if person == (self.name is not None) or (person and None in (self.family_names, self.given_names)):
             raise ValueError(
-                "is neither a person nor an organisation; allowed: family_names and given_names of a person, or name "
-                "of an organisation"
+                f"{self.model_dump(exclude_none=True)} is neither a person nor an organisation; allowed: family_names "
+                "and given_names of a person, or name of an organisation"
             )
         if not person and self.orcid is not None:
             raise ValueError("an organisation has no ORCID; allowed: orcid beside family_names and given_names")
+        if person and self.ror is not None and self.affiliation is None:
+            raise ValueError("a person has no ROR; allowed: ror beside affiliation, the institution that it identifies")
         return self
 
     @property
@@ -194,12 +307,12 @@ class Author(Section):
 class Funding(Section):
     """Who paid."""
 
-    funder: Text = Field(description="Name of the funder.")
-    funder_id: Identifier | None = Field(
+    funder: Line = Field(description="Name of the funder.")
+    funder_id: FunderId | None = Field(
         default=None, description="Its identifier: that of ROR (`https://ror.org/…`) or a DOI of the funder registry."
     )
-    award_number: Text | None = Field(default=None, description="Number of the grant.")
-    award_title: Text | None = Field(default=None, description="Title of the grant.")
+    award_number: Line | None = Field(default=None, description="Number of the grant.")
+    award_title: Line | None = Field(default=None, description="Title of the grant.")
     award_url: Identifier | None = Field(default=None, description="Web address or DOI of the grant.")
 
 
@@ -218,8 +331,53 @@ class RelatedIdentifier(Section):
 class KnownFailure(Section):
     """A run with a failed check that is published nevertheless, and why."""
 
-    run: Text = Field(description="The run as the verdict names it: `study/surface/seed1/slope1/material`.")
-    reason: Text = Field(description="What readers are told: why it failed, and why the data are published.")
+    run: Line = Field(description="The run as the verdict names it: `study/surface/seed1/slope1/material`.")
+    reason: Prose = Field(description="What readers are told: why it failed, and why the data are published.")
+
+
+def _same_author(one: Author, other: Author) -> bool:
+    """Whether two entries are one: the same ORCID, or the same name and no ORCIDs that tell them apart."""
+    if one.orcid and other.orcid:
+        return one.orcid == other.orcid
+    return _alike(one.family_names, one.given_names, one.name) == _alike(
+        other.family_names, other.given_names, other.name
+    )
+
+
+def _same_funding(one: Funding, other: Funding) -> bool:
+    """Whether two entries are one: the same award of the same funder."""
+    if one.funder_id and other.funder_id:
+        same_funder = one.funder_id.lower() == other.funder_id.lower()
+    else:
+        same_funder = _alike(one.funder) == _alike(other.funder)
+    if one.award_number and other.award_number:
+        return same_funder and _alike(one.award_number) == _alike(other.award_number)
+    return same_funder and _award(one) == _award(other)
+
+
+def _award(funding: Funding) -> tuple[str, ...]:
+    return _alike(funding.award_number, funding.award_title, funding.award_url)
+
+
+def _same_relation(one: RelatedIdentifier, other: RelatedIdentifier) -> bool:
+    """Whether two entries say the same of the same thing; capitals make no other DOI or arXiv identifier."""
+
+    def said(related):
+        identifier = related.identifier
+        return related.relation, identifier if _URL.fullmatch(identifier) else identifier.lower()
+
+    return said(one) == said(other)
+
+
+Authors = Annotated[list[Author], _once("author", _same_author, lambda author: author.full_name)]
+Fundings = Annotated[list[Funding], _once("award of a funder", _same_funding, lambda funding: funding.funder)]
+Related = Annotated[
+    list[RelatedIdentifier],
+    _once("relation to an identifier", _same_relation, lambda related: f"{related.relation} {related.identifier}"),
+]
+Failures = Annotated[
+    list[KnownFailure], _once("run", lambda one, other: one.run == other.run, lambda failure: failure.run)
+]
 
 
 class Publication(Section):
@@ -229,22 +387,22 @@ class Publication(Section):
         default=None, description="Version of the data, such as `1.0.0`; needed to publish."
     )
     date: Date | None = Field(default=None, description="Day of publication, such as `2026-01-31`; needed to publish.")
-    authors: list[Author] = Field(default=[], description="Who made the data; at least one is needed to publish.")
-    title: Text | None = Field(default=None, description="Title of the deposit; that of the campaign if left out.")
-    summary: Text | None = Field(default=None, description="Abstract; the summary of the campaign if left out.")
-    license: Text | None = Field(
+    authors: Authors = Field(default=[], description="Who made the data; at least one is needed to publish.")
+    title: Line | None = Field(default=None, description="Title of the deposit; that of the campaign if left out.")
+    summary: Prose | None = Field(default=None, description="Abstract; the summary of the campaign if left out.")
+    license: Line | None = Field(
         default=None, description="Licence of the data, an SPDX identifier; that of the campaign if left out."
     )
-    keywords: Annotated[list[Text], AfterValidator(distinct)] = Field(default=[], description="Keywords.")
-    funding: list[Funding] = Field(default=[], description="Who paid.")
-    related_identifiers: list[RelatedIdentifier] = Field(
+    keywords: Annotated[list[Line], AfterValidator(distinct)] = Field(default=[], description="Keywords.")
+    funding: Fundings = Field(default=[], description="Who paid.")
+    related_identifiers: Related = Field(
         default=[], description="Papers, data and programs that the deposit belongs to."
     )
     doi: Doi | None = Field(default=None, description="DOI of this version, if one is reserved for it.")
-    communities: Annotated[list[Text], AfterValidator(distinct)] = Field(
+    communities: Annotated[list[Community], AfterValidator(distinct)] = Field(
         default=[], description="Communities of Zenodo to which it is proposed."
     )
-    known_failures: list[KnownFailure] = Field(
+    known_failures: Failures = Field(
         default=[], description="Runs whose checks fail and that are published nevertheless."
     )
 
@@ -259,10 +417,17 @@ PARTS = {
 
 
 def needed(publication: Publication) -> list[str]:
-    """What is missing for a deposit, a line for each key, with what is needed; empty if nothing is."""
+    """What keeps it from being a deposit, a line for each key, with what is needed; empty if nothing does."""
     missing = {
         "version": (publication.version is None, "the version of the data, such as '1.0.0'"),
         "date": (publication.date is None, "the day of publication, such as 2026-01-31"),
         "authors": (not publication.authors, "at least one, with family_names and given_names, or name"),
     }
-    return [f"publication.{key}: is missing; needed: {what}" for key, (lacks, what) in missing.items() if lacks]
+    found = [f"publication.{key}: is missing; needed: {what}" for key, (lacks, what) in missing.items() if lacks]
+    # Those of the section have been checked; those of the campaign, which take their place, have not.
+    for key, check in {"title": _line, "summary": _prose}.items():
+        try:
+            check(getattr(publication, key))
+        except ValueError as error:
+            found.append(f"{key}: {getattr(publication, key)!r} {error}")
+    return found
