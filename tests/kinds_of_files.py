@@ -25,8 +25,8 @@ ATTRIBUTES = {"campaign": "small", "license": "CC0-1.0", "config_sha256": "0" * 
 PUBLISHED = {
     "title": "Small campaign",
     "summary": "For tests.",
-    "creator_name": "Ada Example, Bo Example",
-    "creator_type": "person, person",
+    "creator_name": "Ada Example; Bo Example",
+    "creator_type": "person; person",
     "product_version": "1.0.0",
 }
 LOOP = RunLabels("loops", "rough", 1, 1.0, "soft")

@@ -32,7 +32,7 @@ ALL = Publication(
     ],
     title="Area against load: surfaces & materials",
     summary="Loading of one surface,\nat five slopes <1.\n\nAnd unloading.",
-    license="cc0-1.0",
+    license="CC0-1.0",
     keywords=["adhesion", "rough surfaces, soft"],
     funding=[
         Funding(

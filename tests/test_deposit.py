@@ -26,6 +26,7 @@ import xarray as xr
 import yaml
 from conftest import REPOSITORY, copy_project, snakemake_command
 from PIL import Image, PngImagePlugin
+from publications import ALL, LEAST, ORCID
 from traces import traces
 from typer.testing import CliRunner
 
@@ -39,6 +40,7 @@ from icha.configuration.publication import KnownFailure
 from icha.integrity import write_record
 from icha.publication import deposit as deposits
 from icha.publication import dictionary
+from icha.publication.attributes import discovery_attributes
 from icha.publication.deposit import contents, make_deposit, verify_deposit
 from icha.publication.dictionary import data_dictionary, kind_of
 from icha.publication.environment import differences, refuse_other_environment
@@ -778,13 +780,38 @@ def test_licences_are_those_of_spdx():
         "CC0-1.0": "Statement of Purpose",
         "ODbL-1.0": "Database",
     }.items():
-        licence = known_licence(identifier.lower())
+        licence = known_licence(identifier)
         assert licence.identifier == identifier and words in licence.text
         page = licence_page(licence, source="source")
         assert licence.name in page and licence.address in page and page.endswith(licence.text)
     other = known_licence("PDDL-1.0")
     assert other.text == "" and other.address == "https://spdx.org/licenses/PDDL-1.0.html"
     assert "PDDL-1.0" in licence_page(other, source="source")
-    for wrong in ("CC-BY", "my own", "MIT OR CC0-1.0", "LicenseRef-mine", ""):
+    for wrong in ("CC-BY", "my own", "MIT OR CC0-1.0", "LicenseRef-mine", "CC-BY-4.0+", ""):
         with pytest.raises(ValueError, match="is no licence that SPDX knows; allowed: one identifier"):
             known_licence(wrong)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ("cc-by-4.0", "is not written as SPDX writes it; allowed: 'CC-BY-4.0'"),
+        (" CC0-1.0", "is not written as SPDX writes it; allowed: 'CC0-1.0'"),
+        ("GPL-3.0", "is an identifier that SPDX has deprecated; allowed: 'GPL-3.0-only', 'GPL-3.0-or-later'"),
+        ("LGPL-2.1+", "is an identifier that SPDX has deprecated; allowed: 'LGPL-2.1-or-later'"),
+        ("eCos-2.0", "has deprecated; allowed: a current one of https://spdx.org/licenses"),
+    ],
+)
+def test_licences_are_written_as_spdx_writes_them(wrong, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        known_licence(wrong)
+
+
+def test_creators_of_a_dataset_keep_their_places():
+    found = discovery_attributes(ALL)
+    assert found["creator_name"] == "Josiah Carberry; California Digital Library; Zoë Öre Ünal"
+    assert found["creator_type"] == "person; institution; person"
+    assert found["creator_url"] == f"https://orcid.org/{ORCID}; https://ror.org/03yrm5c26; "
+    assert found["creator_institution"] == "California Digital Library; ; Nowhere <Institute> & Sons"
+    assert found["keywords"] == "adhesion, rough surfaces, soft"
+    assert set(discovery_attributes(LEAST)) == {"creator_name", "creator_type", "product_version"}

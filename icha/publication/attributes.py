@@ -8,7 +8,8 @@ from icha.configuration.publication import Author, Publication
 def discovery_attributes(publication: Publication) -> dict[str, str]:
     """Global attributes of the Attribute Convention for Data Discovery (ACDD 1.3) that a publication gives a dataset.
 
-    Of several creators the values are lists with commas, in the same order; where one has no value it is empty.
+    Of several creators the values are lists with semicolons, for names hold commas, in the same order; where one has no
+    value it is empty, and where none has, the attribute is left out.
     """
     authors = publication.authors
     found = {
@@ -16,12 +17,12 @@ def discovery_attributes(publication: Publication) -> dict[str, str]:
         "creator_type": ["person" if author.is_person else "institution" for author in authors],
         "creator_url": [_url(author) for author in authors],
         "creator_institution": [author.affiliation or "" for author in authors],
-        "keywords": publication.keywords,
+        "keywords": [", ".join(publication.keywords)],
         "product_version": [publication.version or ""],
         "acknowledgement": [_acknowledged(each) for each in publication.funding],
         "metadata_link": [f"https://doi.org/{publication.doi}" if publication.doi else ""],
     }
-    return {name: ", ".join(values) for name, values in found.items() if any(values)}
+    return {name: "; ".join(values) for name, values in found.items() if any(values)}
 
 
 def _url(author: Author) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
+# Not of the public part, which does not tell licences from expressions, nor what is deprecated.
+from packaging.licenses._spdx import LICENSES
 
 _TEXTS = Path(__file__).parent / "license_texts"
 # Names and addresses of the licences whose text is here, as their authors give them.
@@ -33,25 +34,35 @@ class Licence(NamedTuple):
 
 
 def known_licence(identifier: str) -> Licence:
-    """The licence of an SPDX identifier, whose letters may be of either case.
+    """The licence of an SPDX identifier.
 
     Raises
     ------
     ValueError
-        If SPDX has no such licence, or if it is an expression of several.
+        If SPDX has no such licence, writes it otherwise, or has deprecated it, or if it is an expression of several.
     """
-    try:
-        canonical = canonicalize_license_expression(identifier)
-    except InvalidLicenseExpression:
-        canonical = ""
-    if not canonical or " " in canonical or canonical.startswith("LicenseRef-"):
+    known = LICENSES.get(identifier.strip().lower())
+    if known is None:
         raise ValueError(
             f"is no licence that SPDX knows; allowed: one identifier of https://spdx.org/licenses, for data usually "
             f"one of {', '.join(_USUAL)}"
         )
-    if canonical not in _USUAL:
-        return Licence(canonical, canonical, f"https://spdx.org/licenses/{canonical}.html", "")
-    return Licence(canonical, *_USUAL[canonical], (_TEXTS / f"{canonical}.txt").read_text(encoding="utf-8"))
+    found = known["id"]
+    if known["deprecated"]:
+        current = ", ".join(repr(each) for each in _successors(found)) or "a current one of https://spdx.org/licenses"
+        raise ValueError(f"is an identifier that SPDX has deprecated; allowed: {current}")
+    if identifier != found:
+        raise ValueError(f"is not written as SPDX writes it; allowed: {found!r}")
+    if found not in _USUAL:
+        return Licence(found, found, f"https://spdx.org/licenses/{found}.html", "")
+    return Licence(found, *_USUAL[found], (_TEXTS / f"{found}.txt").read_text(encoding="utf-8"))
+
+
+def _successors(deprecated: str) -> list[str]:
+    """The current identifiers of a deprecated one that did not say which versions it means, or did so by a `+`."""
+    plain = deprecated.removesuffix("+")
+    possible = [f"{plain}-or-later"] if deprecated.endswith("+") else [f"{plain}-only", f"{plain}-or-later"]
+    return [each for each in possible if each.lower() in LICENSES]
 
 
 def licence_page(licence: Licence, *, source: str) -> str:
