@@ -5,11 +5,13 @@ import re
 
 import pytest
 import yaml
+from conftest import REPOSITORY
 from outside_validators import validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
+from icha import report, simulation
 from icha.configuration.publication import RELATIONS, RESOURCES, RelatedIdentifier
-from icha.publication.citation import citation_cff, datacite_metadata, web_address, zenodo_metadata
+from icha.publication.citation import MODEL_PAPER, citation_cff, datacite_metadata, web_address, zenodo_metadata
 
 
 def written(folder, publication):
@@ -98,6 +100,18 @@ def test_what_is_related_keeps_its_relation_and_its_kind_of_identifier():
     assert [related["relationType"] for related in datacite][:3] == ["IsSupplementTo", "Cites", "IsDerivedFrom"]
 
 
+@pytest.mark.parametrize("publication", PUBLICATIONS.values(), ids=PUBLICATIONS)
+def test_the_paper_of_the_model_is_cited_as_the_program_and_every_run_cite_it(publication):
+    paper = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))["preferred-citation"]
+    names = [(author["given-names"], author["family-names"]) for author in paper["authors"]]
+    assert yaml.safe_load(citation_cff(publication, COMMIT))["references"] == [paper]
+    assert simulation.REFERENCES.startswith(f"{MODEL_PAPER.line}; ") and report.PAPER == MODEL_PAPER.line
+    assert zenodo_metadata(publication)["references"] == [simulation.REFERENCES.split("; ")[0]]
+    (item,) = datacite_metadata(publication)["relatedItems"]
+    assert item["titles"] == [{"title": paper["title"]}] and "relatedItemIdentifier" not in item
+    assert [(creator["givenName"], creator["familyName"]) for creator in item["creators"]] == names
+
+
 def test_identifiers_lead_somewhere():
     assert web_address("10.1007/s11249-017-0900-2") == "https://doi.org/10.1007/s11249-017-0900-2"
     assert web_address("arXiv:1606.03166") == "https://arxiv.org/abs/1606.03166"
@@ -117,6 +131,8 @@ def test_texts_are_html_only_where_html_is_asked_for():
     assert zenodo["description"] == "<p>Loading of one surface, at five slopes &lt;1.</p><p>And unloading.</p>"
     assert "load/flat/seed1/slope1/soft. Area &lt; 0.1 %." in zenodo["notes"]
     assert zenodo["title"] == ALL.title
+    spaced = ALL.model_copy(update={"summary": "\nOne\nline.\n \n\t\nTwo.\n\n\n"})
+    assert zenodo_metadata(spaced)["description"] == "<p>One line.</p><p>Two.</p>"
     assert datacite_metadata(ALL)["descriptions"][0]["description"] == ALL.summary
 
 

@@ -11,8 +11,10 @@ from urllib.parse import unquote
 
 import pytest
 from outside_validators import validated
-from publications import ALL, COMMIT, ORCID, PUBLICATIONS
+from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
+from icha.configuration.publication import Author
+from icha.publication.citation import MODEL_PAPER
 from icha.publication.crate import METADATA, Job, write_crate
 
 SCRIPTS = "source/workflow/scripts"
@@ -184,6 +186,7 @@ def test_who_made_it_under_which_licence_and_who_paid(entities):
     assert references(root["funder"])[0] == "https://doi.org/10.13039/501100000780"
     assert {entities[name]["identifier"] for name in references(root["funding"])} == {"284382", "7 b"}
     cited = [
+        "#paper",
         "https://doi.org/10.1007/s11249-017-0900-2",
         "https://arxiv.org/abs/1606.03166",
         "https://example.org/page",
@@ -200,6 +203,20 @@ def test_no_time_no_name_made_at_random_and_no_place_of_this_machine(deposit):
     assert not re.search(r"[0-9a-f]{8}-[0-9a-f]{4}-", text)
     assert not re.search(r'(startTime|endTime|"/|file:|arcp:)', text)
     assert str(Path.home()) not in text and str(deposit) not in text
+
+
+def test_the_paper_of_the_model_is_cited_beside_what_the_publication_names(entities, tmp_path):
+    cited = [entities[name] for name in references(entities["./"]["citation"])]
+    (paper,) = (each for each in cited if each["name"] == MODEL_PAPER.title)
+    assert paper["@type"] == "ScholarlyArticle" and len(cited) > 1
+    authors = [entities[name] for name in references(paper["author"])]
+    assert [(author["givenName"], author["familyName"]) for author in authors] == list(MODEL_PAPER.authors)
+    # Whoever wrote it and made the data is the same person, with all that is said of them.
+    given, family = MODEL_PAPER.authors[0]
+    own = LEAST.model_copy(update={"authors": [Author(family_names=family, given_names=given, affiliation="Here")]})
+    graph = json.loads((written(tmp_path, own) / METADATA).read_bytes())["@graph"]
+    (person,) = (entity for entity in graph if entity.get("familyName") == family)
+    assert person["affiliation"] == {"@id": "#organisation/Here"}
 
 
 def test_the_same_deposit_has_the_same_bytes(deposit, tmp_path):

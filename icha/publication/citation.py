@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -52,6 +53,25 @@ _ROR = "https://ror.org/"
 _ZENODO_DOI = "10.5281/zenodo."
 
 
+class Paper(NamedTuple):
+    """A paper without an identifier; the authors by given and family names."""
+
+    authors: tuple[tuple[str, str], ...]
+    title: str
+
+    @property
+    def line(self) -> str:
+        """The paper as it is cited in a text."""
+        return f"{' and '.join(f'{given[0]}. {family}' for given, family in self.authors)}, {self.title}"
+
+
+# That of the model: whoever uses data of the model builds on it.
+MODEL_PAPER = Paper(
+    (("Guido", "Violano"), ("Luciano", "Afferrante")),
+    "Modeling the adhesive contact of rough soft media with an advanced asperity model",
+)
+
+
 def web_address(identifier: str) -> str:
     """Where an identifier leads: a DOI, `arXiv:…` or a web address."""
     if identifier.startswith("10."):
@@ -72,7 +92,7 @@ def citation_cff(publication: Publication, commit: str) -> str:
     licence = known_licence(publication.license)
     content = {
         "cff-version": "1.2.0",
-        "message": "If you use these data, please cite them as below.",
+        "message": "If you use these data, please cite them as below, and the paper of their model (in references).",
         "type": "dataset",
         "title": publication.title,
         "abstract": publication.summary,
@@ -85,6 +105,13 @@ def citation_cff(publication: Publication, commit: str) -> str:
         "commit": commit,
         "doi": publication.doi,
         "keywords": publication.keywords,
+        "references": [
+            {
+                "type": "article",
+                "title": MODEL_PAPER.title,
+                "authors": [{"family-names": family, "given-names": given} for given, family in MODEL_PAPER.authors],
+            }
+        ],
     }
     return yaml.safe_dump(_given(content), sort_keys=False, allow_unicode=True, width=100)
 
@@ -119,7 +146,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
         {
             "upload_type": "dataset",
             "title": publication.title,
-            "description": _paragraphs(publication.summary.split("\n\n")),
+            "description": _html(paragraphs(publication.summary)),
             "publication_date": publication.date,
             "version": publication.version,
             "creators": [
@@ -141,9 +168,10 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
                 )
                 for related in publication.related_identifiers
             ],
+            "references": [MODEL_PAPER.line],
             "grants": grants,
             "communities": [{"identifier": community} for community in publication.communities],
-            "notes": _paragraphs(notes),
+            "notes": _html(notes),
         }
     )
 
@@ -189,6 +217,22 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
                     }
                 )
                 for related in publication.related_identifiers
+            ],
+            "relatedItems": [
+                {
+                    "relatedItemType": "JournalArticle",
+                    "relationType": "Cites",
+                    "titles": [{"title": MODEL_PAPER.title}],
+                    "creators": [
+                        {
+                            "name": f"{family}, {given}",
+                            "nameType": "Personal",
+                            "givenName": given,
+                            "familyName": family,
+                        }
+                        for given, family in MODEL_PAPER.authors
+                    ],
+                }
             ],
             "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
         }
@@ -248,9 +292,14 @@ def funding_line(funding: Funding) -> str:
     return f"Funded by {funding.funder}{f' ({award})' if award else ''}."
 
 
-def _paragraphs(texts: list[str]) -> str:
-    """Plain text as HTML."""
-    return "".join(f"<p>{escape(' '.join(text.split()), quote=False)}</p>" for text in texts if text.strip())
+def paragraphs(text: str) -> list[str]:
+    """The paragraphs of a text, between which lines are empty; each in a line."""
+    return [" ".join(part.split()) for part in re.split(r"\n\s*\n", text) if part.strip()]
+
+
+def _html(texts: list[str]) -> str:
+    """Paragraphs of plain text as HTML."""
+    return "".join(f"<p>{escape(text, quote=False)}</p>" for text in texts)
 
 
 def _given(content: dict[str, Any]) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from rocrate.rocrate import ROCrate
 
 from icha.configuration.publication import Author, Publication
 from icha.files import whole_file
-from icha.publication.citation import web_address
+from icha.publication.citation import MODEL_PAPER, web_address
 from icha.publication.licences import known_licence
 
 METADATA = "ro-crate-metadata.json"
@@ -249,7 +249,7 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
         funder=funders,
         funding=grants,
     )
-    related: dict[str, list[Entity]] = {}
+    related: dict[str, list[Entity]] = {"citation": [_add_paper(crate)]}
     for each in publication.related_identifiers:
         cited = each.resource is None or each.resource in _PUBLICATIONS
         key = "isBasedOn" if each.relation == "IsDerivedFrom" else "citation" if cited else "mentions"
@@ -274,6 +274,17 @@ def _add_author(crate: ROCrate, author: Author) -> Entity:
     if author.affiliation or author.ror:
         _set(person, affiliation=_add_organisation(crate, author.affiliation or author.ror, author.ror))
     return person
+
+
+def _add_paper(crate: ROCrate) -> Entity:
+    """The paper of the model."""
+    people = []
+    for given, family in MODEL_PAPER.authors:
+        # Whoever wrote the paper may have made the data, too.
+        key = f"#person/{quote(f'{given} {family}')}"
+        names = {"name": f"{given} {family}", "givenName": given, "familyName": family}
+        people.append(crate.dereference(key) or _add(crate, key, "Person", **names))
+    return _add(crate, "#paper", "ScholarlyArticle", name=MODEL_PAPER.title, author=people)
 
 
 def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
