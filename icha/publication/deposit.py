@@ -122,6 +122,8 @@ def _refuse_changed(results: Path, files: Iterable[str]) -> None:
 def verify_deposit(path: str | os.PathLike) -> list[str]:
     """What is wrong with a deposit, a line each: files that differ, are missing, or were added. Empty if it is whole.
 
+    A deposit is its files, as for git and in the list of checksums: folders without any are of no account.
+
     Parameters
     ----------
     path : its folder or its zip.

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
+from urllib.parse import quote
 
 import jinja2
 import numpy as np
 import xarray as xr
 
 from icha.campaign_file import LABELS
-from icha.checks import Check, worst
+from icha.checks import COMPLETED, Check, worst
 from icha.configuration.model import Campaign, SelfAffineSurface
 from icha.configuration.publication import Publication
 from icha.costs import Cost
 from icha.labels import RunLabels
-from icha.publication.citation import web_address
+from icha.publication.citation import MODEL_PAPER, paragraphs, web_address
 from icha.publication.dictionary import Entry
 from icha.publication.licences import Licence
 from icha.records import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
@@ -41,6 +44,16 @@ _PARTS = {
 # A longer list is cut.
 _MOST_NAMES = 12
 _METADATA = "citation, licence and provenance for people and machines"
+# What is computed; all the rest of a deposit says what it is and how.
+_COMPUTED = (
+    *("dataset", "aggregated", "runs", "surfaces", "references", "figures"),
+    *("report.html", "checks.json", "verdict.txt"),
+)
+# An address within a text, without what may follow it.
+_ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
+# What Markdown takes for more than itself: anywhere, or as the beginning of an entity; and at the beginning of a line.
+_SPECIAL = re.compile(r"[\\`*\[\]<>|~$#]|(?<![^\W_])_|_(?![^\W_])|&(?=[#\w])")
+_SPECIAL_FIRST = re.compile(r"^(\d*)((?<!\d)[-+]|(?<=\d)[.)])(?!\w)")
 
 
 class Part(NamedTuple):
@@ -66,6 +79,15 @@ class StudyDesign(NamedTuple):
     def runs(self) -> int:
         """Number of the runs that were asked for."""
         return sum(self.status.values()) - self.status[STATUS_MEANINGS[NOT_IN_DESIGN]]
+
+
+class IncompleteRun(NamedTuple):
+    """A run that did not reach the end of its path: the steps that it reached, why no more, and why it is published."""
+
+    labels: RunLabels
+    steps: int
+    failure: str
+    reason: str
 
 
 class ModelError(NamedTuple):
@@ -113,8 +135,10 @@ def readme(
         undefined=jinja2.StrictUndefined,
     )
     environment.filters |= {
-        "cell": _cell,
+        "text": markdown,
+        "link": _link,
         "number": "{:.4g}".format,
+        "value": "{:z.2g}".format,
         "size": _size,
         "duration": _duration,
         "span": _span,
@@ -122,21 +146,23 @@ def readme(
         "few": _few,
     }
     designs, surfaces = study_designs(dataset), _written(campaign, "surfaces")
+    complete, incomplete = (_runs_of_status(dataset, status) for status in (COMPLETE, INCOMPLETE))
     known = {failure.run: failure.reason for failure in publication.known_failures}
+    incomplete = [IncompleteRun(*run, known.get(str(run[0]), "")) for run in incomplete]
     text = environment.get_template(_TEMPLATE).render(
         publication=publication,
         citation=citation(publication),
+        paper=MODEL_PAPER,
+        summary=paragraphs(publication.summary),
         campaign=campaign,
         surfaces=surfaces,
         materials=_written(campaign, "materials"),
         licence=licence,
         commit=commit,
         designs=designs,
-        incomplete=[
-            (str(run), reason, known.get(str(run), "")) for run, reason in _runs_of_status(dataset, INCOMPLETE)
-        ],
-        checks=worst(checks),
-        failed=[check for check in checks if not check.passed],
+        incomplete=incomplete,
+        checks=[_meant(check) for check in worst(checks)],
+        failed=[check for check in checks if not check.passed and check.name != COMPLETED],
         known=known,
         count=_count_by_name(checks),
         passed=sum(check.passed for check in checks),
@@ -146,9 +172,10 @@ def readme(
         parts=_parts(sizes),
         files=len(sizes),
         size=sum(sizes.values()),
+        computed=sum(size for path, size in sizes.items() if path.split("/")[0] in _COMPUTED),
         cost=cost,
         addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
-        example=(_runs_of_status(dataset, COMPLETE) or _runs_of_status(dataset, INCOMPLETE))[0][0],
+        example=(complete or incomplete)[0][0],
         partial=[study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
         self_affine=any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
         sides=_known_of(surfaces, campaign.period, "{:.4g}".format),
@@ -161,10 +188,9 @@ def readme(
 
 
 def citation(publication: Publication) -> str:
-    """How to cite a deposit, in a line."""
+    """How to cite a deposit, in a line, but for its DOI."""
     authors = "; ".join(author.sorted_name for author in publication.authors)
-    doi = f" https://doi.org/{publication.doi}" if publication.doi else ""
-    return f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set.{doi}"
+    return f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set."
 
 
 def study_designs(dataset: xr.DataTree) -> list[StudyDesign]:
@@ -204,16 +230,25 @@ def model_errors(tree: xr.DataTree) -> list[ModelError]:
     return found
 
 
-def _runs_of_status(dataset: xr.DataTree, *statuses: int) -> list[tuple[RunLabels, str]]:
-    """The runs of these statuses in a campaign dataset, with the reason why they failed, if they did."""
+def _runs_of_status(dataset: xr.DataTree, asked: int) -> list[tuple[RunLabels, int, str]]:
+    """The runs of a status in a campaign dataset: number of steps, and the reason why they failed, if they did."""
     found = []
     for name, node in dataset.children.items():
-        status, failure = (node[each].transpose(*LABELS).values for each in ("status", "failure"))
+        status, steps, failure = (node[each].transpose(*LABELS).values for each in ("status", "step_count", "failure"))
         axes = [node[label].values.tolist() for label in LABELS]
-        for place in np.argwhere(np.isin(status, statuses)).tolist():
+        for place in map(tuple, np.argwhere(status == asked).tolist()):
             labels = RunLabels(name, *(axis[k] for axis, k in zip(axes, place, strict=True)))
-            found.append((labels, str(failure[tuple(place)])))
+            found.append((labels, int(steps[place]), str(failure[place])))
     return found
+
+
+def _meant(check: Check) -> Check:
+    """The check with words for what it is in general: where a run failed, it has those of that run."""
+    return (
+        replace(check, description="0 if the run reached the end of its path, else 1")
+        if check.name == COMPLETED
+        else check
+    )
 
 
 def _count_by_name(checks: Iterable[Check]) -> dict[str, int]:
@@ -264,13 +299,25 @@ def _known_of(surfaces: Iterable[str], ask, form) -> dict[str, str]:
 
 def _few(values: Sequence) -> str:
     """A list, or its beginning and its length."""
-    shown = [_cell(value) for value in values]
+    shown = [markdown(value) for value in values]
     return ", ".join(shown) if len(shown) <= _MOST_NAMES else f"{', '.join(shown[:_MOST_NAMES])}, … ({len(shown)})"
 
 
-def _cell(text) -> str:
-    """Text for a cell of a table, or for a line."""
-    return " ".join(str(text).split()).replace("|", "\\|")
+def markdown(text) -> str:
+    """Plain text in a line of Markdown that shows nothing else, in a table, too; addresses are links."""
+    line = " ".join(str(text).split())
+    # Of the parts, every other is an address.
+    parts = [
+        _link(part) if number % 2 else _SPECIAL.sub(r"\\\g<0>", part)
+        for number, part in enumerate(_ADDRESS.split(line))
+    ]
+    return _SPECIAL_FIRST.sub(r"\1\\\2", "".join(parts))
+
+
+def _link(address: str) -> str:
+    """A web address as a link."""
+    plain = re.sub(r"[\s<>|`\\]", lambda found: quote(found[0]), address)
+    return f"<{plain}>"
 
 
 def _size(number: float) -> str:
@@ -287,7 +334,7 @@ def _duration(seconds: float) -> str:
     return f"{seconds:.2g} s"
 
 
-def _span(values, form="{:.3g}") -> str:
+def _span(values, form="{:z.3g}") -> str:
     """Smallest and largest value, or the only one."""
     least, most = form.format(min(values)), form.format(max(values))
     return least if least == most else f"{least} to {most}"
