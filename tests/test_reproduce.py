@@ -10,6 +10,8 @@ import sys
 import zipfile
 from importlib.metadata import version
 
+import netCDF4
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -178,6 +180,40 @@ def test_single_runs(made, reproduce, tmp_path):
     status, said = reproduce(made, "--only", SOFT, "--only", f"runs/{HARD}.nc", "--folder", tmp_path / "again")
     assert status == 0 and "identical: 4 files" in said  # two runs, and the surface of each
     assert calls(tmp_path / "again")[-1][0][2:] == [f"results/mine/runs/{run}.nc" for run in (SOFT, HARD)]
+
+
+def fail_run(deposit, run, steps):
+    """Give a run so many steps, and a reason why there are no more."""
+    with netCDF4.Dataset(deposit / f"runs/{run}.nc", "w") as file:
+        file.createDimension("step", steps)
+        file.incomplete = "the path ends: stuck"
+        file.createVariable("pressure", "f8", ("step",))[:] = np.arange(steps) + 1.0
+    seal(deposit)
+
+
+@pytest.mark.parametrize("ending", ["", ".zip"])
+@pytest.mark.parametrize("steps", [0, 2])
+def test_the_smallest_run_is_the_smallest_that_is_complete(steps, ending, deposit, reproduce, tmp_path):
+    fail_run(deposit, SOFT, steps)
+    assert (deposit / f"runs/{SOFT}.nc").stat().st_size < (deposit / f"runs/{HARD}.nc").stat().st_size
+    status, said = reproduce(deposit.with_name(NAME + ending), "--only", "smallest", "--folder", tmp_path / "again")
+    assert status == 0 and "identical: 2 files" in said, said
+    assert calls(tmp_path / "again")[-1][0][2:] == [f"results/mine/runs/{HARD}.nc"]
+    fail_run(deposit, HARD, steps)
+    status, said = reproduce(deposit.with_name(NAME + ending), "--only", "smallest")
+    assert status == 2 and "no run of the deposit is complete" in said
+    assert list(reproduce.temporary.iterdir()) == []
+
+
+def test_a_run_without_steps_is_refused_by_name_and_one_with_some_is_not(deposit, reproduce, tmp_path):
+    fail_run(deposit, SOFT, 0)
+    status, said = reproduce(deposit, "--only", HARD, "--only", SOFT)
+    assert status == 2 and f"--only {SOFT}: this run holds no data (the path ends: stuck)" in said
+    assert list(reproduce.temporary.iterdir()) == []
+    fail_run(deposit, SOFT, 2)
+    status, said = reproduce(deposit, "--only", SOFT, "--folder", tmp_path / "again")
+    assert status == 1 and "different" in said  # the program that stands for the deposit's makes three
+    assert calls(tmp_path / "again")[-1][0][2:] == [f"results/mine/runs/{SOFT}.nc"]
 
 
 def test_a_damaged_deposit_is_refused(deposit, reproduce):

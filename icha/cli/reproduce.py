@@ -35,7 +35,7 @@ def reproduce(
         typer.Option(
             metavar="RUN",
             help="Only this run, and the surface that it needs; may be given several times. "
-            "study/surface/seed1/slope1/material, or `smallest`.",
+            "study/surface/seed1/slope1/material, or `smallest`: that of the complete ones with the least data.",
             show_default=False,
         ),
     ] = None,
@@ -72,7 +72,7 @@ def reproduce(
     if wrong := verify_deposit(deposit):
         raise Mistake(f"{deposit}: the deposit is damaged; needed: a whole one:\n" + "\n".join(wrong))
     names, checksums = _names(deposit, CHECKSUMS)
-    campaign, runs = _campaign(deposit, names), _asked_runs(only, names)
+    campaign, runs = _campaign(deposit, names), _asked_runs(only, deposit, names)
     temporary = folder is None
     if temporary:
         folder = Path(tempfile.mkdtemp(prefix="icha-reproduce-"))
@@ -84,7 +84,7 @@ def reproduce(
             project, original = _prepare(folder, deposit)
             program = _program(project, folder, environment)
             made = project / "results" / campaign
-            status = _run(program, project, _targets(runs, names, campaign), cores)
+            status = _run(program, project, _targets(runs, campaign), cores)
             if not made.is_dir():
                 _fail(f"nothing was computed; {goes_on}")
             comparison = _compared(original, made, runs, names)
@@ -159,13 +159,13 @@ def _campaign(deposit: Path, names) -> str:
     return yaml.safe_load(_read(deposit, CONFIGURATION))["name"]
 
 
-def _asked_runs(only: list[str] | None, names: dict[str, int]) -> list[str]:
+def _asked_runs(only: list[str] | None, deposit: Path, names: dict[str, int]) -> list[str]:
     """Paths of the runs that are asked for, none if all of the deposit is."""
     there = sorted(name for name in names if name.startswith("runs/") and name.endswith(".nc"))
     found = []
     for asked in only or ():
         if asked == SMALLEST and there:
-            path = min(there, key=lambda run: names[run] + names.get(_surface_of(run), 0))
+            path = _smallest(deposit, there, names)
         else:
             path = f"runs/{asked.removeprefix('runs/').removesuffix('.nc')}.nc"
         if path not in there:
@@ -175,8 +175,36 @@ def _asked_runs(only: list[str] | None, names: dict[str, int]) -> list[str]:
                 f"--only {asked}: the deposit has no such run; allowed: {SMALLEST}, or one of its "
                 f"{counted(len(runs), 'run')}, such as {', '.join(near)}"
             )
+        steps, failure = _outcome(deposit, path)
+        if steps == 0:
+            why = f" ({failure})" if failure else ""
+            raise Mistake(
+                f"--only {asked}: this run holds no data{why}, so there is nothing to compare; allowed: a run with at "
+                f"least one step, or {SMALLEST}"
+            )
         found.append(path)
     return list(dict.fromkeys(found))
+
+
+def _smallest(deposit: Path, runs: list[str], names: dict[str, int]) -> str:
+    """The complete run that, with its surface, has the fewest bytes."""
+    for run in sorted(runs, key=lambda run: names[run] + names.get(_surface_of(run), 0)):
+        steps, failure = _outcome(deposit, run)
+        if steps and not failure:
+            return run
+    raise Mistake(
+        f"--only {SMALLEST}: no run of the deposit is complete; allowed: the name of a run that has steps, or "
+        f"no --only at all"
+    )
+
+
+def _outcome(deposit: Path, run: str) -> tuple[int, str]:
+    """Number of steps of a run, and why it is incomplete; an empty text if it is complete."""
+    import netCDF4
+
+    with netCDF4.Dataset(run, memory=_read(deposit, run)) as file:
+        steps = file.dimensions.get("step")
+        return (len(steps) if steps is not None else 0), str(getattr(file, "incomplete", ""))
 
 
 def _surface_of(run: str) -> str:
@@ -185,12 +213,8 @@ def _surface_of(run: str) -> str:
     return f"surfaces/{surface}/{seed}.nc"
 
 
-def _targets(runs: list[str], names, campaign: str) -> list[str]:
-    results = f"results/{campaign}"
-    if runs:
-        return [f"{results}/{run}" for run in runs]
-    # Published with known failures, it has no verdict, which would fail again.
-    return ["all"] if "verdict.txt" in names else ["references", f"{results}/report.html"]
+def _targets(runs: list[str], campaign: str) -> list[str]:
+    return [f"results/{campaign}/{run}" for run in runs] or ["all"]
 
 
 # The folder of the rerun.
