@@ -71,6 +71,11 @@ def set_damaged_aside(results: str, dry_run: bool) -> list[str]:
     return [f"{results}/{path}" for path in {*damaged, *integrity.lost(results)}]
 
 
+def jobs_end_with_this_process() -> None:
+    """Tell jobs which process wants them: they end with it, however that does (see scripts/job.py)."""
+    os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
+
+
 def refuse_unwritable(results: str) -> None:
     """End the program with a message if jobs could not write their results."""
     for folder in (results, ".snakemake"):

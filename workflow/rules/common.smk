@@ -1,13 +1,12 @@
 # What all rules share: the campaign, the names of its results, and the fingerprints of the code.
 
-import os
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(workflow.basedir, "workflow")))
 
 import warm
-from before_jobs import before_execution, refuse_unwritable, set_damaged_aside
+from before_jobs import before_execution, jobs_end_with_this_process, refuse_unwritable, set_damaged_aside
 from campaign_lock import hold_lock
 from command_line import campaign_configuration
 from fingerprint import code_fingerprint, imported_modules
@@ -247,6 +246,25 @@ def measurements_of(name):
     return measurement_settings(CAMPAIGN, CAMPAIGN.figures.drawn()[name].study)
 
 
+def what_is_published(wildcards):
+    """The files of a deposit; ends the program where there can be none, before anything is computed."""
+    refuse_unpublishable(CONFIGURATION, workflow.basedir)
+    return [
+        CONFIG_USED,
+        *INPUTS,
+        DATASET,
+        COMPARISON,
+        CHECKS,
+        VERDICT,
+        REPORT,
+        *FIGURES,
+        *SURFACES,
+        *RUNS,
+        *REFERENCES,
+        *MODEL_ERROR,
+    ]
+
+
 def warm_modules():
     """Modules that the jobs of the campaign import, and those that libraries import when they are first used."""
     modules = imported_modules(*sorted(Path(workflow.basedir, "workflow/scripts").glob("*.py")))
@@ -265,8 +283,7 @@ def prepare(dry_run):
 
 
 before_execution(workflow, RESULTS, prepare)
-# Jobs end with the process that started them, however that does.
-os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
+jobs_end_with_this_process()
 
 # On a node of a cluster, where no hooks are called, for the jobs of one batch.
 if workflow.remote_exec:
