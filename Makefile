@@ -27,7 +27,7 @@ help:
 	@echo "make linkcheck  check the documentation's links to other sites"
 	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
-	@echo "make faults  kill, damage and starve a small campaign (about half an hour, as root); docs/faults.md"
+	@echo "make faults  kill, damage and starve a small campaign (most of an hour, as root); docs/faults.md"
 	@echo "make slurm-environment  install Snakemake with its executor for Slurm in .venv-slurm; docs/howto/cluster.md"
 	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  put a deposit to the validators of others, without network"
 	@echo "make clean   remove results, Snakemake's records and the built documentation (not the environment)"

@@ -7,20 +7,21 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 WENT_ON, REFUSED = "went on", "said what to do"
+LONGEST = 200  # of longer messages the beginning is kept
 
 HEAD = """# What becomes of a campaign that is disturbed
 
 <!-- Written by benchmarks/faults_page.py from benchmarks/results/faults.json. -->
 
-Computers are switched off, disks fill up and files get damaged. What must not come of it is a wrong number that nobody
+Programs are killed, disks fill up and files get damaged. What must not come of it is a wrong number that nobody
 notices. So a campaign of {results} files with every kind of result, its deposit among them, was disturbed
-{trials} times. After each disturbance these have to hold:
+{trials} times. These have to hold:
 
 - no result is there that is not, byte for byte, that of an undisturbed campaign: nothing half-written passes for whole;
-- no process of the disturbed call is left running after {moment:.0f} s;
-- what was complete is not computed again (after kills);
+- after kills and on full disks, no process of the disturbed call is left running after {moment:.0f} s;
+- after kills, what was complete is not computed again;
 - the same command, given again with nothing else done, goes on to the end, and all results have the bytes of the
-  undisturbed campaign; or, where it cannot, it says what is to be done, before it computes anything.
+  undisturbed campaign; or, where it cannot, it says what is to be done.
 
 {verdict}
 
@@ -59,10 +60,11 @@ Of one campaign in one folder, the second call after a random pause, and of two 
 
 TAIL = """## How
 
-`make faults` makes all trials, from the committed state of the program, and writes this page; it takes about half an
-hour and needs Linux and the right to mount disks (root, or user namespaces). Moments and bits are drawn at random with
-seed {seed}. Power cuts are not among the trials: files are not forced to the disk one by one, and what a power cut
-leaves of them is found by its checksum like any other damage.
+`make faults` makes all trials, from the committed state of the program, and writes this page; it takes most of an hour
+on two cores and needs Linux and the right to mount disks (root, or user namespaces). The parts can be run one by one,
+as they were here: `make faults OPTIONS='--parts kill'`. Moments and bits are drawn at random with seed {seed}. Power
+cuts are not among the trials: files are not forced to the disk one by one, and whether what a power cut leaves of them
+is always found by its checksum was not tried.
 """
 
 
@@ -80,13 +82,17 @@ def page(kept: dict) -> str:
     for part, words in PARTS.items():
         own = [row for row in rows if row["part"] == part]
         text += f"\n{words}\n\n{_table(own)}\n"
-        messages = dict.fromkeys(message for row in own for message in row["messages"])
+        messages = dict.fromkeys(_whole(message) for row in own for message in row["messages"])
         if messages:
             text += "\nWhat was said:\n\n```text\n" + "\n".join(messages) + "\n```\n"
         violations = [f"- {row['fault']}: {violation}" for row in own for violation in row["violations"]]
         if violations:
             text += "\nWhat was wrong:\n\n" + "\n".join(violations) + "\n"
     return text + "\n" + TAIL.format(seed=kept["seed"])
+
+
+def _whole(message):
+    return message + "…" if len(message) == LONGEST else message
 
 
 def _wrong(row):

@@ -1,0 +1,64 @@
+"""A campaign that is killed, damaged and called twice: benchmarks/faults.py in short."""
+
+import importlib.util
+import json
+import random
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import REPOSITORY, copy_project
+
+BENCHMARKS = REPOSITORY / "benchmarks"
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+
+
+def module(name):
+    spec = importlib.util.spec_from_file_location(name, BENCHMARKS / f"{name}.py")
+    loaded = importlib.util.module_from_spec(spec)
+    sys.modules[name] = loaded  # dataclasses look their module up
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+faults = module("faults")
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    scratch = tmp_path_factory.mktemp("faults")
+    project = copy_project(REPOSITORY, scratch / "project")
+    return faults.Reference(project, scratch, targets=("runs", "references"))
+
+
+def test_killed_calls_leave_nothing_behind_and_the_next_goes_on(reference):
+    place, chance = reference.empty(), random.Random(1)
+    for victim, moment in ((faults.VICTIMS[1], 0.5), (faults.VICTIMS[0], 0.5)):
+        assert not faults.kill(place, reference, victim, moment * reference.seconds, chance)
+    before = place.times()
+    assert reference.goes_on(place) == []
+    assert faults.computed_again(before, place) == []
+
+
+def test_flipped_bits_are_found_by_the_one_of_two_calls_that_may_run(reference):
+    place = reference.copy()
+    kinds = {"surface": "middle", "run": "start", "boundary elements": "end"}
+    spoilt = {}
+    for kind, where in kinds.items():
+        file = place.folder / faults.KINDS[kind]
+        faults.flip(file, where)
+        spoilt[file.with_name(f"{file.name}.damaged")] = file.read_bytes()
+    assert len(reference.half_written(place)) == len(kinds)
+    calls = [place.start(), place.start()]
+    ends = [place.end(call) for call in calls]
+    assert sorted(bool(status) for status, _ in ends) == [False, True], ends
+    refusal = next(said for status, said in ends if status)
+    assert "is running this campaign in this directory" in refusal and "Traceback" not in refusal
+    assert reference.unequal(place) == []
+    assert {file: file.read_bytes() for file in spoilt} == spoilt
+
+
+def test_the_page_is_that_of_the_counts():
+    kept = json.loads((BENCHMARKS / "results/faults.json").read_text(encoding="utf-8"))
+    assert module("faults_page").page(kept) == Path(REPOSITORY, "docs/faults.md").read_text(encoding="utf-8")
+    assert not [row for row in kept["rows"] if row["violations"]]
