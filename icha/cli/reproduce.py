@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import textwrap
 import zipfile
 from pathlib import Path
 from typing import Annotated, Literal
@@ -26,6 +27,8 @@ _BEGUN, _UNPACKED, _PROJECT, _LOG = "SHA256SUMS", "deposit", "source", "environm
 # Of the caller's: they would change which programs and settings the rerun has.
 _LEFT_BEHIND = ("PYTHON", "VIRTUAL_ENV", "CONDA", "UV_PROJECT", "UV_PYTHON", "SNAKEMAKE", "ICHA_", "MAKE", "MFLAGS")
 _LAST_LINES = 8
+# Characters of a reason that are told.
+_LONGEST = 120
 
 
 def reproduce(
@@ -177,7 +180,7 @@ def _asked_runs(only: list[str] | None, deposit: Path, names: dict[str, int]) ->
             )
         steps, failure = _outcome(deposit, path)
         if steps == 0:
-            why = f" ({failure})" if failure else ""
+            why = f" ({textwrap.shorten(failure, _LONGEST, placeholder=' …')})" if failure else ""
             raise Mistake(
                 f"--only {asked}: this run holds no data{why}, so there is nothing to compare; allowed: a run with at "
                 f"least one step, or {SMALLEST}"
