@@ -1234,7 +1234,7 @@ def test_measurements_that_cannot_be_drawn(table, changes, message, load, tmp_pa
     assert message in str(error.value)
 
 
-def test_dates_are_text_until_they_are_checked(tmp_path):
+def test_days_that_no_calendar_has_are_text_until_they_are_checked(tmp_path):
     (tmp_path / "one.yaml").write_text("publication: {date: 2026-02-30}")
     assert read_yaml(tmp_path / "one.yaml") == {"publication": {"date": "2026-02-30"}}
 

@@ -107,15 +107,13 @@ def read_yaml(path: Path) -> dict:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML in which a key that is given twice is an error, not the last one's secret win, and dates are text.
+    """YAML in which a key that is given twice is an error, not the last one's secret win."""
 
-    Text is checked where it belongs; what is no day of the calendar would end in an error of the library.
-    """
-
-    yaml_implicit_resolvers = {  # noqa: RUF012
-        first: [(tag, pattern) for tag, pattern in resolvers if tag != "tag:yaml.org,2002:timestamp"]
-        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-    }
+    def construct_yaml_timestamp(self, node):
+        try:
+            return super().construct_yaml_timestamp(node)
+        except ValueError:  # a 30th of February, say: text, which is checked where it belongs
+            return self.construct_scalar(node)
 
     def construct_mapping(self, node, deep=False):
         seen = set()
@@ -127,6 +125,9 @@ class _Loader(yaml.SafeLoader):
                 raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is given twice", key_node.start_mark)
             seen.add(key)
         return super().construct_mapping(node, deep)
+
+
+_Loader.add_constructor("tag:yaml.org,2002:timestamp", _Loader.construct_yaml_timestamp)
 
 
 def merged(content: Mapping, overrides: Mapping) -> dict:
