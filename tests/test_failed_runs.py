@@ -99,10 +99,15 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     failed = [check for check in read_checks(tmp_path / "checks.json") if not check.passed]
     assert [(check.subject, check.description) for check in failed] == [("sticky/rough/seed1/slope1/glue", reason)]
     with pytest.raises(ValueError) as verdict:
-        judge_results(tmp_path / "checks.json", tmp_path / "verdict.txt")
+        judge_results(tmp_path / "checks.json", tmp_path / "verdict.txt", known={})
     first, line = str(verdict.value).splitlines()
     assert first.startswith("1 of ") and line == f"sticky/rough/seed1/slope1/glue: the run failed: {reason}"
     assert not (tmp_path / "verdict.txt").exists()
+    judge_results(
+        tmp_path / "checks.json", tmp_path / "verdict.txt", known={"sticky/rough/seed1/slope1/glue": "sticky"}
+    )
+    first, line = (tmp_path / "verdict.txt").read_text().splitlines()
+    assert first.endswith("known failures:") and line == "sticky/rough/seed1/slope1/glue: sticky"
 
 
 def test_a_campaign_of_failed_runs_only_is_a_dataset_and_an_empty_page(sweep, dataset, tmp_path):

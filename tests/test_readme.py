@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 import small_campaign as small
 
@@ -35,6 +36,7 @@ def test_figure_5_is_redrawn_from_the_dataset_in_ten_lines(tmp_path, monkeypatch
     (code,) = blocks("python", "open_datatree")
     statements = [line for line in code.splitlines() if line and not line.startswith("import")]
     assert len(statements) <= 11
+    plt.close("all")  # of other tests
     names = {}
     exec(compile(code, "README", "exec"), names)
     lines = names["plt"].gca().get_lines()

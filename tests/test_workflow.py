@@ -209,7 +209,7 @@ def test_a_failed_check_stops_the_campaign_and_is_named(smoke, tmp_path, monkeyp
     spoilt, verdict = tmp_path / "checks.json", tmp_path / "verdict.txt"
     spoilt.write_text(json.dumps(checks))
     with pytest.raises(ValueError, match=f"1 of {len(checks)} checks failed\n.*{checks[3]['name']}: 0.5"):
-        judge_results(spoilt, verdict)
+        judge_results(spoilt, verdict, known={})
     assert not verdict.exists()
 
 
