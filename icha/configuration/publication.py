@@ -294,6 +294,11 @@ class Author(Section):
         return self.name is None
 
     @property
+    def orcid_address(self) -> str | None:
+        """Where the ORCID leads, if there is one."""
+        return self.orcid and f"https://orcid.org/{self.orcid}"
+
+    @property
     def full_name(self) -> str:
         """The name as it is read: given names before family names."""
         return self.name if self.name is not None else f"{self.given_names} {self.family_names}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from icha.configuration.publication import Author, Publication
+from icha.configuration.publication import Publication
 
 
 def discovery_attributes(publication: Publication) -> dict[str, str]:
@@ -15,7 +15,7 @@ def discovery_attributes(publication: Publication) -> dict[str, str]:
     found = {
         "creator_name": [author.full_name for author in authors],
         "creator_type": ["person" if author.is_person else "institution" for author in authors],
-        "creator_url": [_url(author) for author in authors],
+        "creator_url": [author.orcid_address or author.ror or "" for author in authors],
         "creator_institution": [author.affiliation or "" for author in authors],
         "keywords": [", ".join(publication.keywords)],
         "product_version": [publication.version or ""],
@@ -23,10 +23,6 @@ def discovery_attributes(publication: Publication) -> dict[str, str]:
         "metadata_link": [f"https://doi.org/{publication.doi}" if publication.doi else ""],
     }
     return {name: "; ".join(values) for name, values in found.items() if any(values)}
-
-
-def _url(author: Author) -> str:
-    return f"https://orcid.org/{author.orcid}" if author.orcid else author.ror or ""
 
 
 def _acknowledged(funding) -> str:

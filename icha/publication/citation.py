@@ -123,7 +123,7 @@ def _cff_author(author: Author) -> dict[str, str]:
         {
             "family-names": author.family_names,
             "given-names": author.given_names,
-            "orcid": author.orcid and f"https://orcid.org/{author.orcid}",
+            "orcid": author.orcid_address,
             "affiliation": author.affiliation,
         }
     )
@@ -250,7 +250,7 @@ def _datacite_creator(author: Author) -> dict[str, Any]:
     if author.orcid:
         creator["nameIdentifiers"] = [
             {
-                "nameIdentifier": f"https://orcid.org/{author.orcid}",
+                "nameIdentifier": author.orcid_address,
                 "nameIdentifierScheme": "ORCID",
                 "schemeUri": "https://orcid.org",
             }
@@ -259,7 +259,7 @@ def _datacite_creator(author: Author) -> dict[str, Any]:
         creator["nameIdentifiers"] = [{"nameIdentifier": author.ror, "nameIdentifierScheme": "ROR"} | ror]
     elif ror:
         identified = {"affiliationIdentifier": author.ror, "affiliationIdentifierScheme": "ROR"} | ror
-        creator["affiliation"] = [{"name": author.affiliation or author.ror} | identified]
+        creator["affiliation"] = [{"name": author.affiliation} | identified]
     elif author.affiliation:
         creator["affiliation"] = [{"name": author.affiliation}]
     return _given(creator)

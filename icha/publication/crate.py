@@ -265,14 +265,14 @@ def _add_author(crate: ROCrate, author: Author) -> Entity:
         return _add_organisation(crate, author.name, author.ror)
     person = _add(
         crate,
-        f"https://orcid.org/{author.orcid}" if author.orcid else f"#person/{quote(author.full_name)}",
+        author.orcid_address or f"#person/{quote(author.full_name)}",
         "Person",
         name=author.full_name,
         givenName=author.given_names,
         familyName=author.family_names,
     )
-    if author.affiliation or author.ror:
-        _set(person, affiliation=_add_organisation(crate, author.affiliation or author.ror, author.ror))
+    if author.affiliation:
+        _set(person, affiliation=_add_organisation(crate, author.affiliation, author.ror))
     return person
 
 

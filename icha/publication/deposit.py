@@ -25,7 +25,7 @@ from icha.costs import Cost
 from icha.files import whole_file
 from icha.integrity import is_whole
 from icha.publication.citation import citation_cff, datacite_metadata, zenodo_metadata
-from icha.publication.crate import Job, write_crate
+from icha.publication.crate import METADATA, Job, write_crate
 from icha.publication.dictionary import data_dictionary, dictionary_csv
 from icha.publication.licences import known_licence, licence_page
 from icha.publication.readme import readme
@@ -34,7 +34,6 @@ from icha.records import read_campaign
 
 CHECKSUMS = "SHA256SUMS"
 SOURCE = "source"
-CRATE = "ro-crate-metadata.json"
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _BLOCK = 2**20
 # The earliest time that a zip can hold.
@@ -86,8 +85,8 @@ def make_deposit(
         _describe(part, files, publication, campaign, source.commit, cost)
         checksums = {path: _sha256(part / path) for path in _files(part)}
         write_crate(part, publication, jobs, campaign=campaign.name, commit=source.commit, checksums=checksums)
-        (part / CRATE).chmod(0o644)
-        checksums[CRATE] = _sha256(part / CRATE)
+        (part / METADATA).chmod(0o644)
+        checksums[METADATA] = _sha256(part / METADATA)
         _write(part / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
         with whole_file(archive) as temporary:
             _write_zip(temporary, part, folder.name)
