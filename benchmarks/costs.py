@@ -1,4 +1,4 @@
-"""Predicted over measured: processor time, peak memory and disk by `icha.costs` against small cases, one at a time.
+"""Predicted over measured: processor time, peak memory and disk by `icha.planning.costs` against small cases, one at a time.
 
 python benchmarks/costs.py [--quick]
 
@@ -26,12 +26,12 @@ from pathlib import Path
 import numpy as np
 
 import icha
-from icha import costs
-from icha.cohesive_zone import shortest_range
-from icha.records import write_dataset, write_surface
-from icha.reference.boundary_elements import boundary_elements
-from icha.reference.error_sources import error_sources
-from icha.reference.loops import boundary_element_loop
+from icha.asperity.cohesive_zone import shortest_range
+from icha.datasets.files import write_dataset, write_surface
+from icha.planning import costs
+from icha.references.boundary_elements import boundary_elements
+from icha.references.error_sources import error_sources
+from icha.references.loops import boundary_element_loop
 from icha.simulation import simulate
 
 RESULT = Path(__file__).parent / "results/costs.json"

@@ -22,10 +22,10 @@ import netCDF4
 import numpy as np
 
 import icha
-from icha.campaign import RunLabels
-from icha.campaign_file import write_campaign
-from icha.netcdf import LEAST_COMPRESSED
-from icha.records import write_dataset, write_surface
+from icha.datasets.campaign import RunLabels
+from icha.datasets.campaign_file import write_campaign
+from icha.datasets.files import write_dataset, write_surface
+from icha.datasets.netcdf import LEAST_COMPRESSED
 
 REPEATS = 3
 SPECTRUM = icha.SelfAffineSpectrum(

@@ -4,11 +4,12 @@ import argparse
 import shutil
 from pathlib import Path
 
+from pages import error_sources, hysteresis, one_asperity, validation
+
 from icha.configuration.expansion import asperity_cases, loop_cases, source_cases
 from icha.configuration.load import load_configuration
-from icha.files import whole_file
-from icha.pages import error_sources, hysteresis, one_asperity, validation
-from icha.records import read_campaign, read_dataset
+from icha.datasets.files import read_campaign, read_dataset
+from icha.support.atomic_files import whole_file
 
 DOCS = Path("docs")
 

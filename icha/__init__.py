@@ -3,10 +3,10 @@
 import importlib
 
 _HOME = {
-    "SelfAffineSpectrum": "spectrum",
-    "Surface": "surface",
-    "Material": "material",
-    "Path": "path",
+    "SelfAffineSpectrum": "surfaces.spectrum",
+    "Surface": "surfaces.surface",
+    "Material": "asperity.material",
+    "Path": "path.path",
     "simulate": "simulation",
     "ConvergenceError": "simulation",
 }

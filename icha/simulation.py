@@ -8,11 +8,13 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperities import find_summits
-from icha.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
-from icha.discovery import COMPUTED, discovery
-from icha.dissipation import new_events
-from icha.equilibrium import (
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
+from icha.datasets.attributes import COMPUTED, discovery
+from icha.datasets.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
+from icha.equilibrium.distributions import gap_distribution, pressure_distribution
+from icha.equilibrium.energy import new_events
+from icha.equilibrium.equilibrium import (
     EVENT_KINDS,
     Contact,
     Events,
@@ -23,14 +25,12 @@ from icha.equilibrium import (
     mean_pressure,
     stored_energy,
 )
-from icha.jkr import JKR
-from icha.limits import MAX_REDUCED_PRESSURE
-from icha.material import Material
-from icha.observables import gap_distribution, pressure_distribution
-from icha.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target, follow
-from icha.roughness import spectral_moments, stickiness
-from icha.surface import Surface
-from icha.validation import integer
+from icha.path.limits import MAX_REDUCED_PRESSURE
+from icha.path.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target, follow
+from icha.support.validation import integer
+from icha.surfaces.moments import spectral_moments, stickiness
+from icha.surfaces.summits import find_summits
+from icha.surfaces.surface import Surface
 
 # Snapshots farther up, in h_rms, would not fit the bins of the gap.
 _HIGHEST_SNAPSHOT = 20.0

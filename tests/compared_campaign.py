@@ -7,9 +7,9 @@ import numpy as np
 import small_campaign as small
 
 import icha
-from icha.campaign import RunLabels, campaign_tree, find_snapshot
-from icha.labels import SolutionLabels
-from icha.model_error import SHARED, contact_of_spots, model_error, state_of
+from icha.analysis.model_error import SHARED, contact_of_spots, model_error, state_of
+from icha.datasets.campaign import RunLabels, campaign_tree, find_snapshot
+from icha.datasets.labels import SolutionLabels
 
 PRESSURES = (3e-3, 1e-2)
 GRID = 96

@@ -7,16 +7,16 @@ import numpy as np
 import small_campaign as small
 
 import icha
-from icha.aggregation import compare_campaign
-from icha.campaign import RunLabels
-from icha.campaign_file import write_campaign
-from icha.records import read_campaign, write_dataset, write_surface
-from icha.reference.boundary_elements import boundary_elements
-from icha.reference.dataset import reference_dataset
-from icha.reference.error_sources import error_sources
-from icha.reference.loops import boundary_element_loop
-from icha.reference.one_asperity import hertz_asperity, one_asperity
-from icha.roughness import spectral_moments
+from icha.analysis.common_loads import compare_campaign
+from icha.datasets.campaign import RunLabels
+from icha.datasets.campaign_file import write_campaign
+from icha.datasets.files import read_campaign, write_dataset, write_surface
+from icha.references.boundary_elements import boundary_elements
+from icha.references.dataset import reference_dataset
+from icha.references.error_sources import error_sources
+from icha.references.loops import boundary_element_loop
+from icha.references.one_asperity import hertz_asperity, one_asperity
+from icha.surfaces.moments import spectral_moments
 
 HARD = icha.Material(contact_modulus=1e9, surface_energy=0.0, interaction_range=1e-8)
 # Its attraction reaches far enough for the grid of the small surface.

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 import icha
-from icha.campaign import RunLabels, campaign_tree
-from icha.jkr import JKR
+from icha.asperity.jkr import JKR
+from icha.datasets.campaign import RunLabels, campaign_tree
 
 PERIOD, GRID, RMS_HEIGHT, RADIUS = 100e-6, 32, 0.5e-6, 4e-6
 COUNT = 30

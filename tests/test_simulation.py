@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.roughness import spectral_moments, stickiness
+from icha.surfaces.moments import spectral_moments, stickiness
 
 PERIOD, MODULUS, ENERGY, RANGE = 100e-6, 25e6, 0.05, 2.071e-9
 ADHESIVE, BARE = Material(MODULUS, ENERGY, RANGE), Material(MODULUS, 0.0, RANGE)
@@ -294,9 +294,9 @@ def test_a_surface_that_pulls_itself_together_is_reported_with_what_was_computed
 
 
 def test_nothing_reached_is_an_empty_dataset_not_a_wrong_one(monkeypatch):
-    import icha.equilibrium
+    import icha.equilibrium.equilibrium
 
-    monkeypatch.setattr(icha.equilibrium, "_MAX_NEWTON_STEPS", 0)
+    monkeypatch.setattr(icha.equilibrium.equilibrium, "_MAX_NEWTON_STEPS", 0)
     with pytest.raises(ConvergenceError, match="after 0 of 3 stops") as caught:
         run_of(rough(), BARE)
     assert caught.value.dataset.sizes["step"] == 0

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from snakemake.logging import logger
 
-from icha import integrity
-from icha.files import why_not_writable
+from icha.support import checksums as integrity
+from icha.support.atomic_files import why_not_writable
 
 
 def before_execution(workflow, results: str, prepare) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from make_runs import labels
 
-from icha.checks import check_campaign
-from icha.records import read_campaign
+from icha.analysis.checks import check_campaign
+from icha.datasets.files import read_campaign
 
 folder, count = Path(sys.argv[1]), int(sys.argv[2])
 check_campaign(read_campaign(folder / f"{count}.nc"), labels(count))

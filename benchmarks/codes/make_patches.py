@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import icha
-from icha.asperities import find_summits
+from icha.surfaces.summits import find_summits
 
 GRID, CELLS_PER_SHORT_WAVE, SEEDS = 512, 8, 16
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import icha
-from icha.labels import RunLabels
-from icha.records import write_dataset
+from icha.datasets.files import write_dataset
+from icha.datasets.labels import RunLabels
 
 MATERIALS = {"soft": icha.Material(25e6, 0.05, 2.071e-9), "hertz": icha.Material(25e6, 0.0, 2.071e-9)}
 SLOPES = (0.5, 1.0)

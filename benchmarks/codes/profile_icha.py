@@ -12,8 +12,10 @@ from unittest import mock
 import numpy as np
 
 import icha
-from icha import elasticity, path, simulation
-from icha.records import write_dataset
+from icha import simulation
+from icha.datasets.files import write_dataset
+from icha.half_space import interaction as elasticity
+from icha.path.path import path
 
 MODULUS, SURFACE_ENERGY, RANGE = 25e6, 0.05, 2.071e-9
 SNAPSHOT = [("reduced_pressure", 0.01)]

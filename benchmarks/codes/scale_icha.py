@@ -15,10 +15,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import icha
-from icha.asperities import Asperities
-from icha.equilibrium import Contact, area_fraction
-from icha.jkr import JKR
-from icha.path import follow
+from icha.asperity.jkr import JKR
+from icha.equilibrium.equilibrium import Contact, area_fraction
+from icha.path.path import follow
+from icha.surfaces.summits import Asperities
 
 REDUCED_PRESSURES = np.geomspace(5e-4, 8e-2, 20)
 MATERIAL = {False: icha.Material(25e6, 0.0, 2.071e-9), True: icha.Material(25e6, 0.05, 2.071e-9)}

@@ -7,10 +7,10 @@ from task import Task
 from threadpoolctl import threadpool_limits
 
 import icha
-from icha.asperities import find_summits
-from icha.equilibrium import Contact, area_fraction, mean_pressure
-from icha.jkr import JKR
-from icha.path import follow
+from icha.asperity.jkr import JKR
+from icha.equilibrium.equilibrium import Contact, area_fraction, mean_pressure
+from icha.path.path import follow
+from icha.surfaces.summits import find_summits
 
 
 def main():
@@ -20,7 +20,7 @@ def main():
         path = icha.Path(mean_separations=task.mean_gaps, snapshots=[])
     else:
         path = icha.Path(reduced_pressures=[pressure / unit for pressure in task.pressures], snapshots=[])
-    task.start("icha", "icha.path.follow")
+    task.start("icha", "icha.path.path.follow")
     surface = icha.Surface(task.heights, task.period)
     material = icha.Material(task.contact_modulus, task.surface_energy, task.interaction_range)
     with threadpool_limits(1):

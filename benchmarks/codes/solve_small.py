@@ -6,11 +6,11 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from icha.asperity.material import Material
 from icha.configuration.expansion import run_cases, run_settings
 from icha.configuration.load import load_configuration
-from icha.material import Material
-from icha.path import Path as LoadingPath
-from icha.records import read_surface
+from icha.datasets.files import read_surface
+from icha.path.path import Path as LoadingPath
 from icha.simulation import simulate
 
 

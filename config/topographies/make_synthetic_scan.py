@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from icha.files import whole_file
-from icha.spectrum import SelfAffineSpectrum
+from icha.support.atomic_files import whole_file
+from icha.surfaces.spectrum import SelfAffineSpectrum
 
 ROWS, COLUMNS, PIXEL = 128, 144, 0.5e-6
 HEADING = """\

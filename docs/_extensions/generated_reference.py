@@ -89,14 +89,14 @@ def campaign_variables() -> str:
 
 def comparison_variables() -> str:
     """The variables of the comparison of a study's runs."""
-    from icha.aggregation import compare_runs
+    from icha.analysis.common_loads import compare_runs
 
     return _table(_rows_of(compare_runs(_small_campaign()["study"].to_dataset()).variables))
 
 
 def surface_variables() -> str:
     """The variables of a surface's file."""
-    from icha.records import read_dataset, write_surface
+    from icha.datasets.files import read_dataset, write_surface
 
     spectrum = _small_spectrum()
     with tempfile.TemporaryDirectory() as folder:
@@ -107,7 +107,7 @@ def surface_variables() -> str:
 
 def model_error_variables() -> str:
     """The variables of the comparison with boundary elements."""
-    from icha.model_error import AXES, VARIABLES
+    from icha.analysis.model_error import AXES, VARIABLES
 
     return _table((name, (*AXES, *dims), units, text) for name, (dims, units, text) in VARIABLES.items())
 
@@ -115,8 +115,8 @@ def model_error_variables() -> str:
 def theory_variables() -> str:
     """The variables of the theories of a surface."""
     import icha
-    from icha.reference.dataset import reference_dataset
-    from icha.roughness import spectral_moments
+    from icha.references.dataset import reference_dataset
+    from icha.surfaces.moments import spectral_moments
 
     spectrum = _small_spectrum()
     material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2e-9)
@@ -134,7 +134,7 @@ def _small_spectrum():
 def _small_campaign():
     """A campaign of one run, in and back, on a surface of a few summits."""
     import icha
-    from icha.campaign import campaign_tree
+    from icha.datasets.campaign import campaign_tree
 
     material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2.071e-9)
     path = icha.Path(reduced_pressures=[5e-4, 1e-3], unload=True, max_step=0.5)

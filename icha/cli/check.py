@@ -18,7 +18,7 @@ def check(
     Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is none of those. All files are
     checked in any case.
     """
-    from icha.format import CAMPAIGN, RUN, UnknownFile, flaws, kind_of
+    from icha.datasets.format import CAMPAIGN, RUN, UnknownFile, flaws, kind_of
 
     status = 0
     for file in files:
@@ -47,8 +47,8 @@ def check(
 
 def _physics(kind, data):
     """Checks of the numbers that failed, as text, and how many there are."""
-    from icha.checks import check_campaign, check_run
-    from icha.format import RUN
+    from icha.analysis.checks import check_campaign, check_run
+    from icha.datasets.format import RUN
 
     if kind == RUN and "incomplete" in data.attrs:
         return [f"the run failed: {data.attrs['incomplete']}"], 1
@@ -57,7 +57,7 @@ def _physics(kind, data):
 
 
 def _said(check):
-    from icha.checks import COMPLETED
+    from icha.analysis.checks import COMPLETED
 
     subject = f"{check.subject}: " if check.subject else ""
     if check.name == COMPLETED:

@@ -26,8 +26,8 @@ def describe(
     """
     from rich.console import Console
 
-    from icha.cli.plan import plan
-    from icha.integrity import damaged
+    from icha.planning.plan import plan
+    from icha.support.checksums import damaged
 
     path = configuration_path(config)
     campaign = read_configuration(path).campaign
@@ -53,7 +53,7 @@ def _summary(console, items, damaged, cores) -> None:
     from rich.table import Table
 
     from icha.cli.live import duration
-    from icha.cli.plan import memory_on, time_on, total
+    from icha.planning.plan import memory_on, time_on, total
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
     parts: dict[str, list] = {}

@@ -102,7 +102,7 @@ def _measured(path: Path, data: str | None, start: Path) -> tuple[str, str, list
     """Name and section of a measured surface, and what of it is left to fill in."""
     import numpy as np
 
-    from icha.topography import Preparation, UnfitTopography, read_scan
+    from icha.surfaces.measured.topography import Preparation, UnfitTopography, read_scan
 
     if not path.is_file():
         raise Mistake(f"--measured {path}: no such file")

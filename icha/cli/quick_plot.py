@@ -8,14 +8,14 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from icha.datasets.format import RUN, SURFACE
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
 from icha.figures.style import COLOURS, ONE_COLUMN, TWO_COLUMNS, new_figure, styled
-from icha.files import whole_file
-from icha.format import RUN, SURFACE
+from icha.support.atomic_files import whole_file
 
 
 def draw(kind: str, data: xr.Dataset | xr.DataTree, path: Path) -> None:
-    """Draw what `icha.format.kind_of` gave into a file, whose ending says the format."""
+    """Draw what `icha.datasets.format.kind_of` gave into a file, whose ending says the format."""
     drawing = _run if kind == RUN else _surface if kind == SURFACE else _campaign
     with whole_file(path) as temporary:
         drawing(data).savefig(temporary, format=path.suffix[1:], dpi=150)

@@ -87,7 +87,7 @@ def run(
 
     from icha.cli.events import Watch
     from icha.cli.live import LiveView, PlainView
-    from icha.cli.plan import expected_seconds
+    from icha.planning.plan import expected_seconds
 
     console = Console()
     watch = Watch(expected_seconds(campaign, folder / "results" / campaign.name))
@@ -233,8 +233,8 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
     """Print what has become of the campaign."""
     from icha.cli.events import reason_of
     from icha.cli.live import duration
-    from icha.cli.plan import failed_runs
-    from icha.files import why_not_writable
+    from icha.planning.plan import failed_runs
+    from icha.support.atomic_files import why_not_writable
 
     results = folder / "results" / campaign.name
     ended = len(watch.done) + len(watch.failed)

@@ -27,7 +27,7 @@ def show(
     if plot is not None and plot.suffix not in (".png", ".pdf", ".svg"):
         raise Mistake(f"--plot {plot}: ends in {plot.suffix!r}; allowed: .png, .pdf, .svg")
     from icha.cli.quick_plot import draw
-    from icha.format import CAMPAIGN, RUN, SURFACE, UnknownFile, kind_of
+    from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, kind_of
 
     try:
         kind, data = kind_of(file)

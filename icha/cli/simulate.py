@@ -15,7 +15,7 @@ def _length(value: str | None) -> float | None:
 
 
 def _si(value: str, si_unit: str, example: str) -> float:
-    from icha.configuration.units import to_si
+    from icha.support.units import to_si
 
     try:
         return to_si(value, si_unit)
@@ -82,10 +82,10 @@ def simulate(
         raise Mistake(f"{output} is there already; --force replaces it")
     if not output.absolute().parent.is_dir():
         raise Mistake(f"{output}: no such folder as {output.parent}")
+    from icha.asperity.material import Material
     from icha.cli.show import show_run
-    from icha.material import Material
-    from icha.path import Path as LoadingPath
-    from icha.records import write_dataset
+    from icha.datasets.files import write_dataset
+    from icha.path.path import Path as LoadingPath
     from icha.simulation import ConvergenceError
     from icha.simulation import simulate as press
 
@@ -108,22 +108,22 @@ def simulate(
 
 
 def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope):
-    from icha.spectrum import SelfAffineSpectrum
-    from icha.surface import Surface
+    from icha.surfaces.spectrum import SelfAffineSpectrum
+    from icha.surfaces.surface import Surface
 
     if file is None:
         slope = 1.0 if rms_slope is None else rms_slope
         rolloff, short = _cutoffs(period, rolloff, short, grid)
         return SelfAffineSpectrum(period, rolloff, short, hurst, slope).realise(grid, seed)
     if file.suffix == ".npy":
-        from icha.configuration.height_map import read_height_map
+        from icha.surfaces.measured.height_map import read_height_map
 
         try:
             found = Surface(read_height_map(file, 1.0), period)
         except ValueError as error:
             raise ValueError(f"{file}: {error}") from None
     else:
-        from icha.records import read_surface
+        from icha.datasets.files import read_surface
 
         found = read_surface(file)
     return found if rms_slope is None else found.scaled_to_rms_slope(rms_slope)

@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from icha.configuration.model import BESIDE_STUDIES, SCALARS, SURFACE_KINDS, Campaign, Contact, Material, Study
 from icha.configuration.problems import Problem
 from icha.configuration.values import MEASURED, NOTHING, Unit
-from icha.labels import number_label
+from icha.datasets.labels import number_label
 
 MAX_RUNS = 100_000
 # Lists of a study, and what one of their entries is called in a case.

@@ -8,7 +8,7 @@ import json
 
 from icha.configuration.model import BesideStudy, Campaign, RunFigure
 from icha.configuration.topography import MeasuredSurface
-from icha.labels import ContactLabels, RunLabels, SolutionLabels, number_label
+from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, number_label
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:

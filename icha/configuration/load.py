@@ -15,12 +15,12 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from icha.configuration.design import designed
-from icha.configuration.height_map import read_height_map
 from icha.configuration.measurement import read_columns
 from icha.configuration.model import SURFACE_KINDS, Campaign, Defaults, Topography
 from icha.configuration.problems import Problem, problems
 from icha.configuration.topography import Crop, MeasuredSurface
 from icha.configuration.values import MEASURED, NAME_PATTERN, NOTHING
+from icha.surfaces.measured.height_map import read_height_map
 
 
 class ConfigurationError(ValueError):
@@ -327,7 +327,7 @@ def _topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Probl
 def _facts(surface, with_slope: bool) -> tuple[int, float, str, float | None]:
     if isinstance(surface, MeasuredSurface):
         # Slow to import, and not for every campaign.
-        from icha.topography import topography_facts
+        from icha.surfaces.measured.topography import topography_facts
 
         facts = topography_facts(surface.path, surface.preparation)
         return facts.grid, facts.period, facts.boundary, facts.rms_slope if with_slope else None
@@ -335,7 +335,7 @@ def _facts(surface, with_slope: bool) -> tuple[int, float, str, float | None]:
     slope = None
     if with_slope:
         # Imports SciPy's transforms, for which no other call should wait.
-        from icha.surface import Surface
+        from icha.surfaces.surface import Surface
 
         slope = Surface(heights, surface.period).rms_slope
     return len(heights), surface.period, "periodic", slope

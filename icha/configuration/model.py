@@ -23,7 +23,6 @@ from pydantic import (
 
 from icha.configuration.publication import Publication
 from icha.configuration.topography import MeasuredSurface
-from icha.configuration.units import conversion_factor
 from icha.configuration.values import (
     MAX_GRID,
     MEASURED,
@@ -53,7 +52,8 @@ from icha.configuration.values import (
     number,
     stops,
 )
-from icha.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.support.units import conversion_factor
 
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
@@ -321,7 +321,7 @@ class Study(Section):
 
     def check_path(self, snapshots: list[tuple[str, float]] | None) -> None:
         """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
-        from icha.path import Path  # the solver, which others who read configurations need not wait for
+        from icha.path.path import Path  # the solver, which others who read configurations need not wait for
 
         Path(**self.path_settings(snapshots))
 

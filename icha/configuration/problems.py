@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from icha.cohesive_zone import resolution_problem
+from icha.asperity.cohesive_zone import resolution_problem
+from icha.asperity.material import Material as Interface
 from icha.configuration.expansion import run_cases
 from icha.configuration.model import (
     BESIDE_STUDIES,
@@ -22,8 +23,7 @@ from icha.configuration.model import (
     TaborFigure,
 )
 from icha.configuration.values import MAX_GRID, ROUNDING
-from icha.limits import MAX_REDUCED_PRESSURE
-from icha.material import Material as Interface
+from icha.path.limits import MAX_REDUCED_PRESSURE
 
 # Location in the configuration, value, and what is wrong with it and allowed.
 Problem = tuple[tuple, Any, str]

@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from icha.configuration.units import PATTERN, conversion_factor, to_si
 from icha.configuration.values import MAX_GRID, File, Length, Section, Text, integer, number, quantity
+from icha.support.units import PATTERN, conversion_factor, to_si
 
 
 def _unit_of_length(value: Any) -> float:
@@ -69,7 +69,7 @@ class Crop(Section):
 
     def __repr__(self):
         """How messages call it."""
-        from icha.topography import in_words  # slow to import
+        from icha.surfaces.measured.topography import in_words  # slow to import
 
         return f"a square of {in_words(self.side)} at x = {in_words(self.x)}, y = {in_words(self.y)}"
 
@@ -163,7 +163,7 @@ class MeasuredSurface(Section):
 
     @property
     def preparation(self) -> dict:
-        """What `icha.topography.Preparation` takes: everything but kind and path, in SI units."""
+        """What `icha.surfaces.measured.topography.Preparation` takes: everything but kind and path, in SI units."""
         settings = self.model_dump(exclude={"kind", "path"})
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-from icha.configuration.units import PATTERN, PHYSICAL_NAMES, to_number, to_si
-from icha.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
+from icha.path.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
+from icha.support.units import PATTERN, PHYSICAL_NAMES, to_number, to_si
 
 NAME_PATTERN = r"^[a-z0-9_-]+$"
 # Nodes along a side of a surface or of boundary elements.

@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from icha.aggregation import mean_curve, mean_way
-from icha.ensemble import Ensemble
+from icha.analysis.common_loads import mean_curve, mean_way
+from icha.datasets.labels import RunLabels
 from icha.figures.scale import MOST_COLOURS, Scale, materials_scale, places_scale
 from icha.figures.select import path_steps, study_runs, ways_back
 from icha.figures.style import BLACK, COLOURS, GREY, MARKERS, line_look, material_label, slope_label
-from icha.labels import RunLabels
+from icha.support.statistics import Ensemble
 
 PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"
 AREA_LABEL = r"contact area  $A/A_0$"

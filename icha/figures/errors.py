@@ -10,7 +10,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from icha.ensemble import ensemble
 from icha.figures.curves import PRESSURE_LABEL, bars_handle
 from icha.figures.scale import MOST_COLOURS, places_scale
 from icha.figures.select import NothingToDraw, study_errors
@@ -26,6 +25,7 @@ from icha.figures.style import (
     panel_label,
     slope_label,
 )
+from icha.support.statistics import ensemble
 
 # More surfaces than this, and every material has panels of its own.
 _MOST_LINES = 2

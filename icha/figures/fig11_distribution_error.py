@@ -32,7 +32,7 @@ def figure(model_error: xr.DataTree, *, study: str) -> Figure:
 
     Parameters
     ----------
-    model_error : `icha.model_error.model_error` of the campaign.
+    model_error : `icha.analysis.model_error.model_error` of the campaign.
     study : name of the study.
 
     Raises

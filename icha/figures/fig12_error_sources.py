@@ -24,7 +24,7 @@ from icha.figures.style import (
     panel_label,
     styled,
 )
-from icha.reference.error_sources import effects, relative_radius, shape_ratio, shape_ratio_of_fourth_order
+from icha.references.error_sources import effects, relative_radius, shape_ratio, shape_ratio_of_fourth_order
 
 CAPTION = (
     "Where the model's error comes from: between ICHA and boundary elements (BEM) one thing is switched at a time, on "
@@ -55,7 +55,7 @@ _HIGHEST_RATIO = 3.0
 
 @styled
 def figure(error_sources: Sequence[xr.Dataset]) -> Figure:
-    """Draw the datasets of `icha.reference.error_sources.error_sources`, of surfaces that differ in their seeds only.
+    """Draw the datasets of `icha.references.error_sources.error_sources`, of surfaces that differ in their seeds only.
 
     Raises
     ------

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from icha.aggregation import mean_way
-from icha.ensemble import Ensemble
+from icha.analysis.common_loads import mean_way
+from icha.analysis.model_error import run_of_same_contact
+from icha.datasets.labels import RunLabels
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, band_handle, draw_band
 from icha.figures.hysteresis import (
     BRANCH_DASHES,
@@ -23,8 +24,7 @@ from icha.figures.hysteresis import (
 )
 from icha.figures.select import branches, pick
 from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, slope_label, styled
-from icha.labels import RunLabels
-from icha.model_error import run_of_same_contact
+from icha.support.statistics import Ensemble
 
 CAPTION = (
     "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over nominal "

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
 from icha.figures.style import BLUE, GREY, TWO_COLUMNS, VERMILLION, new_figure, panel_label, styled
-from icha.jkr import JKR
-from icha.material import Material
 
 CAPTION = (
     "Force F (a) and contact radius a (b) of one asperity against its approach δ by the theory of Johnson, Kendall and "

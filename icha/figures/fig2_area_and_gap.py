@@ -7,7 +7,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from icha.ensemble import ensemble
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
@@ -21,6 +20,7 @@ from icha.figures.curves import (
 )
 from icha.figures.select import study_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
+from icha.support.statistics import ensemble
 
 CAPTION = (
     "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
@@ -57,8 +57,8 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    references : theories and points for the study's first surface (`icha.reference.reference_dataset`), if any.
-    model_error : `icha.model_error.model_error` of the campaign, for the boundary elements beside its runs, if any.
+    references : theories and points for the study's first surface (`icha.references.reference_dataset`), if any.
+    model_error : `icha.analysis.model_error.model_error` of the campaign, for the boundary elements beside its runs, if any.
     study : name of the study.
 
     Raises

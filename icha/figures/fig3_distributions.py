@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.ensemble import ensemble
+from icha.analysis.model_error import state_of
 from icha.figures.curves import band_handle, draw_mean, material_looks
 from icha.figures.select import first_line, name_of_place, snapshot_label, study_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
-from icha.model_error import state_of
-from icha.reference.persson import persson_pressure_density
+from icha.references.persson import persson_pressure_density
+from icha.support.statistics import ensemble
 
 CAPTION = (
     "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure p "
@@ -50,7 +50,7 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    model_error : `icha.model_error.model_error` of the campaign, for the boundary elements of the same states, if any.
+    model_error : `icha.analysis.model_error.model_error` of the campaign, for the boundary elements of the same states, if any.
     study : name of the study.
     kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
 

@@ -8,11 +8,11 @@ from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from icha.campaign import find_snapshot, spots_of
+from icha.analysis.model_error import check_same_contact, contact_of_spots, jaccard, state_of
+from icha.datasets.campaign import find_snapshot, spots_of
 from icha.figures.select import check_topography, pick_run
 from icha.figures.spots import circles_in_cell, draw_spots
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, new_figure, number, panel_label, styled, unit_for
-from icha.model_error import check_same_contact, contact_of_spots, jaccard, state_of
 
 CAPTION = (
     "Contact spots (red circles, true size and position) over the topography, of which the highest parts are "
@@ -66,7 +66,7 @@ def figure(
     ----------
     campaign : the campaign dataset.
     surface : the surface file's dataset; it must be the topography of the run that is drawn.
-    solution : boundary elements (`icha.reference.boundary_elements`) of the state that is drawn, if there are any.
+    solution : boundary elements (`icha.references.boundary_elements`) of the state that is drawn, if there are any.
     study : name of the study.
     surface_name, seed, rms_slope, material : which run; what is left out is the study's first. For the material that
         is the first one with adhesion, if there is any.

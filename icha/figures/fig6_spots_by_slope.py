@@ -7,7 +7,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Wedge
 
-from icha.campaign import find_snapshot, spots_of
+from icha.datasets.campaign import find_snapshot, spots_of
 from icha.figures.select import pick, study_runs
 from icha.figures.spots import circles_in_cell, draw_spots
 from icha.figures.style import (

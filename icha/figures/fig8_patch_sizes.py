@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.campaign import spots_of
-from icha.ensemble import ensemble
+from icha.datasets.campaign import spots_of
 from icha.figures.curves import band_handle, draw_mean, material_looks
 from icha.figures.select import first_line, name_of_place, snapshot_label
 from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
+from icha.support.statistics import ensemble
 
 CAPTION = (
     "Sizes of the contact patches, the areas A of the spots (united ones count as one), at the load given in the "

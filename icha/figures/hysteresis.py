@@ -10,13 +10,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from icha.ensemble import ensemble
+from icha.datasets.labels import RunLabels
 from icha.figures.curves import UNLOADING
 from icha.figures.errors import interfaces_of
 from icha.figures.scale import MOST_COLOURS, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, study_runs, ways_back
 from icha.figures.style import COLOURS, GREY, MARKERS, material_label, slope_label
-from icha.labels import RunLabels
+from icha.support.statistics import ensemble
 
 # More names than this are written smaller.
 _MANY_NAMES = 12

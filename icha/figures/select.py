@@ -8,9 +8,18 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.campaign import LABELS, RAGGED, RunLabels, find_snapshot, loading_stops, reduced_gap, run_labels, select_run
+from icha.datasets.campaign import (
+    LABELS,
+    RAGGED,
+    RunLabels,
+    find_snapshot,
+    loading_stops,
+    reduced_gap,
+    run_labels,
+    select_run,
+)
+from icha.datasets.files import COMPLETE
 from icha.figures.style import number, slope_label
-from icha.records import COMPLETE
 
 
 class NothingToDraw(ValueError):

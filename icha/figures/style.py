@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation
 
-from icha.files import whole_file
+from icha.support.atomic_files import whole_file
 
 # Widths of one and of two columns of a journal page, inches.
 ONE_COLUMN = 3.5

@@ -25,8 +25,8 @@ from typing import NamedTuple
 import netCDF4
 import numpy as np
 
-from icha.checks import RESIDUAL_LIMIT
-from icha.files import whole_file
+from icha.analysis.checks import RESIDUAL_LIMIT
+from icha.support.atomic_files import whole_file
 
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (
     "identical",

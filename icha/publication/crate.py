@@ -23,9 +23,9 @@ from rocrate.model import ContextEntity, Dataset, Entity, File
 from rocrate.rocrate import ROCrate
 
 from icha.configuration.publication import Author, Publication
-from icha.files import whole_file
 from icha.publication.citation import MODEL_PAPER, web_address
 from icha.publication.licences import known_licence
+from icha.support.atomic_files import whole_file
 
 METADATA = "ro-crate-metadata.json"
 CONFIGURATION = "config.used.yaml"

@@ -18,19 +18,19 @@ from typing import BinaryIO
 
 import xarray as xr
 
-from icha.checks import read_checks, refuse_unknown_failures
+from icha.analysis.checks import read_checks, refuse_unknown_failures
 from icha.configuration.model import Campaign
 from icha.configuration.publication import Publication
-from icha.costs import Cost
-from icha.files import whole_file
-from icha.integrity import is_whole
+from icha.datasets.files import read_campaign
+from icha.planning.costs import Cost
 from icha.publication.citation import citation_cff, datacite_metadata, zenodo_metadata
 from icha.publication.crate import METADATA, Job, write_crate
 from icha.publication.dictionary import data_dictionary, dictionary_csv
 from icha.publication.licences import known_licence, licence_page
 from icha.publication.readme import readme
 from icha.publication.source import Source
-from icha.records import read_campaign
+from icha.support.atomic_files import whole_file
+from icha.support.checksums import is_whole
 
 CHECKSUMS = "SHA256SUMS"
 SOURCE = "source"

@@ -13,16 +13,16 @@ import jinja2
 import numpy as np
 import xarray as xr
 
-from icha.campaign_file import LABELS
-from icha.checks import COMPLETED, Check, worst
+from icha.analysis.checks import COMPLETED, Check, worst
 from icha.configuration.model import Campaign, SelfAffineSurface
 from icha.configuration.publication import Publication
-from icha.costs import Cost
-from icha.labels import RunLabels
+from icha.datasets.campaign_file import LABELS
+from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
+from icha.datasets.labels import RunLabels
+from icha.planning.costs import Cost
 from icha.publication.citation import MODEL_PAPER, paragraphs, web_address
 from icha.publication.dictionary import Entry
 from icha.publication.licences import Licence
-from icha.records import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 
 _TEMPLATE = "README.md.jinja"
 # What lies in a deposit, in the order of interest: only what is there is listed.

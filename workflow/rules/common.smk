@@ -31,7 +31,7 @@ from icha.configuration.expansion import (
     surface_settings,
 )
 from icha.configuration.inputs import with_files_beside_it
-from icha.costs import job_threads
+from icha.planning.costs import job_threads
 from icha.publication.attributes import discovery_attributes
 from icha.publication.source import committed_source
 

@@ -2,9 +2,9 @@
 
 from job import guarded
 
-from icha.checks import check_campaign, check_solution, worst, write_checks
-from icha.labels import SolutionLabels
-from icha.records import read_campaign, read_dataset
+from icha.analysis.checks import check_campaign, check_solution, worst, write_checks
+from icha.datasets.files import read_campaign, read_dataset
+from icha.datasets.labels import SolutionLabels
 
 
 def check_results(dataset, solutions, output, *, labels, solution_labels):

@@ -2,8 +2,8 @@
 
 from job import attributes, guarded
 
-from icha.aggregation import compare_campaign
-from icha.records import read_campaign, write_dataset
+from icha.analysis.common_loads import compare_campaign
+from icha.datasets.files import read_campaign, write_dataset
 
 
 def compare_runs(dataset, output, *, attributes):

@@ -6,9 +6,9 @@ import textwrap
 from job import guarded
 
 from icha.configuration.measurement import read_columns
+from icha.datasets.files import read_campaign, read_dataset
 from icha.figures.select import NothingToDraw
 from icha.figures.style import GREY, new_figure, save, styled
-from icha.records import read_campaign, read_dataset
 
 READERS = {
     "campaign": read_campaign,

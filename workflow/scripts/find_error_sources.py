@@ -2,9 +2,9 @@
 
 from job import attributes, guarded
 
-from icha.material import Material
-from icha.records import read_surface, write_dataset
-from icha.reference.error_sources import error_sources
+from icha.asperity.material import Material
+from icha.datasets.files import read_surface, write_dataset
+from icha.references.error_sources import error_sources
 
 
 def find_error_sources(surface, output, *, rms_slope, material, attributes, **settings):

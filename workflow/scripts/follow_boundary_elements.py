@@ -2,9 +2,9 @@
 
 from job import attributes, guarded
 
-from icha.material import Material
-from icha.records import read_surface, write_dataset
-from icha.reference.loops import boundary_element_loop
+from icha.asperity.material import Material
+from icha.datasets.files import read_surface, write_dataset
+from icha.references.loops import boundary_element_loop
 
 
 def follow_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):

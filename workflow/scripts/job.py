@@ -11,8 +11,8 @@ import traceback
 from contextlib import contextmanager
 from pathlib import Path
 
-from icha import integrity
-from icha.files import whole_file
+from icha.support import checksums as integrity
+from icha.support.atomic_files import whole_file
 
 # Set by the Snakefile: the process that wants the job.
 SNAKEMAKE = "ICHA_SNAKEMAKE"
@@ -22,8 +22,8 @@ def _failures_of_solvers():
     """How solvers say that they did not converge. Most jobs do without them, so nothing is imported for this."""
     names = {
         "icha.simulation": "ConvergenceError",
-        "icha.equilibrium": "NotConverged",
-        "icha.reference.boundary_elements": "NotSolved",
+        "icha.equilibrium.equilibrium": "NotConverged",
+        "icha.references.boundary_elements": "NotSolved",
     }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
 

@@ -2,8 +2,8 @@
 
 from job import guarded
 
-from icha.checks import read_checks, refuse_unknown_failures
-from icha.files import whole_file
+from icha.analysis.checks import read_checks, refuse_unknown_failures
+from icha.support.atomic_files import whole_file
 
 
 def judge_results(checks, output, *, known):

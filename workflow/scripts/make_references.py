@@ -2,10 +2,10 @@
 
 from job import attributes, guarded
 
-from icha.material import Material
-from icha.records import read_spectral_moments, write_dataset
-from icha.reference.dataset import reference_dataset
-from icha.spectrum import SelfAffineSpectrum
+from icha.asperity.material import Material
+from icha.datasets.files import read_spectral_moments, write_dataset
+from icha.references.dataset import reference_dataset
+from icha.surfaces.spectrum import SelfAffineSpectrum
 
 
 def make_references(surface, output, *, settings, adhesive, attributes):

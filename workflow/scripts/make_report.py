@@ -6,16 +6,16 @@ from pathlib import Path
 import yaml
 from job import guarded
 
-from icha.checks import read_checks
-from icha.files import whole_file
-from icha.records import read_campaign
-from icha.report import (
+from icha.analysis.checks import read_checks
+from icha.datasets.files import read_campaign
+from icha.report.report import (
     ReportFigure,
     read_benchmarks,
     read_surface_statistics,
     write_report,
     write_times_page,
 )
+from icha.support.atomic_files import whole_file
 
 
 def make_report(

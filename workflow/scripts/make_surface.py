@@ -2,11 +2,11 @@
 
 from job import attributes, guarded
 
-from icha.configuration.height_map import read_height_map
-from icha.records import write_surface
-from icha.spectrum import SelfAffineSpectrum
-from icha.surface import Surface
-from icha.topography import prepared_topography
+from icha.datasets.files import write_surface
+from icha.surfaces.measured.height_map import read_height_map
+from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.spectrum import SelfAffineSpectrum
+from icha.surfaces.surface import Surface
 
 SPECTRUM = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
 

@@ -2,9 +2,9 @@
 
 from job import attributes, guarded
 
-from icha.labels import SolutionLabels
-from icha.model_error import model_error
-from icha.records import read_campaign, read_dataset, write_dataset
+from icha.analysis.model_error import model_error
+from icha.datasets.files import read_campaign, read_dataset, write_dataset
+from icha.datasets.labels import SolutionLabels
 
 
 def measure_model_error(campaign, solutions, output, *, labels, attributes):

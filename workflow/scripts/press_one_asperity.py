@@ -2,8 +2,8 @@
 
 from job import attributes, guarded
 
-from icha.records import write_dataset
-from icha.reference.one_asperity import hertz_asperity, one_asperity
+from icha.datasets.files import write_dataset
+from icha.references.one_asperity import hertz_asperity, one_asperity
 
 
 def press_one_asperity(output, *, tabor_parameter, attributes, progress):

@@ -12,8 +12,8 @@ def publish(archive, *, results, files, named_files, project):
     `named_files` are the files that the configuration names, by their places beside the configuration as used.
     """
     # What is imported at the top is imported for every job of a campaign.
-    from icha.cli.plan import whole_cost
     from icha.configuration.load import load_configuration
+    from icha.planning.plan import whole_cost
     from icha.publication.deposit import make_deposit
     from icha.publication.environment import refuse_other_environment
     from icha.publication.source import committed_source

@@ -2,9 +2,9 @@
 
 from job import attributes, guarded
 
-from icha.material import Material
-from icha.path import Path
-from icha.records import read_surface, write_dataset
+from icha.asperity.material import Material
+from icha.datasets.files import read_surface, write_dataset
+from icha.path.path import Path
 from icha.simulation import ConvergenceError, simulate
 
 

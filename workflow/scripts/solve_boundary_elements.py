@@ -2,9 +2,9 @@
 
 from job import attributes, guarded
 
-from icha.material import Material
-from icha.records import read_surface, write_dataset
-from icha.reference.boundary_elements import boundary_elements
+from icha.asperity.material import Material
+from icha.datasets.files import read_surface, write_dataset
+from icha.references.boundary_elements import boundary_elements
 
 
 def solve_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):

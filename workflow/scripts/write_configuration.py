@@ -4,7 +4,7 @@ import shutil
 
 from job import guarded
 
-from icha.files import whole_file
+from icha.support.atomic_files import whole_file
 
 
 def write_configuration(output, *, text, copies):

@@ -1,0 +1,424 @@
+"""Checks of results: what every run must satisfy, whoever computed it.
+
+They are identities and bounds of the physics, evaluated on the dataset alone.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
+from icha.datasets.campaign import RunLabels, loading_stops, run_labels, select_run
+from icha.datasets.files import MISSING
+from icha.path.path import BETWEEN
+from icha.support.atomic_files import whole_file
+
+RESIDUAL_LIMIT = 1e-8
+IDENTITY_LIMIT = 1e-8
+TARGET_LIMIT = 1e-8
+# The mean gap that carries a load is searched for to 2e-4 of the load.
+LOAD_LIMIT = 1e-3
+# Where spots unite, the same load or area may need the surfaces further apart by a little, in units of h_rms. Where
+# they jump in, by as much as the jump gives: that has no limit.
+SEPARATION_RISE_LIMIT = 1e-2
+# The check of every run of a campaign that it reached its end.
+COMPLETED = "completed"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding: `passed` says whether `value` keeps to `limit`; `subject` is the run it belongs to."""
+
+    name: str
+    value: float
+    limit: float
+    passed: bool
+    description: str
+    subject: str = ""
+
+
+def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
+    """Check a run dataset: finite, converged, on target, monotone, and true to the identities of its distributions.
+
+    Parameters
+    ----------
+    run : a dataset as `icha.simulate` returns it.
+    subject : name of the run in the findings.
+    """
+    checks: list[Check] = []
+
+    def at_most(name, value, limit, description):
+        checks.append(_at_most(name, value, limit, description, subject))
+
+    numbers = [v.values for v in run.variables.values() if v.dtype.kind in "fiu"]
+    at_most(
+        "finite",
+        sum(int(np.count_nonzero(~np.isfinite(values))) for values in numbers),
+        0,
+        "number of values that are not finite",
+    )
+    at_most("steps", int(run.sizes["step"] == 0), 0, "1 if the run has no step at all")
+    if run.sizes["step"] == 0:
+        return tuple(checks)
+
+    at_most("residual", np.max(run["residual"].values), RESIDUAL_LIMIT, "largest equilibrium error over h_rms")
+    at_most("converged", int((run["converged"] != 1).sum()), 0, "number of steps that did not converge")
+    at_most("targets", _miss(run), TARGET_LIMIT, "largest relative distance of a step from its target")
+
+    # The way back is another curve, and so is loading again.
+    loading = run.isel(step=run["leg"].values == 0)
+    adhesive = float(run["surface_energy"]) > 0
+    height = float(run["rms_height"])
+    # Two targets of different kinds may be one state but for the accuracy to which it is reached.
+    at_most(
+        "area rises",
+        _fall_in_loading(loading, "contact_area_fraction"),
+        TARGET_LIMIT,
+        "largest fall of A/A0 within the first loading, between stops or where nothing unites, over its maximum",
+    )
+    if not adhesive:
+        # Adhesion may pull the surfaces together: between stops in separation or area the load is then free to fall.
+        at_most(
+            "pressure rises",
+            _fall_in_loading(loading, "nominal_pressure"),
+            TARGET_LIMIT,
+            "largest fall of the nominal pressure within the first loading, between stops or where nothing unites, "
+            "over its maximum",
+        )
+    rise, rise_at_events = _rises_of_separation(loading)
+    at_most(
+        "separation falls",
+        rise / height,
+        TARGET_LIMIT,
+        "largest rise of the mean separation within the first loading where nothing jumps in or unites, over h_rms",
+    )
+    if not adhesive:
+        at_most(
+            "separation falls where spots unite",
+            rise_at_events / height,
+            SEPARATION_RISE_LIMIT,
+            "largest rise of the mean separation within the first loading where spots unite, over h_rms",
+        )
+    if not adhesive:
+        at_most(
+            "stiffness",
+            int((run["contact_stiffness"] < 0).sum()),
+            0,
+            "number of steps with a negative contact stiffness, without adhesion",
+        )
+    if run.sizes.get("snapshot", 0):
+        for name, value, description in _identities(run):
+            at_most(name, value, IDENTITY_LIMIT, description)
+    if "work" in run:
+        for name, value, limit, description in _cycle(run):
+            at_most(name, value, limit, description)
+    return tuple(checks)
+
+
+def _fall(values):
+    """Largest fall from one value to the next; 0 if there is none."""
+    return float(np.max(-np.diff(values), initial=0.0))
+
+
+def _fall_in_loading(loading, name):
+    """Largest fall of a variable from stop to stop and from step to step, over its largest absolute value.
+
+    Where two spots unite in one, it may carry less than both did at the same separation: a step may fall there, but no
+    stop may.
+    """
+    values, stops = loading[name].values, loading_stops(loading).values
+    united = np.cumsum(np.diff(loading["coalescence_count"].values, prepend=0) != 0)
+    parts = [values[stops], *(values[united == part] for part in np.unique(united))]
+    return max(map(_fall, parts)) / (float(np.max(np.abs(values))) or 1.0)
+
+
+def _rises_of_separation(loading):
+    """Largest rise of the mean separation from step to step, m: where nothing jumps in or unites, and elsewhere."""
+    rise = np.diff(loading["mean_separation"].values)
+    happened = np.diff(loading["jump_in_count"].values) + np.diff(loading["coalescence_count"].values) != 0
+    return tuple(float(np.max(rise[where], initial=0.0)) for where in (~happened, happened))
+
+
+def _miss(run):
+    """Largest relative distance between what was asked of a step and what it has."""
+    scale = float(run["contact_modulus"])
+    reached = {
+        "reduced_pressure": run["reduced_pressure"].values,
+        "relative_load": run["nominal_pressure"].values / scale,
+        "area_fraction": run["contact_area_fraction"].values,
+        "mean_separation": run["mean_separation"].values,
+        BETWEEN: run["mean_separation"].values,
+    }
+    target, kinds = run["step_target"].values, [str(kind) for kind in run["step_kind"].values]
+    value = np.array([reached[kind][k] for k, kind in enumerate(kinds)])
+    # A path may turn back at no load, of which no part can be taken: then it is one of the run's largest load.
+    whole = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
+    return np.max(np.abs(value - target) / np.where(target != 0, np.abs(target), whole))
+
+
+def _identities(run):
+    """Largest errors of the identities between a snapshot's distributions and spots, and its step."""
+    at = run["snapshot_step"].values.astype(int)
+    area = run["contact_area_fraction"].values[at]
+    pressure = run["nominal_pressure"].values[at]
+
+    # Before first contact there is no area to compare with, and both sides are zero.
+    area_scale = np.maximum(area, np.finfo(float).tiny)
+
+    pressure_content = run["pressure_density"].values * np.diff(run["pressure_bin_edges"].values)
+    load = pressure_content * run["pressure_bin_mean"].values
+    gap_content = run["gap_density"].values * np.diff(run["gap_bin_edges"].values)
+    # With adhesion tension and compression nearly cancel: errors are measured against the sum of both.
+    load_scale = np.maximum(np.abs(load).sum(axis=1), np.finfo(float).tiny)
+
+    cell = float(run["period"]) ** 2
+    snapshot = run["spot_snapshot"].values.astype(int)
+    spot_area = np.bincount(snapshot, np.pi * run["spot_radius"].values ** 2 / cell, len(at))
+    spot_load = np.bincount(snapshot, run["spot_force"].values / cell, len(at))
+
+    yield (
+        "area from P(p)",
+        np.max(np.abs(pressure_content.sum(axis=1) - area) / area_scale),
+        "integral of P(p) over p against A/A0",
+    )
+    yield (
+        "load from P(p)",
+        np.max(np.abs(load.sum(axis=1) - pressure) / load_scale),
+        "integral of p P(p) over p against F/A0, over the sum of compression and tension",
+    )
+    overlap = run["overlap_fraction"].values
+    yield (
+        "P(u) complete",
+        np.max(np.abs(gap_content.sum(axis=1) + area - run["area_beyond_edges"].values + overlap - 1)),
+        "integral of P(u) over u, plus A/A0 within the edges, plus overlap, against 1",
+    )
+    yield "area of spots", np.max(np.abs(spot_area - area) / area_scale), "sum of the spots' areas against A/A0"
+    yield (
+        "load of spots",
+        np.max(np.abs(spot_load - pressure) / load_scale),
+        "sum of the spots' forces against F/A0, over the sum of compression and tension",
+    )
+
+
+# What the hysteresis loss of a run consists of.
+LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump", "loss_unattributed")
+# The counts of events in a run, in the order of the flags of `event_kind`.
+EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
+
+
+def _cycle(run):
+    """Findings on the work of a run that goes on after its first loading: name, value, limit, what it is."""
+    # Energies are differences of works: they are as accurate as the largest of those.
+    scale = float(np.max(np.abs(run["work"].values))) or 1.0
+    last = run.isel(step=-1)
+    logged = np.bincount(run["event_kind"].values, minlength=len(EVENT_COUNTS))
+    counted = np.array([int(last[name]) for name in EVENT_COUNTS])
+    yield (
+        "events",
+        np.abs(logged - counted).sum(),
+        0,
+        "number of events that are counted and not logged, or logged only",
+    )
+    # A single jump into contact may be a little uphill: Wu's distance is that of a lone asperity, its images are not.
+    jumps = float(last["dissipated_by_jump_in"] + last["dissipated_by_jump_off"])
+    yield (
+        "jumps lose energy",
+        -min(jumps, 0.0) / scale,
+        IDENTITY_LIMIT,
+        "energy gained in jumps into and out of contact together, over the largest work",
+    )
+    if "hysteresis_loss" not in run:
+        return
+    loss = float(run["hysteresis_loss"])
+    parts = sum(float(run[name]) for name in LOSSES if name in run)
+    yield (
+        "loss adds up",
+        abs(loss - parts) / scale,
+        IDENTITY_LIMIT,
+        "hysteresis loss against its parts, over the largest work",
+    )
+    yield (
+        "loss is the work",
+        abs(loss - float(last["work"])) / scale,
+        IDENTITY_LIMIT,
+        "hysteresis loss against the work done up to complete separation, over the largest work",
+    )
+    yield "separated: spots", float(last["spot_count"]), 0, "number of spots left in contact at the end of unloading"
+    yield (
+        "separated: pressure",
+        abs(float(last["nominal_pressure"])),
+        0,
+        "nominal pressure left at the end of unloading, in Pa",
+    )
+    back = run["nominal_pressure"].values[run["leg"].values == int(last["leg"])]
+    yield (
+        "pull-off pressure",
+        abs(float(run["pull_off_pressure"]) + back.min()) / (np.abs(back).max() or 1.0),
+        IDENTITY_LIMIT,
+        "pull-off pressure against the largest tension of the last unloading, over the largest pressure there",
+    )
+    if float(run["surface_energy"]) == 0 and int(last["coalescence_count"]) == 0:
+        yield (
+            "loop closes",
+            abs(loss) / scale,
+            IDENTITY_LIMIT,
+            "hysteresis loss without adhesion or coalescence, where nothing is irreversible, over the largest work",
+        )
+
+
+def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
+    """Check a campaign dataset: every run there and complete, every variable described, and `check_run` for each.
+
+    A run that failed has one check, which fails and has the reason as its description.
+
+    Parameters
+    ----------
+    tree : the campaign dataset.
+    expected : labels of the runs that the campaign asks for; those of the dataset's own design, if left out.
+    """
+    checks = []
+
+    def none_of(name, count, description, subject):
+        checks.append(Check(name, float(count), 0.0, bool(count == 0), description, subject))
+
+    wanted = None if expected is None else {str(RunLabels(*labels)) for labels in expected}
+    present = run_labels(tree)
+    if wanted is not None:
+        lacking = wanted - {str(labels) for labels in present}
+        none_of(
+            "all runs", len(lacking), "number of runs that the campaign asks for and lacks", ", ".join(sorted(lacking))
+        )
+    for study, node in tree.children.items():
+        missing = np.count_nonzero(node["status"].values == MISSING)
+        none_of("no run missing", missing, "number of runs of the design that are missing", study)
+        variables = node.to_dataset().variables.values()
+        bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in variables)
+        none_of("described", bare, "number of variables without units or long name", study)
+    for labels in present:
+        run = select_run(tree, labels)
+        # What a failed run has is not used; of it there is nothing to say but why it failed.
+        if "incomplete" in run.attrs:
+            checks.append(Check(COMPLETED, 1.0, 0.0, False, run.attrs["incomplete"], str(labels)))
+            continue
+        checks.append(Check(COMPLETED, 0.0, 0.0, True, "the run reached the end of its path", str(labels)))
+        checks.extend(check_run(run, str(labels)))
+    return tuple(checks)
+
+
+def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
+    """Check a boundary-element solution: finite, converged, resolved, at its load, and true to its identities.
+
+    Parameters
+    ----------
+    solution : a dataset as `icha.references.boundary_elements.boundary_elements` returns it.
+    subject : name of the solution in the findings.
+    """
+    gaps = solution["gap_density"].values * np.diff(solution["gap_bin_edges"].values)
+    pressures = solution["pressure_density"].values * np.diff(solution["pressure_bin_edges"].values)
+    loads = pressures * solution["pressure_bin_mean"].values
+    area, nominal = float(solution["contact_area_fraction_raw"]), float(solution["nominal_pressure"])
+    unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
+    asked = float(solution["target_reduced_pressure"]) * unit
+    numbers = [v.values for v in solution.variables.values() if v.dtype.kind in "fiu"]
+    findings = (
+        (
+            "boundary elements: finite",
+            sum(int(np.count_nonzero(~np.isfinite(values))) for values in numbers),
+            0,
+            "number of values that are not finite",
+        ),
+        (
+            "boundary elements: converged",
+            float(solution["residual"]) / float(solution["tolerance"]),
+            1,
+            "error of the solver over the one at which it was to stop",
+        ),
+        ("boundary elements: load", abs(nominal / asked - 1), LOAD_LIMIT, "mean traction against the load asked for"),
+        (
+            "boundary elements: resolved",
+            float(solution["strength_number"]),
+            MAX_STRENGTH_NUMBER,
+            "sqrt(dgamma dx/E*)/range of the grid, 0 without adhesion",
+        ),
+        (
+            "boundary elements: P(u) complete",
+            abs(gaps.sum() + area - 1),
+            IDENTITY_LIMIT,
+            "integral of P(u) over u, plus the nodes in contact, against 1",
+        ),
+        (
+            "boundary elements: area from P(p)",
+            abs(pressures.sum() - area) / max(area, np.finfo(float).tiny),
+            IDENTITY_LIMIT,
+            "integral of P(p) over p against the nodes in contact",
+        ),
+        (
+            "boundary elements: load from P(p)",
+            abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), asked),
+            IDENTITY_LIMIT,
+            "integral of p P(p) over p, plus the traction outside contact, against F/A0, over the sum of both signs",
+        ),
+    )
+    return tuple(_at_most(name, value, limit, description, subject) for name, value, limit, description in findings)
+
+
+def _at_most(name, value, limit, description, subject):
+    """The finding that a value keeps to a limit, or does not."""
+    # A value that is not a number keeps to no limit; it is reported as -1, which no error can be.
+    value = float(value)
+    finite = math.isfinite(value)
+    return Check(name, value if finite else -1.0, float(limit), finite and value <= limit, description, subject)
+
+
+def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
+    """One check of every name: a failed one before passed ones, then the one with the largest value."""
+    found: dict[str, Check] = {}
+    for check in checks:
+        best = found.get(check.name)
+        if best is None or (not check.passed, check.value) > (not best.passed, best.value):
+            found[check.name] = check
+    return tuple(found.values())
+
+
+def told(check: Check) -> str:
+    """A failed check in a line."""
+    if check.name == COMPLETED:
+        return f"{check.subject}: the run failed: {check.description}"
+    return f"{check.subject}: {check.name}: {check.value:.3g} ({check.description}); allowed: at most {check.limit:g}"
+
+
+def refuse_unknown_failures(checks: Iterable[Check], known: Iterable[str]) -> None:
+    """Refuse failed checks of other subjects than those that are known to fail.
+
+    Raises
+    ------
+    ValueError
+        Listing the checks that failed and are not known to, and the subjects that are known to fail and do not.
+    """
+    failed = [check for check in checks if not check.passed]
+    known = list(known)
+    passing = sorted(set(known) - {check.subject for check in failed})
+    lines = [told(check) for check in failed if check.subject not in known]
+    lines += [f"{subject}: is said to fail, and all of its checks passed" for subject in passing]
+    if lines:
+        raise ValueError("\n".join(lines))
+
+
+def write_checks(checks: Iterable[Check], path: str | os.PathLike) -> None:
+    """Write findings to a JSON file."""
+    rows = [asdict(check) for check in checks]
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_checks(path: str | os.PathLike) -> tuple[Check, ...]:
+    """Read findings from a JSON file."""
+    return tuple(Check(**row) for row in json.loads(Path(path).read_text(encoding="utf-8")))

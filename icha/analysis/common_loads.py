@@ -1,0 +1,257 @@
+"""Runs of a study side by side: areas and separations at common loads, and what spreads them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import PchipInterpolator
+
+from icha.datasets.attributes import DERIVED, collected
+from icha.datasets.campaign import LABELS, loading_stops, reduced_gap
+from icha.datasets.files import COMPLETE
+from icha.support.statistics import Ensemble, ensemble
+
+# Loads at which curves are compared, per decade.
+_POINTS_PER_DECADE = 8
+# Points of a mean loop on every way.
+_WAY_POINTS = 200
+# Stops whose loads differ by less than this part, from seed to seed, are stops at the same load.
+_SAME_LOAD = 1e-6
+# The round reduced pressures at which tables quote the results.
+ROUND_PRESSURES = (1e-4, 3.16e-4, 1e-3, 3.16e-3, 1e-2, 3.16e-2, 1e-1)
+
+_AXES = {
+    "reduced_pressure": "nominal pressure over contact modulus and rms slope, p/(E* h'rms)",
+    "relative_load": "nominal pressure over contact modulus, F/(E* A0)",
+}
+_WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
+_AVERAGED = (
+    ("contact_area_fraction", "area", "A/A0"),
+    ("reduced_separation", "separation", "the mean separation over the rms height"),
+)
+_STATISTICS = {
+    "mean": "mean of {} over the seeds",
+    "deviation": "standard deviation of {} over the seeds",
+    "confidence": "half the width of the 95 % band of confidence of the mean of {} over the seeds (Student's t)",
+}
+
+
+def interpolated(load, values, at, *, logarithmic: bool) -> np.ndarray:
+    """Values of a monotone curve at loads `at` within its range, by monotone cubics in the logarithm of the load.
+
+    Parameters
+    ----------
+    load, values : the curve, in any order; loads positive. Of equal loads the first is kept.
+    at : loads within the curve's.
+    logarithmic : whether to interpolate the logarithm of the values, which are then positive.
+
+    Raises
+    ------
+    ValueError
+        If a load lies outside the curve's.
+    """
+    load, first = np.unique(np.asarray(load, float), return_index=True)
+    # Targets of two kinds may be one state: what differs by rounding only cannot carry a slope.
+    apart = np.concatenate([[True], np.diff(load) > 1e-9 * load[1:]])
+    load, values = load[apart], np.asarray(values, float)[first][apart]
+    at = np.asarray(at, float)
+    if at.size and (at.min() < load[0] * (1 - 1e-9) or at.max() > load[-1] * (1 + 1e-9)):
+        raise ValueError(f"loads {at.min():g} to {at.max():g} lie outside the curve's, {load[0]:g} to {load[-1]:g}")
+    x = np.log(np.clip(at, load[0], load[-1]))
+    if len(load) == 1:
+        return np.full(at.shape, values[0])
+    curve = PchipInterpolator(np.log(load), np.log(values) if logarithmic else values)
+    return np.exp(curve(x)) if logarithmic else curve(x)
+
+
+def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Dataset:
+    """Contact area and mean separation of all runs of a study at common loads, and their spread.
+
+    Parameters
+    ----------
+    study : one group of the campaign dataset (`icha.datasets.campaign.campaign_tree`).
+    attrs : further global attributes.
+
+    Returns
+    -------
+    Dataset on two grids of loads, `reduced_pressure` and `relative_load`, each over the range that all complete runs
+    cover (of length zero where there is no such range) between stops of their first loading. On each, with the suffix
+    `_at_load` on the second: `contact_area_fraction` and `reduced_separation` along surface, seed, rms_slope and
+    material; over the seeds mean, standard deviation and half the width of the 95 % band of confidence of both
+    (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`); `material_spread` and
+    `slope_spread`, the largest over the smallest area of all materials (slopes), less one. Runs that are not complete
+    lack values, as `status` says, and do not count; `seed_count` says how many seeds there are of every surface, slope
+    and material. A single one has no deviation and no band: they are missing.
+    """
+    complete = study["status"].transpose(*LABELS).values == COMPLETE
+    pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
+    slope = study["rms_slope"].values[None, None, :, None, None]
+    # Loads of the first, tensile contacts have no logarithm.
+    shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
+    loads = {"reduced_pressure": pressure, "relative_load": pressure * slope}
+    curves = {
+        "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
+        "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
+    }
+
+    variables, coords = (
+        {"status": study["status"], "seed_count": _seed_count(complete)},
+        {label: study[label] for label in LABELS},
+    )
+    for axis, load in loads.items():
+        suffix = "" if axis == "reduced_pressure" else "_at_load"
+        at = _common_grid([load[index][shown[index]] for index in map(tuple, np.argwhere(complete))])
+        coords[axis] = xr.Variable(axis, at, {"units": "1", "long_name": _AXES[axis]})
+        shape = load.shape[:-1]
+        on_grid = {}
+        for name, values in curves.items():
+            result = np.full((*shape, len(at)), np.nan)
+            for index in map(tuple, np.argwhere(complete) if len(at) else ()):
+                result[index] = interpolated(
+                    load[index][shown[index]],
+                    values[index][shown[index]],
+                    at,
+                    logarithmic=name == "contact_area_fraction",
+                )
+            on_grid[name] = result
+            described = {"units": "1", "long_name": f"{study[name].attrs['long_name']}, at {_AXES[axis]}"}
+            variables[name + suffix] = xr.Variable((*LABELS, axis), result, described)
+        area = on_grid["contact_area_fraction"]
+
+        def derived(reduce, label, long_name, axis=axis, area=area):
+            # A reduction over no complete run at all has no value.
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                values = reduce(area, LABELS.index(label))
+            dims = (*(each for each in LABELS if each != label), axis)
+            return xr.Variable(dims, values, {"units": "1", "long_name": f"{long_name}, at {_AXES[axis]}"})
+
+        for name, short, symbol in _AVERAGED:
+            over_seeds = ensemble(on_grid[name], LABELS.index("seed"))
+            for part, words in _STATISTICS.items():
+                attributes = {"units": "1", "long_name": f"{words.format(symbol)}, at {_AXES[axis]}"}
+                if part != "mean":
+                    attributes["missing"] = "where there is a single seed"
+                variables[f"{short}_{part}{suffix}"] = xr.Variable(
+                    (*_WITHOUT_SEED, axis), getattr(over_seeds, part), attributes
+                )
+        for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
+            variables[f"{label.removeprefix('rms_')}_spread{suffix}"] = derived(
+                _spread, label, f"largest over smallest A/A0 of all {many}, less 1"
+            )
+    described = collected(
+        f"Comparison of the runs of study {study.attrs.get('study', '')}".rstrip(),
+        "Contact area and mean separation at loads common to all runs, by monotone interpolation.",
+        DERIVED,
+        [study.attrs],
+    )
+    kept = {name: study.attrs[name] for name in ("study", "license") if study.attrs.get(name)}
+    return xr.Dataset(variables, coords, described | kept | dict(attrs))
+
+
+def _seed_count(complete):
+    count = complete.sum(axis=LABELS.index("seed")).astype(np.int32)
+    return xr.Variable(_WITHOUT_SEED, count, {"units": "1", "long_name": "number of seeds whose runs are complete"})
+
+
+def mean_curve(curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: bool) -> tuple[np.ndarray, Ensemble]:
+    """Mean of the curves of an ensemble, one for each seed, at common positive loads, with its band of confidence.
+
+    Parameters
+    ----------
+    curves : load and values of every member.
+    logarithmic : whether to interpolate the logarithm of the values, which are then positive.
+
+    Returns
+    -------
+    The loads, those of the members where they are the same and else evenly spaced by their logarithm over the range
+    that all cover (none if there is no such range), and the statistics at them.
+    """
+    curves = [(load[load > 0], values[load > 0]) for load, values in curves]
+    loads = [np.sort(load) for load, _ in curves]
+    if all(load.shape == loads[0].shape and np.allclose(load, loads[0], rtol=_SAME_LOAD, atol=0) for load in loads):
+        return loads[0], ensemble([values[np.argsort(load, kind="stable")] for load, values in curves])
+    at = _common_grid(loads)
+    if not len(at):
+        return at, ensemble(np.empty((len(curves), 0)))
+    return at, ensemble([interpolated(load, values, at, logarithmic=logarithmic) for load, values in curves])
+
+
+def mean_way(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, Ensemble]]:
+    """Mean over seeds of reduced pressure and contact area on one leg of a path, at common displacements.
+
+    They are counted from where the leg is loaded most, so that legs that meet there meet in the mean as well. Where a
+    member is separated, pressure and area are zero; ways that end in contact end where the first of them does.
+
+    Parameters
+    ----------
+    ways : the same leg of every member (`icha.figures.select.branches`).
+
+    Returns
+    -------
+    Means of the mean separations over the rms height, in the order of the leg, and the statistics of
+    `reduced_pressure` and `contact_area_fraction` at them.
+    """
+    separations = [way["reduced_separation"].values for way in ways]
+    closest = [float(separation.min()) for separation in separations]
+    falling = separations[0][-1] < separations[0][0]
+    apart = all(float(way["contact_area_fraction"].values[0 if falling else -1]) == 0 for way in ways)
+    reach = max if apart else min
+    at = np.linspace(0, reach(np.ptp(separation) for separation in separations), _WAY_POINTS)
+    found = {}
+    for name in ("reduced_pressure", "contact_area_fraction"):
+        members = []
+        for way, separation, least in zip(ways, separations, closest, strict=True):
+            order = np.argsort(separation, kind="stable")
+            beyond = 0.0 if apart else None
+            members.append(np.interp(least + at, separation[order], way[name].values[order], right=beyond))
+        found[name] = ensemble(members)
+    at = at + np.mean(closest)
+    if not falling:
+        return at, found
+    return at[::-1], {name: Ensemble(*(each[::-1] for each in own)) for name, own in found.items()}
+
+
+def _spread(area, axis):
+    return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
+
+
+def _common_grid(loads):
+    """Loads, evenly spaced by their logarithm, that every run covers; `loads` are those of each, all positive."""
+    if not loads or not all(map(len, loads)):
+        return np.empty(0)
+    lowest = max(float(own.min()) for own in loads)
+    highest = min(float(own.max()) for own in loads)
+    if highest <= lowest:
+        return np.empty(0)
+    count = max(2, round(np.log10(highest / lowest) * _POINTS_PER_DECADE) + 1)
+    return np.geomspace(lowest, highest, count)
+
+
+def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.DataTree:
+    """`compare_runs` for every study of a campaign, as a tree of the same shape."""
+    groups = {f"/{name}": compare_runs(node.to_dataset()) for name, node in tree.children.items()}
+    root = collected(
+        "Comparison of the runs of every study",
+        "Contact area and mean separation of all runs of a study at common loads, a group for each study.",
+        DERIVED,
+        [group.attrs for group in groups.values()],
+    )
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
+
+
+def at_round_pressures(run: xr.Dataset) -> list[tuple[float, float, float]]:
+    """(p*, A/A0, mean separation over h_rms) of a run at the round reduced pressures that its first loading covers."""
+    run = run.isel(step=loading_stops(run).values)
+    load = run["reduced_pressure"].values
+    positive = load > 0
+    if not positive.any():
+        return []
+    load = load[positive]
+    covered = [p for p in ROUND_PRESSURES if load.min() * (1 - 1e-9) <= p <= load.max() * (1 + 1e-9)]
+    area = interpolated(load, run["contact_area_fraction"].values[positive], covered, logarithmic=True)
+    gap = interpolated(load, reduced_gap(run).values[positive], covered, logarithmic=False)
+    return list(zip(covered, area.tolist(), gap.tolist(), strict=True))

@@ -1,0 +1,375 @@
+"""How far the model is from boundary elements on the same topography, at the same load and range of attraction."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Iterable, Mapping
+from functools import cache
+
+import numpy as np
+import xarray as xr
+from scipy.stats import wasserstein_distance
+
+from icha.datasets.attributes import DERIVED, collected
+from icha.datasets.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
+from icha.datasets.campaign import LABELS, RAGGED, find_snapshot, select_run, spots_of
+from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, status_variable
+from icha.datasets.labels import RunLabels, SolutionLabels
+from icha.equilibrium.distributions import nodes_in_discs
+from icha.path.path import REDUCED_PRESSURE
+
+_TITLE = "Error of the model against boundary elements"
+_SUMMARY = "The same topographies, loads and ranges of attraction by the model and by boundary elements."
+
+AXES = (*LABELS, "reduced_pressure")
+
+# What a run and a solution must share for their difference to be the model's error, and to which relative accuracy.
+SHARED = (
+    "period",
+    "rms_height",
+    "rms_slope",
+    "contact_modulus",
+    "surface_energy",
+    "interaction_range",
+)
+_ROUNDING = 1e-6
+
+# name: (further dimensions, units, long name)
+VARIABLES = {
+    "contact_area_fraction": ((), "1", "real over nominal contact area, A/A0, of the model"),
+    "contact_area_fraction_boundary_elements": (
+        (),
+        "1",
+        "real over nominal contact area, A/A0, of boundary elements, corrected by the contact's perimeter",
+    ),
+    "contact_area_fraction_raw": ((), "1", "fraction of the boundary elements' nodes in contact"),
+    "perimeter_correction": (
+        (),
+        "1",
+        "fraction of the nodes in contact over the area corrected by the contact's perimeter, less 1",
+    ),
+    "energetic_area_fraction": (
+        (),
+        "1",
+        "energy of adhesion of boundary elements over that of full contact; the raw area without adhesion",
+    ),
+    "reduced_separation": ((), "1", "mean separation over rms height, of the model"),
+    "reduced_separation_boundary_elements": ((), "1", "mean separation over rms height, of boundary elements"),
+    "area_error": ((), "1", "contact area of the model over that of boundary elements, less 1"),
+    "energetic_area_error": (
+        (),
+        "1",
+        "contact area of the model over the energetic area of boundary elements, less 1; area_error without adhesion",
+    ),
+    "separation_error": ((), "1", "mean separation of the model over that of boundary elements, less 1"),
+    "gap_distribution_distance": (
+        (),
+        "1",
+        "first Wasserstein distance between the distributions of the gap over the nominal area, over rms height; "
+        "contact, and what overlaps in the model, has gap 0",
+    ),
+    "pressure_distribution_distance": (
+        (),
+        "1",
+        "first Wasserstein distance between the distributions of the contact pressure over the nominal area, over the "
+        "nominal pressure",
+    ),
+    "jaccard": ((), "1", "area in contact in both over area in contact in either"),
+    "shared_of_icha": ((), "1", "area in contact in both over area in contact in the model"),
+    "shared_of_boundary_elements": ((), "1", "area in contact in both over area in contact in boundary elements"),
+    "load_error": ((), "1", "nominal pressure of boundary elements over the one asked for, less 1"),
+    "residual": ((), "1", "error of the boundary elements' solver: its criterion of convergence"),
+    "solution_grid": ((), "1", "boundary elements along a side"),
+    "gap_density": (("gap_bin",), "1", "P(u) h_rms of boundary elements, over the nominal area"),
+    "pressure_density": (
+        ("pressure_bin",),
+        "1",
+        "P(p) E* h'rms of boundary elements in contact, over the nominal area",
+    ),
+}
+_BINS = bin_table("gap", "1", "rms height") | bin_table("pressure", "1", "contact modulus and rms slope")
+_INTEGERS = {"solution_grid"}
+# Of these, mean and deviation over the seeds.
+SUMMARISED = (
+    "area_error",
+    "energetic_area_error",
+    "separation_error",
+    "gap_distribution_distance",
+    "pressure_distribution_distance",
+    "jaccard",
+)
+
+
+def model_error(
+    campaign: xr.DataTree,
+    solutions: Iterable[tuple[SolutionLabels | tuple, xr.Dataset]],
+    *,
+    attrs: Mapping[str, str] = {},
+) -> xr.DataTree:
+    """The runs of a campaign beside their boundary-element solutions, state by state.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset; its runs have a snapshot of kind `reduced_pressure` at every solution's load.
+    solutions : pairs of labels (entry, study, surface, seed, rms_slope, material, reduced_pressure) and the solution's
+        dataset (`icha.references.boundary_elements`), in any order.
+    attrs : further global attributes.
+
+    Returns
+    -------
+    DataTree with a group for every entry, along surface, seed, rms_slope, material and reduced_pressure (the one
+    asked for): the variables of `VARIABLES`; for those of `SUMMARISED` the mean over the seeds, `<name>_mean`, and from
+    two seeds on their standard deviation, `<name>_deviation`; modulus, energy, range and Tabor parameter of the runs.
+    `status(surface, seed, rms_slope, material)` says which of these combinations have solutions beside a complete run;
+    elsewhere values are missing, and do not count.
+
+    Raises
+    ------
+    ValueError
+        Naming entry, run and pressure: if a run is not there, has no snapshot at that pressure, or is another contact
+        than the solution's; if a contact lacks a state that others of its entry have, or has one twice.
+    """
+    select = cache(lambda labels: select_run(campaign, labels))
+    entries: dict[str, dict[SolutionLabels, dict]] = {}
+    origins: dict[str, list[dict[str, str]]] = {}
+    for labels, solution in solutions:
+        labels = SolutionLabels(*labels)
+        states = entries.setdefault(labels.entry, {})
+        if labels in states:
+            raise ValueError(f"{_name(labels)}: this solution is given twice")
+        try:
+            run = select(labels.run)
+            if "incomplete" in run.attrs:
+                states[labels] = None
+                continue
+            at = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
+            if not np.isclose(float(solution["target_reduced_pressure"]), labels.reduced_pressure, rtol=1e-9):
+                asked = float(solution["target_reduced_pressure"])
+                raise ValueError(f"the solution is one of reduced pressure {asked:g}")
+            states[labels] = compare_state(run, at, solution)
+        except ValueError as error:
+            raise ValueError(f"{_name(labels)}: {error}") from None
+        origins.setdefault(labels.entry, []).extend((run.attrs, solution.attrs))
+    if not entries:
+        raise ValueError("a model error needs at least one boundary-element solution")
+    groups = {
+        f"/{entry}": _entry_dataset(campaign, entry, states).assign_attrs(
+            collected(f"{_TITLE}, entry {entry}", _SUMMARY, DERIVED, origins.get(entry, []))
+        )
+        for entry, states in entries.items()
+    }
+    root = collected(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
+
+
+def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
+    """The variables of `VARIABLES` for one snapshot of a run and the boundary-element solution of the same state.
+
+    Raises
+    ------
+    ValueError
+        If they are not the same contact, or the solution has no contact or no gap to be compared with.
+    """
+    check_same_contact(run, solution)
+    state = state_of(run, snapshot)
+    area, truth = (float(each["contact_area_fraction"]) for each in (state, solution))
+    separation, true_separation = (float(each["reduced_separation"]) for each in (state, solution))
+    for name, value in (("contact area", truth), ("mean separation", true_separation)):
+        if not value > 0:
+            raise ValueError(f"boundary elements have a {name} of {value:g}, relative to which there is no error")
+    # Around the area of zero gap the attraction acts; of the two areas the energetic one tends to JKR's sooner as the
+    # range vanishes.
+    adhesive = float(solution["surface_energy"]) > 0
+    raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
+    spots = contact_of_spots(run, snapshot, solution.sizes["x"])
+    contact = solution["contact"].transpose("y", "x").values == 1
+    height = float(solution["rms_height"])
+    pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
+    return {
+        "contact_area_fraction": area,
+        "contact_area_fraction_boundary_elements": truth,
+        "contact_area_fraction_raw": raw,
+        "perimeter_correction": raw / truth - 1,
+        "energetic_area_fraction": energetic,
+        "reduced_separation": separation,
+        "reduced_separation_boundary_elements": true_separation,
+        "area_error": area / truth - 1,
+        "energetic_area_error": area / (energetic if adhesive else truth) - 1,
+        "separation_error": separation / true_separation - 1,
+        "gap_distribution_distance": gap_distribution_distance(state, solution) / height,
+        "pressure_distribution_distance": pressure_distribution_distance(state, solution)
+        / float(state["nominal_pressure"]),
+        "jaccard": jaccard(spots, contact),
+        "shared_of_icha": shared(spots, contact),
+        "shared_of_boundary_elements": shared(contact, spots),
+        "load_error": float(solution["load_error"]),
+        "residual": float(solution["residual"]),
+        "solution_grid": int(solution["grid"]),
+        "gap_density": solution["gap_density"].values * height,
+        "pressure_density": solution["pressure_density"].values * pressure,
+    }
+
+
+def check_same_contact(run: xr.Dataset, solution: xr.Dataset) -> None:
+    """Raise ValueError unless a run and a solution are of the same topography, half-space and attraction."""
+    for name in SHARED:
+        own, other = float(run[name]), float(solution[name])
+        if not np.isclose(own, other, rtol=_ROUNDING, atol=0):
+            units = run[name].attrs.get("units", "1")
+            raise ValueError(f"{name} is {own:.7g} for the run, {other:.7g} for the solution (in {units})")
+    if int(solution["seed"]) != int(run["seed"]):
+        raise ValueError(f"seed is {int(run['seed'])} for the run, {int(solution['seed'])} for the solution")
+
+
+def run_of_same_contact(runs: Iterable[tuple[RunLabels, xr.Dataset]], solution: xr.Dataset) -> RunLabels:
+    """Labels of the first run that is of the same contact as a solution.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    for labels, run in runs:
+        try:
+            check_same_contact(run, solution)
+        except ValueError:
+            continue
+        return labels
+    names = ("contact_modulus", "surface_energy", "interaction_range", "rms_slope", "seed")
+    values = ", ".join(f"{name} {float(solution[name]):g}" for name in names)
+    raise ValueError(f"no run is of the same contact as the boundary elements of {values}")
+
+
+def state_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
+    """What a run has of one snapshot, under the names of a boundary-element solution; without spots and events."""
+    step = int(run["snapshot_step"].values[snapshot])
+    return run.drop_dims(RAGGED, errors="ignore").isel(snapshot=snapshot, step=step)
+
+
+def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
+    """Which nodes of a grid, (n, n) of bool along y and x, lie inside the spots of a snapshot."""
+    spots = spots_of(run, snapshot)
+    centres = np.column_stack([spots["spot_x"].values, spots["spot_y"].values])
+    return nodes_in_discs(float(run["period"]), grid, centres, spots["spot_radius"].values)
+
+
+def jaccard(one: np.ndarray, other: np.ndarray) -> float:
+    """Nodes in both maps over nodes in either; 1 where both maps are empty, which then agree."""
+    either = np.count_nonzero(one | other)
+    return np.count_nonzero(one & other) / either if either else 1.0
+
+
+def shared(one: np.ndarray, other: np.ndarray) -> float:
+    """Nodes in both maps over nodes in the first; 1 where the first is empty, of which nothing is missing."""
+    own = np.count_nonzero(one)
+    return np.count_nonzero(one & other) / own if own else 1.0
+
+
+def gap_distribution_distance(one: xr.Dataset, other: xr.Dataset) -> float:
+    """First Wasserstein distance between two P(u) over the nominal area, m.
+
+    It is the area between the cumulative distributions. Contact, and what overlaps outside it, has gap zero; a bin
+    stands at the geometric mean of its edges.
+    """
+    (u, weights), (v, other_weights) = _gaps(one), _gaps(other)
+    return float(wasserstein_distance(u, v, weights, other_weights))
+
+
+def pressure_distribution_distance(one: xr.Dataset, other: xr.Dataset) -> float:
+    """First Wasserstein distance between two P(p) over the nominal area, Pa.
+
+    The area out of contact has pressure zero, whatever attracts there; a bin stands at its mean pressure.
+    """
+    (p, weights), (q, other_weights) = _pressures(one), _pressures(other)
+    return float(wasserstein_distance(p, q, weights, other_weights))
+
+
+def _gaps(state):
+    """Gaps, m, and the parts of the nominal area that have them: contact and overlap first, then the bins."""
+    edges = state["gap_bin_edges"].values
+    content = state["gap_density"].values * np.diff(edges)
+    return np.concatenate([[0.0], np.sqrt(edges[1:] * edges[:-1])]), _whole(content)
+
+
+def _pressures(state):
+    """Pressures, Pa, and the parts of the nominal area that have them: what is out of contact first, then the bins."""
+    content = state["pressure_density"].values * np.diff(state["pressure_bin_edges"].values)
+    return np.concatenate([[0.0], state["pressure_bin_mean"].values]), _whole(content)
+
+
+def _whole(content):
+    """The bins' content with the rest of the nominal area before it."""
+    return np.concatenate([[max(1.0 - float(content.sum()), 0.0)], content])
+
+
+def _name(labels):
+    return f"entry {labels.entry}, run {labels.run}, reduced pressure {labels.reduced_pressure:g}"
+
+
+def _entry_dataset(campaign, entry, states):
+    """The states of one entry as full arrays along `AXES`, in the order of the campaign's labels.
+
+    Those of runs that failed are None.
+    """
+    studies = sorted({labels.study for labels in states})
+    if len(studies) > 1:
+        raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")
+    study = campaign[studies[0]].to_dataset()
+    asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
+    axes = {label: [value for value in study[label].values.tolist() if value in asked[label]] for label in LABELS}
+    axes["rms_slope"] = sorted(asked["rms_slope"])
+    axes["reduced_pressure"] = sorted(asked["reduced_pressure"])
+    grid = [SolutionLabels(entry, studies[0], *values) for values in itertools.product(*axes.values())]
+    contacts = {labels.run for labels in states}
+    if missing := [labels for labels in grid if labels.run in contacts and labels not in states]:
+        raise ValueError(f"{_name(missing[0])}: no solution, nor of {len(missing) - 1} other states of this entry")
+
+    shape = tuple(map(len, axes.values()))
+    coords = {
+        label: xr.Variable(label, np.array(axes[label], dtype=study[label].dtype), study[label].attrs)
+        for label in LABELS
+    }
+    coords["reduced_pressure"] = _variable(
+        ("reduced_pressure",), axes["reduced_pressure"], "1", "reduced pressure asked for, p/(E* h'rms)"
+    )
+    of_contact = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
+    status = np.array(of_contact, np.int8).reshape(shape)[..., 0]
+    variables = {"status": status_variable(LABELS, status)}
+    bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
+    for name, (dims, units, long_name) in VARIABLES.items():
+        unknown = np.full([bins[dim] for dim in dims], np.nan)
+        values = np.array([unknown if states.get(labels) is None else states[labels][name] for labels in grid])
+        variables[name] = _variable(AXES + dims, values.reshape(shape + values.shape[1:]), units, long_name)
+        if name in _INTEGERS and values.dtype.kind == "f":
+            variables[name].encoding["dtype"] = np.dtype("int32")
+    seeds = AXES.index("seed")
+    others = tuple(axis for axis in AXES if axis != "seed")
+    for name in SUMMARISED:
+        values, long_name = variables[name].values, VARIABLES[name][2]
+        # Of no complete run there is no mean.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            mean = np.nanmean(values, axis=seeds)
+            deviation = np.nanstd(values, axis=seeds, ddof=1) if len(axes["seed"]) > 1 else None
+        variables[f"{name}_mean"] = _variable(others, mean, "1", f"mean over the seeds: {long_name}")
+        if deviation is not None:
+            described = f"standard deviation over the seeds: {long_name}"
+            variables[f"{name}_deviation"] = _variable(others, deviation, "1", described)
+            variables[f"{name}_deviation"].attrs["missing"] = "where fewer than two runs are complete"
+    edges = bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS)
+    variables |= {name: _variable(dims, edges[name], units, text) for name, (dims, units, text) in _BINS.items()}
+    result = with_bounds(xr.Dataset(variables, coords, {"entry": entry, "study": studies[0]}))
+    own = study.sel(surface=axes["surface"], seed=axes["seed"], material=axes["material"])
+    own = own.sel(rms_slope=axes["rms_slope"], method="nearest").assign_coords(rms_slope=result["rms_slope"])
+    for name in ("contact_modulus", "surface_energy", "interaction_range", "tabor_parameter"):
+        result[name] = own[name]
+    return result
+
+
+def _status(state):
+    return INCOMPLETE if state is None else COMPLETE
+
+
+def _variable(dims, values, units, long_name):
+    return xr.Variable(dims, values, {"units": units, "long_name": long_name})

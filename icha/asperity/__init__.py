@@ -1,0 +1,1 @@
+"""One contact spot: material, law, and what becomes of two that overlap."""

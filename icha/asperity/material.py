@@ -1,0 +1,45 @@
+"""The elastic half-space and the interface: three numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from icha.support.validation import not_negative, positive
+
+
+@dataclass(frozen=True)
+class Material:
+    """Composite elastic modulus, adhesion energy and range of attraction of an interface.
+
+    Parameters
+    ----------
+    contact_modulus : E*, composite elastic modulus, Pa; positive.
+    surface_energy : energy of adhesion per unit area, J/m^2; zero is adhesionless contact.
+    interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m; positive.
+
+    Raises
+    ------
+    ValueError
+        Naming the parameter whose value is not allowed.
+    """
+
+    contact_modulus: float
+    surface_energy: float
+    interaction_range: float
+
+    def __post_init__(self):
+        """Check the values."""
+        object.__setattr__(self, "contact_modulus", positive("contact_modulus", self.contact_modulus, "Pa"))
+        object.__setattr__(self, "surface_energy", not_negative("surface_energy", self.surface_energy, "J/m^2"))
+        object.__setattr__(self, "interaction_range", positive("interaction_range", self.interaction_range, "m"))
+
+    @property
+    def adhesion_length(self) -> float:
+        """Surface energy over contact modulus, m: the elasto-adhesive length."""
+        return self.surface_energy / self.contact_modulus
+
+    def tabor_parameter(self, radius):
+        """mu = (gamma^2 R/E*^2)^(1/3)/epsilon of paraboloids of radius R (m), of any shape (after eq. 3)."""
+        return np.cbrt(self.adhesion_length**2 * radius) / self.interaction_range

@@ -1,0 +1,1 @@
+"""What is kept: variables, attributes and netCDF files of surfaces, runs and campaigns."""

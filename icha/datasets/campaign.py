@@ -1,0 +1,146 @@
+"""The campaign dataset: the runs of every study as full arrays along surface, seed, rms slope and material."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from icha.datasets.campaign_file import LABELS, RAGGED, write_campaign
+from icha.datasets.files import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, read_campaign
+from icha.datasets.labels import RunLabels
+from icha.path.path import BETWEEN
+
+
+def campaign_tree(
+    runs: Iterable[tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]],
+    *,
+    design: Iterable[RunLabels | tuple] | None = None,
+    attrs: Mapping[str, str] = {},
+) -> xr.DataTree:
+    """The campaign dataset of some runs in memory; arguments and errors as `icha.datasets.campaign_file.write_campaign`."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "campaign.nc")
+        write_campaign(runs, path, design=design, attrs=attrs)
+        return read_campaign(path).load()
+
+
+def run_labels(tree: xr.DataTree) -> list[RunLabels]:
+    """Labels of all runs in a campaign dataset, complete or not, in its order."""
+    found = []
+    for study, node in tree.children.items():
+        axes = [node[label].values.tolist() for label in LABELS]
+        there = np.isin(node["status"].transpose(*LABELS).values, (COMPLETE, INCOMPLETE))
+        found += [
+            RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True)))
+            for index in np.argwhere(there).tolist()
+        ]
+    return found
+
+
+def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
+    """Take one run out of a campaign dataset, with the steps that it has and its own spots.
+
+    One that is incomplete has the reason in its attribute `incomplete`, as its file has.
+
+    Raises
+    ------
+    ValueError
+        If the campaign has no such run; the message says what it has.
+    """
+    labels = RunLabels(*labels)
+    if labels.study not in tree.children:
+        raise ValueError(f"no study {labels.study!r}; there are {', '.join(tree.children)}")
+    study = tree.children[labels.study].dataset
+    index = {label: _position(study, labels, label) for label in LABELS}
+    place = tuple(index.values())
+    status, steps, failure = (study.variables[name].transpose(*LABELS)[place] for name in _OF_THE_CAMPAIGN)
+    if int(status) in (MISSING, NOT_IN_DESIGN):
+        raise ValueError(f"{labels}: this run is {'missing' if int(status) == MISSING else 'not in the design'}")
+    part = (
+        index | {"step": slice(0, int(steps))} | {dim: _own(study, dim, place) for dim in RAGGED if dim in study.dims}
+    )
+    incomplete = int(status) == INCOMPLETE
+    if incomplete:
+        there = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
+        part["snapshot"] = np.flatnonzero(np.isfinite(there))
+    left_out = {*_OF_THE_CAMPAIGN, *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
+    variables = {}
+    for name, variable in study.variables.items():
+        if name in left_out:
+            continue
+        own = variable[tuple(part.get(dim, slice(None)) for dim in variable.dims)].load()
+        if incomplete and own.ndim == 0 and own.dtype.kind == "f" and np.isnan(own.values):
+            continue  # not known of a run that ended early
+        if own.dtype.kind == "f" and own.encoding.get("dtype") == np.dtype("int32"):
+            own = xr.Variable(own.dims, own.values.astype(np.int32), own.attrs)  # a float for other runs that lack it
+        variables[name] = own
+    coords = {name: variables.pop(name) for name in study.coords if name not in LABELS}
+    attrs = study.attrs | ({"incomplete": failure.item()} if incomplete else {})
+    return xr.Dataset(variables, coords, attrs)
+
+
+# What the dataset of a campaign says of a run.
+_OF_THE_CAMPAIGN = ("status", "step_count", "failure")
+
+
+def _position(study, labels, label):
+    """Where a run stands along a label."""
+    values, wanted = study.variables[label].values, getattr(labels, label)
+    at = np.flatnonzero(np.isclose(values, wanted, rtol=1e-9) if label == "rms_slope" else values == wanted)
+    if not len(at):
+        there = ", ".join(f"{value:g}" if label == "rms_slope" else str(value) for value in values)
+        raise ValueError(f"study {labels.study}: no {label} {wanted!r}; there are {there}")
+    return int(at[0])
+
+
+def _own(study, dim, place):
+    """Where a run's spots or events are: all runs' follow each other in the order of the labels."""
+    begin, end = 0, study.sizes[dim]
+    for label, k in zip(LABELS, place, strict=True):
+        column = study.variables[f"{dim}_{label}"].values[begin:end]
+        begin, end = begin + np.searchsorted(column, k, "left"), begin + np.searchsorted(column, k, "right")
+    return slice(int(begin), int(end))
+
+
+def reduced_gap(data: xr.Dataset) -> xr.DataArray:
+    """Mean gap over rms height: what figures and comparisons show as separation of a run or of all runs of a study.
+
+    Of a periodic surface it is the mean separation over the rms height; of a free square, whose separation is that of
+    the half-space far away, it is the one that can be compared with others.
+    """
+    gap = (data["mean_gap"] / data["rms_height"]).transpose(*data["reduced_separation"].dims)
+    return data["reduced_separation"].where(data["boundary"] != "free", gap)
+
+
+def loading_stops(data: xr.Dataset) -> xr.DataArray:
+    """Which steps of a run, or of all runs of a study, are stops of the first loading, and not between stops."""
+    return (data["leg"] == 0) & (data["step_kind"] != BETWEEN)
+
+
+def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
+    """Position of the snapshot of a kind and target; the first one of the kind, or of all, if nothing more is said.
+
+    Raises
+    ------
+    ValueError
+        If there is none; the message lists the run's snapshots.
+    """
+    kinds = [str(value) for value in run["snapshot_kind"].values]
+    targets = run["snapshot_target"].values
+    for k, (own_kind, own_target) in enumerate(zip(kinds, targets, strict=True)):
+        if kind in (None, own_kind) and (target is None or np.isclose(own_target, target, rtol=1e-9)):
+            return k
+    there = ", ".join(f"{k} {t:g}" for k, t in zip(kinds, targets, strict=True)) or "none"
+    asked = kind or "any kind"
+    raise ValueError(f"no snapshot of {asked}{'' if target is None else f' {target:g}'}; there are: {there}")
+
+
+def spots_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
+    """The spots of one snapshot of a run."""
+    own = [name for name, variable in run.variables.items() if variable.dims == ("spot",)]
+    return run[own].isel(spot=np.flatnonzero(run["spot_snapshot"].values == snapshot))

@@ -1,0 +1,341 @@
+"""What is kept: surfaces, runs and whole campaigns as netCDF-4 files.
+
+A file appears whole or not at all, holds no value that is not finite except where it says that a run is
+missing or has no more steps, and has the same bytes whenever it is written from the same values.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from contextlib import contextmanager
+
+import netCDF4
+import numpy as np
+import xarray as xr
+
+from icha.datasets.attributes import INPUT, discovery
+from icha.datasets.bins import BOUND
+from icha.datasets.netcdf import (
+    COMPRESSION,
+    FLOAT_FILL,
+    INTEGER_FILL,
+    LEAST_COMPRESSED,
+    characters,
+    coordinates_of,
+    define_dimensions,
+    define_numbers,
+    define_text,
+    is_text,
+)
+from icha.support.atomic_files import whole_file
+from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, ring_edges, spectral_moments
+from icha.surfaces.surface import PERIODIC, Surface
+
+# Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
+_COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
+# Bytes of an array from which on it is not read as a whole.
+_LEFT_IN_FILE = 2**26
+
+COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN = range(4)
+STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design")
+STATUS_ATTRIBUTES = {
+    "units": "1",
+    "long_name": "status of the run",
+    "flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8),
+    "flag_meanings": " ".join(STATUS_MEANINGS),
+    "comment": "values that a run does not have are filled with _FillValue",
+}
+
+# Dimensions and values of variables by name; texts are characters, along a last dimension without a name.
+Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
+
+
+def status_variable(dims: tuple[str, ...], values: np.ndarray) -> xr.Variable:
+    """What became of every run, as positions in `STATUS_MEANINGS`. Those that are not complete may lack values."""
+    return xr.Variable(dims, values.astype(np.int8), STATUS_ATTRIBUTES)
+
+
+def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
+    """Write a dataset or a tree of datasets to the netCDF-4 file `path`.
+
+    Raises
+    ------
+    ValueError
+        If a variable lacks units or holds a value that is not finite. A run that is not complete by the dataset's
+        `status` may lack values, none has any beyond its `step_count` steps, and a variable whose attribute `missing`
+        says why may lack some, too; those are written as the variable's `_FillValue`.
+    """
+    nodes = {"/": data}
+    if isinstance(data, xr.DataTree):
+        nodes = {node.path: node.to_dataset(inherit=False) for node in data.subtree}
+    for group, dataset in nodes.items():
+        _refuse_values_not_finite(dataset, f"{path}" if group == "/" else f"{path}, group {group}")
+    with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
+        # All variables are written whole.
+        file.set_fill_off()
+        defined = [
+            variable
+            for group, dataset in nodes.items()
+            for variable in _define(file if group == "/" else file.createGroup(group), dataset)
+        ]
+        for variable, values in defined:
+            variable[...] = values
+
+
+def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.Variable, np.ndarray]]:
+    """Make the dimensions and variables of a dataset in a group of a file; give them with what is to be written."""
+    define_dimensions(group, dataset.sizes)
+    group.setncatts(dataset.attrs)
+    coordinates = coordinates_of(dataset.variables, dataset.coords)
+    defined = []
+    for name, variable in dataset.variables.items():
+        attrs = variable.attrs | ({"coordinates": coordinates[name]} if name in coordinates else {})
+        if is_text(variable.dtype):
+            values = characters(variable.values)
+            defined.append((define_text(group, name, variable.dims, values.shape[-1], attrs), values))
+            continue
+        values, storage = variable.values, {}
+        if variable.dtype.kind == "f" and np.isnan(values).any():
+            whole = variable.encoding.get("dtype") == np.dtype("int32")
+            storage["fill_value"] = INTEGER_FILL if whole else FLOAT_FILL
+            values = np.where(np.isnan(values), storage["fill_value"], values)
+            values = values.astype(np.int32) if whole else values
+        if variable.size in _COMPRESSED_SIZES:
+            storage |= COMPRESSION
+        defined.append((define_numbers(group, name, variable.dims, values.dtype, attrs, **storage), values))
+    return defined
+
+
+def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
+    excused = dataset["status"] != COMPLETE if "status" in dataset.data_vars else None
+    for name, variable in dataset.variables.items():
+        if "units" not in variable.attrs:
+            raise ValueError(f"{where}: variable {name!r} has no units")
+        if variable.dtype.kind not in "fc":
+            continue
+        bad = ~np.isfinite(variable.values)
+        if "missing" in variable.attrs:
+            bad &= ~np.isnan(variable.values)
+        if excused is not None and set(variable.dims) & set(excused.dims):
+            # A value that several runs share is missing where all of them are.
+            may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
+            may_lack = may_lack.set_dims(dict(zip(variable.dims, variable.shape, strict=True))).values
+            if "step" in variable.dims:
+                beyond = dataset["step"] >= dataset["step_count"]
+                may_lack = may_lack | beyond.transpose(*variable.dims).values
+            bad &= ~(may_lack & np.isnan(variable.values))
+        if bad.any():
+            first = ", ".join(f"{dim}={index}" for dim, index in zip(variable.dims, np.argwhere(bad)[0], strict=True))
+            raise ValueError(
+                f"{where}: variable {name!r} holds {np.count_nonzero(bad)} of {bad.size} values that are not finite"
+                + (f", the first at {first}" if first else "")
+            )
+
+
+def read_dataset(path: str | os.PathLike) -> xr.Dataset:
+    """Read a netCDF file of one group into memory.
+
+    Raises
+    ------
+    ValueError
+        If there is no such file or it cannot be read.
+    """
+    return _read(xr.load_dataset, path)
+
+
+def read_campaign(path: str | os.PathLike) -> xr.DataTree:
+    """Read a campaign dataset into memory, but for large arrays; errors as `read_dataset`.
+
+    What takes more than 64 MB, as distributions of thousands of runs do, stays in the file until it is used; of a
+    single run (`icha.datasets.campaign.select_run`) only its own part is then read.
+    """
+    return _read(_load_small, path)
+
+
+def _load_small(path, engine):
+    tree = xr.open_datatree(path, engine=engine)
+    variables = [variable for node in tree.subtree for variable in node.variables.values()]
+    for variable in variables:
+        if variable.nbytes <= _LEFT_IN_FILE:
+            variable.load()
+    if all(variable.nbytes <= _LEFT_IN_FILE for variable in variables):
+        tree.close()
+    return tree
+
+
+def _read(load, path):
+    with _readable(path):
+        return load(path, engine="netcdf4")
+
+
+@contextmanager
+def _readable(path):
+    """Name the file that cannot be read."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise ValueError(f"{path}: no such file") from None
+    except (OSError, RuntimeError) as error:
+        raise ValueError(f"{path}: not a readable netCDF file ({error})") from None
+
+
+def read_run(path: str | os.PathLike) -> xr.Dataset:
+    """Read a run dataset as `icha.simulate` returned it.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or is not a run dataset.
+    """
+    run = read_dataset(path)
+    _check_is_run(run.variables, path)
+    return run
+
+
+def read_run_values(path: str | os.PathLike) -> tuple[Values, dict]:
+    """Read the values of a run dataset and its attributes, without those of its variables: quickly.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or is not a run dataset.
+    """
+    with _readable(path), netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        file.set_auto_chartostring(False)
+        _check_is_run(file.variables, path)
+        values = {
+            name: (variable.dimensions[: -1 if variable.dtype == "S1" else None], variable[...])
+            for name, variable in file.variables.items()
+        }
+        return values, {name: file.getncattr(name) for name in file.ncattrs()}
+
+
+def _check_is_run(variables, path):
+    for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
+        if name not in variables:
+            raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")
+
+
+def write_surface(
+    path: str | os.PathLike,
+    surface: Surface,
+    *,
+    name: str,
+    seed: int,
+    spectrum=None,
+    measured=None,
+    attrs: Mapping[str, str] = {},
+) -> None:
+    """Write a topography, its statistics and power spectrum, and where it comes from.
+
+    Parameters
+    ----------
+    path : the file.
+    surface : the topography; the campaigns keep it at rms slope 1.
+    name, seed : what the campaign calls it.
+    spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` that it realises, if any.
+    measured : the `icha.surfaces.measured.topography.PreparedTopography` whose heights, scaled, it has, if any.
+    attrs : further global attributes.
+    """
+    n = surface.grid
+    nodes = np.arange(n) * surface.spacing
+
+    def variable(dims, value, units, long_name):
+        return xr.Variable(dims, value, {"units": units, "long_name": long_name})
+
+    moments = spectral_moments(surface)
+    wave_number, power = radial_power_spectrum(surface)
+    edges = ring_edges(surface)
+    rings = "rad m^-1", "wave number of a ring of wave vectors"
+    variables = {
+        "height": variable(("y", "x"), surface.heights, "m", "height towards the elastic body"),
+        "period": variable((), surface.period, "m", "side of the periodic cell, or of the free square"),
+        "grid": variable((), np.int32(n), "1", "nodes along a side"),
+        "seed": variable((), np.int32(seed), "1", "seed of the random phases"),
+        "rms_slope": variable((), surface.rms_slope, "1", "root mean square slope"),
+        "rms_height": variable((), surface.rms_height, "m", "root mean square height"),
+        "rms_curvature": variable((), surface.rms_curvature, "m^-1", "root mean square curvature of a profile"),
+        "spectral_moment_0": variable((), moments.m0, "m^2", "variance of a profile's height"),
+        "spectral_moment_2": variable((), moments.m2, "1", "variance of a profile's slope"),
+        "spectral_moment_4": variable((), moments.m4, "m^-2", "variance of a profile's curvature"),
+        "nayak_parameter": variable((), moments.nayak_parameter, "1", "Nayak's parameter m0 m4/m2^2"),
+        "psd_wavevector_bounds": variable(("psd_bin", BOUND), np.column_stack([edges[:-1], edges[1:]]), *rings),
+        "power_spectrum": variable(
+            "psd_bin",
+            power,
+            "m^4",
+            "isotropic power spectrum C(q); its integral over the plane is the variance of height",
+        ),
+    }
+    if spectrum is not None:
+        variables |= {
+            "rolloff_wavelength": variable((), spectrum.rolloff_wavelength, "m", "roll-off wavelength"),
+            "short_wavelength": variable((), spectrum.short_wavelength, "m", "short cut-off wavelength"),
+            "hurst": variable((), spectrum.hurst, "1", "Hurst exponent"),
+        }
+    if measured is not None:
+        variables["measured_rms_slope"] = variable(
+            (), measured.rms_slope, "1", "root mean square slope of the measurement as prepared, before scaling"
+        )
+    coords = {axis: variable((axis,), nodes, "m", f"{axis} of the nodes") for axis in ("x", "y")}
+    coords["psd_wavevector"] = variable("psd_bin", wave_number, *rings)
+    coords["psd_wavevector"].attrs |= {
+        "bounds": "psd_wavevector_bounds",
+        "comment": "mean over the ring's wave vectors",
+    }
+    kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
+    if measured is not None:
+        kind = "Measured topography"
+        origin = {
+            "source_file": measured.source_file,
+            "source_sha256": measured.source_sha256,
+            "preparation": measured.description,
+        }
+    described = discovery(
+        f"Topography {name}, seed {seed}",
+        f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
+        INPUT,
+        keywords=["topography"],
+    )
+    origin |= {"surface": name, "boundary": surface.boundary}
+    write_dataset(xr.Dataset(variables, coords, described | origin | dict(attrs)), path)
+
+
+def read_surface(path: str | os.PathLike) -> Surface:
+    """Read the topography of a surface file.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, lacks heights or period, or its heights are not finite, not square or flat.
+    """
+    dataset = read_dataset(path)
+    for name in ("height", "period"):
+        if name not in dataset:
+            raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
+    try:
+        heights = dataset["height"].transpose("y", "x").values
+        return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
+    """Read the spectral moments of a surface file, without its heights.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or does not hold them.
+    """
+    names = [f"spectral_moment_{order}" for order in (0, 2, 4)]
+
+    def load(path, engine):
+        with xr.open_dataset(path, engine=engine) as dataset:
+            if missing := [name for name in names if name not in dataset]:
+                raise ValueError(f"{path}: not a surface file, it has no variable {missing[0]!r}")
+            return SpectralMoments(*(float(dataset[name]) for name in names))
+
+    return _read(load, path)

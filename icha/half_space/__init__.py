@@ -1,0 +1,1 @@
+"""The elastic half-space between the spots: who displaces whom by how much."""

@@ -1,0 +1,311 @@
+"""Displacement of the half-space at all nodes of a grid, and the spots around which something changes there.
+
+The sum over spots and images is split as in `icha.half_space.interaction`: a smooth half through its Fourier series and a
+short-ranged half around every spot. A field has as many targets as nodes, so that the area of the windows around the
+spots is what it costs, and many moments of a spot's pressure pay: four of them represent it from five radii on. In
+return the smooth half of a large spot must be smooth on the scale of that spot: spots are put into groups of like
+size, every group with a Fourier series of its own length.
+
+With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot far away displaces by sum_k M_k Lap^k (1/(pi E* r)),
+and its Fourier transform is that of a point with sum_k M_k (-q^2)^k in the place of its force.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import finufft
+import numpy as np
+import scipy.fft
+from scipy.special import beta, erf
+
+from icha.asperity.jkr import JKR
+from icha.half_space.free_square import basis, image_field
+from icha.half_space.interaction import _short_mean, _smooth_mode, cell_of
+from icha.support.parallel import blocks, on_cores
+
+# Cut of both halves of the Ewald sum: erfc(4.6) = 8e-11.
+_CUT = 4.6
+_NUFFT_TOLERANCE = 1e-12
+# Radii of a spot from which its moments represent it, with an error of 1e-8 of the displacement at its edge.
+_WINDOW = 5.0
+_MOMENTS = 4
+# Ratio of the windows of neighbouring groups of spots.
+_LADDER = math.sqrt(2)
+# Nodes of a block of rows, and of windows that are worked on at a time: what fits the processor's cache.
+_BLOCK = 2**19
+_BATCH = 2**15
+# Below this (alpha r)^2 the smooth half comes from its power series, up to this power of (alpha r)^2.
+_SERIES_BELOW = 0.25
+_SERIES_LENGTH = 15
+
+
+def displacement_field(law: JKR, period: float, grid: int, centres, a, R, *, free: bool = False) -> np.ndarray:
+    """Displacement w (grid, grid) in m at the nodes of a regular grid, eq. (9)'s sum.
+
+    It is periodic and of zero mean; or, for a single square on a free half-space, the plain sum over the spots.
+
+    centres: (m, 2), a and R: (m,), all m. Inside a spot its own part is the displacement under its contact. The grid
+    need not be the surface's: a coarser one gives the values at every so-manieth node and costs accordingly less.
+    """
+    return np.concatenate(DisplacementField(law, period, grid, centres, a, R, free).in_blocks(lambda _, w: w))
+
+
+def row_blocks(grid: int) -> list[slice]:
+    """The rows of a grid in blocks whose size depends on nothing but the grid."""
+    return blocks(grid, max(_BLOCK // grid, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementField:
+    """Displacement w of the half-space at the nodes of a regular grid, by rows; arguments as `displacement_field`."""
+
+    law: JKR
+    period: float
+    grid: int
+    centres: np.ndarray
+    contact_radius: np.ndarray
+    radius_of_curvature: np.ndarray
+    free: bool = False
+
+    @property
+    def _cell(self):
+        """Period of the sum, m; of a single square it is in a cell of twice its side, without what the images do."""
+        return cell_of(self.period, self.free)
+
+    @property
+    def _nodes(self):
+        """Nodes along a side of that cell."""
+        return cell_of(self.grid, self.free)
+
+    def in_blocks(self, function) -> list:
+        """Results of `function(rows, w)` for all rows in blocks, in order; several threads work on them."""
+        if len(self.contact_radius):
+            # Before all threads want it.
+            _ = self._smooth_half, self.free and self._images
+        return on_cores(lambda rows: function(rows, self.rows(rows)), row_blocks(self.grid))
+
+    def rows(self, rows: slice) -> np.ndarray:
+        """Displacement w (rows.stop - rows.start, grid) at the nodes of a range of rows, m."""
+        if not len(self.contact_radius):
+            return np.zeros((rows.stop - rows.start, self.grid))
+        # Grids too coarse for the Fourier series are nodes of a finer one.
+        finer, half = self._smooth_half
+        nodes = np.arange(rows.start, rows.stop) * finer
+        w = scipy.fft.irfft(half[nodes], n=finer * self._nodes, axis=1, norm="forward", workers=1)[:, ::finer]
+        w = np.ascontiguousarray(w) - self._short_mean
+        for group in self._groups:
+            for window in windows(self.centres[group.spots], group.reach, self._nodes, self._cell, rows):
+                np.add.at(w.reshape(-1), window.node.ravel(), self._short_half(group, window).ravel())
+        if self.free:
+            w = w[:, : self.grid]
+            by, bx, field = self._images
+            w = w - (by[rows] @ field) @ bx.T
+        return w
+
+    @cached_property
+    def _images(self):
+        """Bases of the nodes, and the field of the images between them."""
+        nodes = basis(np.arange(self.grid) * (self.period / self.grid), self._cell)
+        field = 0.0
+        for group in self._groups:
+            bases = (basis(self.centres[group.spots, axis], self._cell) for axis in (1, 0))
+            moments = group.moments.T / group.alpha ** (2 * np.arange(_MOMENTS)[:, None])
+            field = field + image_field(*bases, moments, self._cell, self.law.material.contact_modulus)
+        return nodes, nodes, field
+
+    @cached_property
+    def _groups(self):
+        """Spots by the width of their windows: wide enough for their own radius and for few Fourier modes."""
+        count, widest = len(self.contact_radius), 0.5 * self._cell
+        # As many modes as make the Fourier series and the windows about equally costly.
+        modes = min((2.0 * count * self._nodes**2) ** 0.25, (self._nodes - 1) // 2)
+        narrowest = min(_CUT**2 / np.pi * self._cell / modes, widest)
+        needed = np.clip(_WINDOW * self.contact_radius, narrowest, widest)
+        rung = np.ceil(np.log(needed / narrowest) / math.log(_LADDER) - 1e-9).astype(int)
+        return [self._group(np.flatnonzero(rung == k), min(narrowest * _LADDER**k, widest)) for k in np.unique(rung)]
+
+    def _group(self, spots, reach):
+        a, R, alpha = self.contact_radius[spots], self.radius_of_curvature[spots], _CUT / reach
+        order = np.arange(_MOMENTS)
+        # Mean r^(2k) over a^(2k) of Hertz's and of the flat punch's pressure.
+        hertz, punch = 1.5 * beta(order + 1, 1.5), 0.5 * beta(order + 1, 0.5)
+        force = self.law.repulsive_force(a, R)[:, None] * hertz - self.law.adhesive_force(a)[:, None] * punch
+        factorial = np.cumprod(np.maximum(order, 1))
+        return _Group(spots, reach, alpha, force * (0.25 * (alpha * a[:, None]) ** 2) ** order / factorial**2)
+
+    @cached_property
+    def _short_mean(self):
+        modulus = self.law.material.contact_modulus
+        return sum(np.sum(g.moments[:, 0]) * _short_mean(g.alpha, modulus, self._cell) for g in self._groups)
+
+    @cached_property
+    def _smooth_half(self):
+        """How many times finer than the grid, and the Fourier series along x at the rows of that finer grid."""
+        modes = on_cores(self._modes, self._groups)
+        highest = [each.shape[1] - 1 for each in modes]
+        finer = -(-(2 * max(highest) + 1) // self._nodes)
+        half = np.zeros((finer * self._nodes, max(highest) + 1), dtype=complex)
+        for k, each in zip(highest, modes, strict=True):
+            half[np.arange(-k, k + 1) % len(half), : k + 1] += each
+
+        def along_y(columns):
+            half[:, columns] = scipy.fft.ifft(half[:, columns], axis=0, norm="forward", workers=1)
+
+        on_cores(along_y, blocks(half.shape[1], 64))
+        return finer, half
+
+    def _modes(self, group):
+        """Fourier coefficients (2k + 1, k + 1) of the smooth half by one group of spots."""
+        highest = math.ceil(_CUT * group.alpha * self._cell / np.pi - 1e-9)
+        y, x = (np.ascontiguousarray(self.centres[group.spots, axis]) * (2 * np.pi / self._cell) for axis in (1, 0))
+        k = np.arange(-highest, highest + 1) * (2 * np.pi / self._cell)
+        q2 = k[:, None] ** 2 + k[None, highest:] ** 2
+        strength, factor = np.zeros(q2.shape, dtype=complex), np.ones(q2.shape)
+        for even, odd in group.moments.T.reshape(-1, 2, len(group.spots)):
+            # Two real sets travel as one complex one: its spectrum c holds the first as the part with
+            # c(-k) = conj c(k). One thread: the order of summation, and with it every bit, is then fixed.
+            c = finufft.nufft2d1(y, x, even + 1j * odd, (len(k), len(k)), eps=_NUFFT_TOLERANCE, isign=-1, nthreads=1)
+            mirrored = np.conj(c[::-1, ::-1])[:, highest:]
+            c = c[:, highest:]
+            strength += factor * (0.5 * (c + mirrored))
+            factor *= -q2 / group.alpha**2
+            strength += factor * (-0.5j * (c - mirrored))
+            factor *= -q2 / group.alpha**2
+        q2[highest, 0] = 1.0
+        strength *= _smooth_mode(np.sqrt(q2), group.alpha, self.law.material.contact_modulus, self._cell)
+        strength[highest, 0] = 0.0
+        return strength
+
+    def _short_half(self, group, window):
+        """Exact displacement less the smooth half by the spots of the windows, shaped as the windows."""
+        spot = group.spots[window.spot]
+        r2 = window.dy[:, None] ** 2 + window.dx**2
+        a, R = self.contact_radius[spot][:, None], self.radius_of_curvature[spot][:, None]
+        w = self.law.displacement(np.sqrt(r2), a, R)
+        r2 *= group.alpha**2
+        smooth = smooth_half(r2, group.moments[window.spot])
+        smooth *= group.alpha / (np.pi * self.law.material.contact_modulus)
+        w -= smooth
+        return w
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Spots (m,) that share a window (m) and the alpha = _CUT/window of their smooth half (1/m).
+
+    moments : (m, 4) M_k alpha^(2k), N.
+    """
+
+    spots: np.ndarray
+    reach: float
+    alpha: float
+    moments: np.ndarray
+
+
+def smooth_half(y, moments):
+    """Sum over k of moments[..., k] Lap^k (erf(x)/x), Lap in the plane, at y = x^2 (m, n); moments (m, 4)."""
+    coefficients = np.einsum("mk,kj->mj", moments, _SMOOTH_HALF)
+    multipole, gauss, series = np.split(coefficients, [_MOMENTS, 3 * _MOMENTS - 2], axis=1)
+    safe = np.maximum(y, _SERIES_BELOW)
+    inverse = 1 / safe
+    value = _horner(multipole[:, :, None], inverse)
+    value *= erf(np.sqrt(safe))
+    value *= np.sqrt(inverse)
+    # The powers of the Gaussian's factor run from -3 to 2.
+    factor = _horner(gauss[:, _MOMENTS - 1 :, None], safe)
+    factor += _horner(gauss[:, _MOMENTS - 2 :: -1, None], inverse) * inverse
+    factor *= np.exp(-safe)
+    value -= factor
+    near = np.flatnonzero(y < _SERIES_BELOW)
+    if len(near):
+        value.ravel()[near] = _horner(series[near // y.shape[1]], y.ravel()[near])
+    return value
+
+
+def _horner(coefficients, x):
+    """Polynomial in x with coefficients along the axis 1, lowest power first."""
+    value = coefficients[:, -1] * x
+    for k in range(coefficients.shape[1] - 2, 0, -1):
+        value += coefficients[:, k]
+        value *= x
+    value += coefficients[:, 0]
+    return value
+
+
+def _smooth_half_table():
+    """Coefficients of Lap^k (erf(x)/x), k = 0..3 (rows), in powers of y = x^2: (1) of the factor of erf(x)/x, falling
+    from y^0, (2) of that of exp(-y), from y^-3 to y^2, and (3) of the whole, rising from y^0.
+
+    Lap^k (erf(x)/x) = (d_k y^-k) erf(x)/x - exp(-y) g_k(y) with Laurent polynomials g_k. In the plane
+    Lap y^j = 4 j^2 y^(j-1), from which d_(k+1) = (2k+1)^2 d_k, and with 2/sqrt(pi) exp(-y) the derivative of erf
+    the recurrence for g_k below.
+    """
+    multipole = np.zeros((_MOMENTS, _MOMENTS))
+    gauss = np.zeros((_MOMENTS, 2 * _MOMENTS - 2))
+    zero = _MOMENTS - 1
+    multipole[0, 0] = 1.0
+    for k in range(_MOMENTS - 1):
+        d, g = multipole[k, k], gauss[k]
+        multipole[k + 1, k + 1] = (2 * k + 1) ** 2 * d
+        new = gauss[k + 1]
+        new[zero - k] += 2 * d * 2 / math.sqrt(math.pi)
+        new[zero - k - 1] += (4 * k + 1) * d * 2 / math.sqrt(math.pi)
+        for j in range(-k, k):
+            new[zero + j - 1] += 4 * j**2 * g[zero + j]
+            new[zero + j] -= 4 * (2 * j + 1) * g[zero + j]
+            new[zero + j + 1] += 4 * g[zero + j]
+    length = _SERIES_LENGTH + _MOMENTS
+    power = np.arange(length)
+    series = [2 / math.sqrt(math.pi) * (-1.0) ** power / ([math.factorial(j) for j in power] * (2 * power + 1))]
+    for _ in range(_MOMENTS - 1):
+        series.append(np.append((4 * power**2 * series[-1])[1:], 0.0))
+    return np.hstack([multipole, gauss, np.array(series)[:, :_SERIES_LENGTH]])
+
+
+_SMOOTH_HALF = _smooth_half_table()
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Strips of nodes: parts of rows within reach of a spot.
+
+    spot : (m,) index of the spot. dy : (m,), dx : (m, n) way from its centre to the nodes, m. node : (m, n) index of
+    the nodes in the flattened block of rows.
+    """
+
+    spot: np.ndarray
+    dy: np.ndarray
+    dx: np.ndarray
+    node: np.ndarray
+
+
+def windows(centres, reach: float, grid: int, period: float, rows: slice):
+    """Yield the nodes of a range of rows less than `reach` (m) from each of the centres (m, 2) in x and in y.
+
+    Nodes that are a little farther are among them, but none twice for one centre.
+    """
+    spacing = period / grid
+    ahead = int(reach / spacing) + 1
+    width = min(2 * ahead + 1, grid)
+    ahead = min(ahead, grid // 2)
+    count = rows.stop - rows.start
+    # In cells; first row and column of every window, not yet brought into the cell.
+    first = np.rint(centres / spacing).astype(int) - ahead
+    lag = np.mod(rows.start - first[:, 1], grid)
+    meeting = np.flatnonzero((lag < width) | (lag + count > grid))
+    step = np.mod(lag[meeting, None] + np.arange(count), grid)
+    which, row = np.nonzero(step < width)
+    spot = meeting[which]
+    line = first[spot, 1] + step[which, row]
+    for some in blocks(len(spot), max(_BATCH // width, 1)):
+        at = spot[some]
+        column = first[at, 0][:, None] + np.arange(width)
+        yield Windows(
+            spot=at,
+            dy=line[some] * spacing - centres[at, 1],
+            dx=column * spacing - centres[at, 0][:, None],
+            node=row[some][:, None] * grid + np.mod(column, grid),
+        )

@@ -1,0 +1,1 @@
+"""The way from first contact to given loads, areas or separations, and back."""

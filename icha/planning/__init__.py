@@ -1,0 +1,1 @@
+"""What a campaign will compute and cost, before it does."""

@@ -1,5 +1,0 @@
-"""What ICHA is compared with: theories of rough contact and published points."""
-
-from icha.reference.dataset import reference_dataset
-
-__all__ = ["reference_dataset"]

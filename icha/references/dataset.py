@@ -1,0 +1,139 @@
+"""Theory curves and published points as one dataset, for the figures of one surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from icha.asperity.material import Material
+from icha.datasets.attributes import THEORY, discovery
+from icha.references import persson, summits
+from icha.references.literature import literature
+from icha.surfaces.moments import SpectralMoments
+from icha.surfaces.spectrum import SelfAffineSpectrum
+
+REDUCED_PRESSURES = np.geomspace(1e-5, 1.0, 101)
+SUMMIT_AREAS = np.geomspace(1e-5, summits.SEPARATE_SUMMITS_AREA_LIMIT, 81)
+
+
+def reference_dataset(
+    spectrum: SelfAffineSpectrum | None = None,
+    moments: SpectralMoments | None = None,
+    adhesive: Mapping[tuple[float, str], Material] = {},
+    *,
+    reduced_pressures=REDUCED_PRESSURES,
+    attrs: Mapping[str, str] = {},
+) -> xr.Dataset:
+    """Theories of a surface, and the points of the literature.
+
+    Parameters
+    ----------
+    spectrum : of the surface; without one (a measured surface) there is no Persson theory of its separation and
+        stiffness.
+    moments : of the surface at any rms slope; without them there are no theories of separate summits.
+    adhesive : the materials with adhesion that lie against it, by rms slope and name: a curve of Fuller & Tabor each.
+    reduced_pressures : p/(E* h'_rms), increasing and positive.
+    attrs : further global attributes.
+
+    Returns
+    -------
+    Dataset with Persson's theory along `reduced_pressure`, that of Bush, Gibson & Thomas along `linear_point`, those
+    of Greenwood & Williamson and of Fuller & Tabor along `summit_point`, at the areas `summit_area_fraction`, and
+    published points along `gfmd_point`.
+    """
+    variables = _persson(np.asarray(reduced_pressures, float), spectrum) | _published()
+    if moments is not None:
+        variables |= _separate_summits(moments, adhesive)
+    described = discovery(
+        "Theories of rough contact, and published points",
+        "Contact area, mean separation and contact stiffness against reduced pressure.",
+        THEORY,
+        references="; ".join(
+            dict.fromkeys(v.attrs["references"] for v in variables.values() if "references" in v.attrs)
+        ),
+    )
+    return xr.Dataset(variables, attrs=described | dict(attrs))
+
+
+_PRESSURE = "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"
+_AREA = "real over nominal contact area, A/A0"
+_SEPARATION = "mean separation over rms height"
+
+_PERSSON = "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, doi:10.1063/1.1388626"
+_YANG = "C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214, gamma = 0.45"
+_BUSH = "A. W. Bush, R. D. Gibson and T. R. Thomas, Wear 35 (1975) 87, doi:10.1016/0043-1648(75)90145-3"
+_GREENWOOD = (
+    "J. A. Greenwood and J. B. P. Williamson, Proc. R. Soc. Lond. A 295 (1966) 300, doi:10.1098/rspa.1966.0242; "
+    "J. I. McCool, Wear 107 (1986) 37, doi:10.1016/0043-1648(86)90045-1"
+)
+_FULLER = (
+    "K. N. G. Fuller and D. Tabor, Proc. R. Soc. Lond. A 345 (1975) 327, doi:10.1098/rspa.1975.0138, on loading: "
+    "summits are in contact from approach 0 on"
+)
+
+
+def _variable(dim, values, long_name, source=""):
+    described = {"units": "1", "long_name": long_name}
+    return xr.Variable(dim, values, described | ({"references": source} if source else {}))
+
+
+def _persson(pressure, spectrum):
+    dim = "reduced_pressure"
+    variables = {
+        dim: _variable(dim, pressure, _PRESSURE),
+        "persson_area_fraction": _variable(dim, persson.persson_area(pressure), f"{_AREA}, Persson", _PERSSON),
+    }
+    if spectrum is not None:
+        separation = persson.persson_mean_separation(pressure, spectrum)
+        stiffness = persson.persson_stiffness(pressure, spectrum)
+        named = "contact stiffness times rms height over contact modulus and rms slope, Yang and Persson"
+        variables |= {
+            "persson_reduced_separation": _variable(dim, separation, f"{_SEPARATION}, Yang and Persson", _YANG),
+            "persson_reduced_stiffness": _variable(dim, stiffness, named, _YANG),
+        }
+    linear = pressure[summits.bush_gibson_thomas_area(pressure) <= summits.SEPARATE_SUMMITS_AREA_LIMIT]
+    area, named = summits.bush_gibson_thomas_area(linear), f"{_AREA}, Bush, Gibson and Thomas"
+    return variables | {
+        "linear_pressure": _variable("linear_point", linear, _PRESSURE),
+        "bush_gibson_thomas_area_fraction": _variable("linear_point", area, named, _BUSH),
+    }
+
+
+def _separate_summits(moments, adhesive):
+    dim, by = "summit_point", "Greenwood and Williamson"
+    separation = summits.separation_at(summits.greenwood_williamson_area, SUMMIT_AREAS, moments)
+    pressure = summits.greenwood_williamson_pressure(separation, moments)
+    alpha = moments.nayak_parameter
+    variables = {
+        "nayak_parameter": _variable((), alpha, "Nayak's parameter m0 m4/m2^2: breadth of the spectrum"),
+        "summit_area_fraction": _variable(dim, SUMMIT_AREAS, f"{_AREA}, at which separate summits are evaluated"),
+        "greenwood_williamson_reduced_pressure": _variable(dim, pressure, f"{_PRESSURE}, {by}", _GREENWOOD),
+        "greenwood_williamson_reduced_separation": _variable(dim, separation, f"{_SEPARATION}, {by}", _GREENWOOD),
+    }
+    if not adhesive:
+        return variables
+    curves = []
+    for (rms_slope, _), material in adhesive.items():
+        own = moments.scaled_to_rms_slope(rms_slope)
+        separation = summits.separation_at(summits.fuller_tabor_area, SUMMIT_AREAS, own, material)
+        curves.append((summits.fuller_tabor_pressure(separation, own, material), separation))
+    pressures, separations = np.moveaxis(np.array(curves), 1, 0)
+    slopes, names = zip(*adhesive, strict=True)
+    curve, by = "fuller_tabor_curve", "Fuller and Tabor"
+    return variables | {
+        "fuller_tabor_rms_slope": _variable(curve, np.array(slopes, float), "root mean square slope of the surface"),
+        "fuller_tabor_material": _variable(curve, np.array(names, dtype=object), "name of the material"),
+        "fuller_tabor_reduced_pressure": _variable((curve, dim), pressures, f"{_PRESSURE}, {by}", _FULLER),
+        "fuller_tabor_reduced_separation": _variable((curve, dim), separations, f"{_SEPARATION}, {by}", _FULLER),
+    }
+
+
+def _published():
+    gfmd = literature("gfmd_area")
+    points = gfmd["citation"] + " " + gfmd["description"]
+    return {
+        f"gfmd_{name}": _variable("gfmd_point", np.array(gfmd[name]), f"{long_name}, GFMD", points)
+        for name, long_name in (("reduced_pressure", _PRESSURE), ("area_fraction", _AREA))
+    }

@@ -1,0 +1,374 @@
+"""Boundary elements with adhesion both ways: from apart down to a load and up again until apart.
+
+The mean gap is what is given, as in a stiff machine. Every solution starts from the one before and so stays on its
+branch until that ends; there the surfaces jump, and what the jump frees is lost. Between jumps the work done on the
+contact, minus the integral of the nominal pressure over the mean gap, is the change of the energy it stores: on a step
+the two may differ by what jumps in it dissipate, and by the error of the trapezoid. So steps on which they differ are
+halved, down to a limit; where within the smallest the jump was remains unknown.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from icha.asperity.cohesive_zone import longest_spacing, strength_number
+from icha.asperity.material import Material
+from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
+from icha.references.boundary_elements import (
+    DEFAULT_TOLERANCE,
+    REFERENCES,
+    GapContact,
+    NotSolved,
+    perimeter_correction,
+    resolved,
+)
+from icha.support.validation import positive
+from icha.surfaces.surface import Surface
+
+# Surfaces are apart where every gap exceeds this many ranges: nowhere more than 0.7 % of the interface's strength acts.
+_APART = 5.0
+# The loop starts this many ranges above the highest summit, from where attraction draws it nearer.
+_START = 6.0
+# Steps are halved while their work is known to this part of the surface energy only, this many times at most.
+_WORK_TOLERANCE = 1e-4
+_MAX_HALVINGS = 5
+# The largest load is met to this relative error, unless it lies within a jump.
+_LOAD_TOLERANCE = 1e-3
+# Tries to meet it within one step.
+_MAX_MEETING = 12
+# A loop that takes more solutions than this does not end.
+_MAX_SOLVES = 5000
+
+# name: (dimensions, units, long name)
+VARIABLES = {
+    "mean_separation": (("step",), "m", "mean gap"),
+    "nominal_pressure": (("step",), "Pa", "mean traction over the nominal area, attraction included"),
+    "reduced_pressure": (("step",), "1", "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"),
+    "reduced_separation": (("step",), "1", "mean gap over rms height"),
+    "contact_area_fraction": (("step",), "1", "area of zero gap over the nominal area, corrected by its perimeter"),
+    "contact_area_fraction_raw": (("step",), "1", "fraction of the nodes in contact"),
+    "energetic_area_fraction": (
+        ("step",),
+        "1",
+        "energy of adhesion over that of full contact; the raw area without adhesion",
+    ),
+    "residual": (("step",), "1", "error of the solver: its criterion of convergence"),
+    "leg": (("step",), "1", "0 on the way down, 1 on the way up"),
+    "work": (("step",), "J m^-2", "work done on the contact so far, minus the integral of pressure over mean gap"),
+    "stored_energy": (("step",), "J m^-2", "elastic energy less that of adhesion, over the nominal area"),
+    "dissipated": (("step",), "J m^-2", "work so far less the change of the stored energy: lost in jumps"),
+    "pull_off_pressure": ((), "Pa", "largest tension on the way up, at least 0"),
+    "pull_off_separation": ((), "m", "mean gap of the largest tension on the way up"),
+    "hysteresis_loss": ((), "J m^-2", "work of the whole loop"),
+    "hysteresis_loss_error": (
+        (),
+        "J m^-2",
+        "estimate of its error, by the trapezoid and by the steps within which pressure jumps",
+    ),
+    "largest_reduced_pressure": ((), "1", "largest nominal pressure over contact modulus and rms slope"),
+    "largest_contact_area_fraction": ((), "1", "largest area of zero gap over the nominal area, corrected"),
+    "separation_step": ((), "1", "largest step of the mean gap over rms height"),
+    "solve_count": ((), "1", "solutions, those included that were replaced by smaller steps"),
+    "tolerance": ((), "1", "error of the solver at which it was to stop"),
+    "refinement": ((), "1", "cells per cell of the surface's grid, along a side"),
+    "grid": ((), "1", "nodes along a side"),
+    "spacing": ((), "m", "distance between nodes"),
+    "longest_spacing": ((), "m", "widest spacing that resolves the cohesive zone; 0 without adhesion"),
+    "strength_number": ((), "1", "sqrt(dgamma dx/E*)/range; 0 without adhesion"),
+    "contact_modulus": ((), "Pa", "composite contact modulus E*"),
+    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
+    "interaction_range": ((), "m", "range of the attractive forces"),
+    "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
+    "rms_height": ((), "m", "root mean square height"),
+    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
+    "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
+    "period": ((), "m", "side of the periodic cell"),
+    "seed": ((), "1", "seed of the surface; -1 where it has none"),
+}
+
+
+def boundary_element_loop(
+    surface: Surface,
+    material: Material,
+    *,
+    largest_reduced_pressure: float,
+    separation_step: float,
+    refinement: int = 1,
+    tolerance: float = DEFAULT_TOLERANCE,
+    seed: int = -1,
+    progress: Callable[[str], None] | None = None,
+) -> xr.Dataset:
+    """Bring two surfaces from apart to a load and apart again, by boundary elements.
+
+    Parameters
+    ----------
+    surface, material : as for `icha.simulate`; with adhesion, traction decays over `material.interaction_range`.
+    largest_reduced_pressure : p/(E* h'_rms) at which the way turns, positive. A jump may carry the load beyond it.
+    separation_step : largest step of the mean gap, in h_rms; steps with jumps are taken in up to 32 smaller ones.
+    refinement : nodes per node of the surface's grid, along a side.
+    tolerance : relative error at which the solver may stop.
+    seed : recorded in the dataset.
+    progress : called with lines of text.
+
+    Returns
+    -------
+    xarray.Dataset of `VARIABLES`. Both ends of `step` are the same state, apart, and work is counted from the first.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range, or the grid does not resolve the attraction.
+    NotSolved
+        If the solver does not reach its tolerance, or the load is not reached: it says how far the loop has come.
+    """
+    target = positive("largest_reduced_pressure", largest_reduced_pressure)
+    step = positive("separation_step", separation_step) * surface.rms_height
+    say = progress or _silent
+    fine = resolved(surface, material, refinement, say)
+    way = _Way(fine, material, positive("tolerance", tolerance), say)
+    legs = _down_and_up(way, step, target * surface.rms_slope * material.contact_modulus)
+    return _dataset(surface, way, legs, separation_step, seed)
+
+
+def _silent(line):
+    pass
+
+
+@dataclass(frozen=True)
+class _Record:
+    """What is kept of a state."""
+
+    separation: float
+    pressure: float
+    energy: float
+    area: float
+    area_raw: float
+    energetic_area: float
+    residual: float
+
+
+class _Way:
+    """States one after the other, each from the one before."""
+
+    def __init__(self, fine, material, tolerance, say):
+        self.fine, self.material, self.say = fine, material, say
+        self.tolerance = tolerance
+        self.contact = GapContact(fine, material, tolerance)
+        adhesive = material.surface_energy > 0
+        self.work_tolerance = _WORK_TOLERANCE * material.surface_energy if adhesive else math.inf
+        self.range = material.interaction_range if adhesive else 0.0
+
+    def apart(self, separation):
+        """The state at a mean gap (m) to which the undeformed surfaces lead."""
+        return self._solved(separation - self.fine.heights, separation)
+
+    def is_apart(self, state):
+        """Whether no attraction to speak of is left."""
+        return not state.contact.any() and state.gap.min() >= _APART * self.range
+
+    def step(self, state, separation):
+        """The state at a mean gap (m), from another."""
+        return self._solved(state.gap, separation)
+
+    def steps(self, state, separation, halvings=_MAX_HALVINGS):
+        """States from one to a mean gap (m), in steps so small that the work is known, or the smallest."""
+        after = self.step(state, separation)
+        if halvings == 0 or self.work_error(state, after) <= self.work_tolerance:
+            yield after
+            return
+        for middle in self.steps(state, (state.mean_separation + separation) / 2, halvings - 1):
+            yield middle
+        yield from self.steps(middle, separation, halvings - 1)
+
+    def work_error(self, before, after):
+        """Error of a step's work by the trapezoid, J/m^2; of two estimates the smaller.
+
+        On a branch it is the work less the change of the stored energy; where pressure jumps, at most half its change
+        times the step.
+        """
+        records = [self.kept(before), self.kept(after)]
+        return min(abs(_dissipated(records)[0]), _unknown_place(records)[0])
+
+    def error(self, records):
+        """Error of the work over all steps, J/m^2: what branches dissipate, which is nothing, and jumps' places."""
+        dissipated = _dissipated(records)
+        jump = dissipated > self.work_tolerance
+        return abs(dissipated[~jump].sum()) + _unknown_place(records)[jump].sum()
+
+    def kept(self, state):
+        """The numbers that are kept of a state."""
+        return _Record(
+            separation=state.mean_separation,
+            pressure=state.nominal_pressure,
+            energy=state.stored_energy(self.material),
+            area=perimeter_correction(state.contact)[0],
+            area_raw=np.count_nonzero(state.contact) / state.contact.size,
+            energetic_area=state.energetic_area_fraction(self.material),
+            residual=state.residual,
+        )
+
+    def described(self, state):
+        """A state in words."""
+        reduced = state.nominal_pressure / (self.material.contact_modulus * self.fine.rms_slope)
+        return f"mean gap {state.mean_separation / self.fine.rms_height:.6g} h_rms, load {reduced:.4g} E* h'rms"
+
+    def _solved(self, gap, separation):
+        if self.contact.solves >= _MAX_SOLVES:
+            raise NotSolved(f"the loop has not ended after {self.contact.solves} solutions")
+        self.contact.start_from(gap)
+        return self.contact.at(separation)
+
+
+def _down_and_up(way, step, target):
+    """Records of both legs of the loop, from apart and until apart."""
+    start = float(way.fine.heights.max()) + _START * way.range
+    last, legs = None, ([], [])
+    try:
+        for leg, states in zip(legs, (_down, _up), strict=True):
+            for state in states(way, last, start, step, target):
+                leg.append(way.kept(state))
+                way.say(f"{way.described(state)}, contact area {leg[-1].area:.4g} A0, error {state.residual:.2g}")
+                last = state
+        # Where contact held beyond the start, the way down begins as far out.
+        above = _levels(start, step, last.mean_separation)
+        legs[0][:0] = [way.kept(way.apart(level)) for level in reversed(above)]
+    except NotSolved as error:
+        reached = way.described(last) if last is not None else "nothing"
+        raise NotSolved(f"{'un' if legs[1] else ''}loading stopped after {reached}: {error}") from None
+    return legs
+
+
+def _levels(start, step, end):
+    """Mean gaps (m) above start in steps, up to the end."""
+    return [start + step * (k + 1) for k in range(round((end - start) / step))]
+
+
+def _down(way, _, start, step, target):
+    """States from apart to the largest load."""
+    state, count = way.apart(start), 0
+    yield state
+    while state.nominal_pressure < target * (1 - _LOAD_TOLERANCE):
+        count += 1
+        if start - count * step <= 0:
+            raise NotSolved("the load was not reached before the mean gap closed; allowed: a smaller load or step")
+        for after in way.steps(state, start - count * step):
+            if after.nominal_pressure > target * (1 + _LOAD_TOLERANCE):
+                yield from _meeting(way, state, after, target)
+                return
+            yield after
+            state = after
+
+
+def _meeting(way, before, after, target):
+    """States between two, up to the one that carries the load; the second if the load lies within a jump."""
+    for _ in range(_MAX_MEETING):
+        share = (target - before.nominal_pressure) / (after.nominal_pressure - before.nominal_pressure)
+        between = way.step(before, before.mean_separation + share * (after.mean_separation - before.mean_separation))
+        if between.nominal_pressure > target * (1 + _LOAD_TOLERANCE):
+            after = between
+            continue
+        yield between
+        if between.nominal_pressure >= target * (1 - _LOAD_TOLERANCE):
+            return
+        before = between
+    yield after
+
+
+def _up(way, state, start, step, target):
+    """States from the largest load until apart, at the mean gaps of the way down."""
+    count = math.ceil((start - state.mean_separation) / step) - 1
+    while count >= 0 or not way.is_apart(state):
+        for after in way.steps(state, start - count * step):
+            yield after
+            state = after
+        count -= 1
+
+
+def _column(records, name):
+    return np.array([getattr(record, name) for record in records])
+
+
+def _work(records):
+    """Work on each step by the trapezoid, J/m^2."""
+    pressure = _column(records, "pressure")
+    return -np.diff(_column(records, "separation")) * (pressure[1:] + pressure[:-1]) / 2
+
+
+def _dissipated(records):
+    """Work on each step less the change of the stored energy, J/m^2."""
+    return _work(records) - np.diff(_column(records, "energy"))
+
+
+def _unknown_place(records):
+    """Half of each step times the change of pressure, J/m^2: error of the work if the pressure jumps at an end."""
+    return np.abs(np.diff(_column(records, "separation")) * np.diff(_column(records, "pressure"))) / 2
+
+
+def _dataset(surface, way, legs, separation_step, seed):
+    material, fine = way.material, way.fine
+    records = [*legs[0], *legs[1]]
+    along = {name: _column(records, name) for name in _Record.__annotations__}
+    leg = np.repeat([0, 1], [len(one) for one in legs])
+    work = np.concatenate([[0.0], np.cumsum(_work(records))])
+    pressure, separation, unit = along["pressure"], along["separation"], material.contact_modulus * surface.rms_slope
+    last = len(legs[0]) + int(np.argmin(pressure[leg == 1]))
+    adhesive = material.surface_energy > 0
+    values = {
+        "mean_separation": separation,
+        "nominal_pressure": pressure,
+        "reduced_pressure": pressure / unit,
+        "reduced_separation": separation / surface.rms_height,
+        "contact_area_fraction": along["area"],
+        "contact_area_fraction_raw": along["area_raw"],
+        "energetic_area_fraction": along["energetic_area"],
+        "residual": along["residual"],
+        "leg": leg,
+        "work": work,
+        "stored_energy": along["energy"],
+        "dissipated": work - (along["energy"] - along["energy"][0]),
+        "pull_off_pressure": max(0.0, -pressure[last]),
+        "pull_off_separation": separation[last],
+        "hysteresis_loss": work[-1],
+        "hysteresis_loss_error": way.error(records),
+        "largest_reduced_pressure": pressure.max() / unit,
+        "largest_contact_area_fraction": along["area"].max(),
+        "separation_step": separation_step,
+        "solve_count": way.contact.solves,
+        "tolerance": way.tolerance,
+        "refinement": fine.grid // surface.grid,
+        "grid": fine.grid,
+        "spacing": fine.spacing,
+        "longest_spacing": longest_spacing(material) if adhesive else 0.0,
+        "strength_number": strength_number(material, fine.spacing),
+        "contact_modulus": material.contact_modulus,
+        "surface_energy": material.surface_energy,
+        "interaction_range": material.interaction_range,
+        "rms_slope": surface.rms_slope,
+        "rms_height": surface.rms_height,
+        "rms_curvature": surface.rms_curvature,
+        "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
+        "period": surface.period,
+        "seed": seed,
+    }
+    variables = {
+        name: (dims, values[name], {"units": units, "long_name": long_name})
+        for name, (dims, units, long_name) in VARIABLES.items()
+    }
+    branch = np.array(["loading", "unloading"], dtype=object)[leg]
+    named = {"units": "1", "long_name": "loading on the way down, unloading on the way up"}
+    variables["branch"] = ("step", branch, named)
+    attrs = discovery(
+        f"Rough contact {'with' if adhesive else 'without'} adhesion both ways, boundary elements",
+        "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
+        COMPUTED,
+        programs=("tamaas",),
+        references=REFERENCES,
+        keywords=[BOUNDARY_ELEMENTS],
+    )
+    steps = ("step", np.arange(len(records)), {"units": "1", "long_name": "state of the loop"})
+    return xr.Dataset(variables, {"step": steps}, attrs)

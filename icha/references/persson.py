@@ -1,0 +1,123 @@
+"""Persson's theory of the adhesionless contact of a nominally flat rough surface.
+
+Pressures are reduced, p* = p/(E* h'_rms). Sources:
+
+- Persson: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840-3861, doi:10.1063/1.1388626; in the form with the rms
+  slope, A/A0 = erf(sqrt(2) p*), e.g. M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2.
+- Yang & Persson: C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214,
+  doi:10.1088/0953-8984/20/21/215214.
+- Stiffness proportional to pressure: B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502,
+  doi:10.1103/PhysRevLett.99.125502.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import simpson
+from scipy.special import erf
+
+# Slope of A/A0 against p* as p* -> 0.
+PERSSON_SLOPE = np.sqrt(8 / np.pi)
+
+# Share of the full-contact elastic energy that a small contact stores (Yang & Persson, gamma).
+YANG_PERSSON_GAMMA = 0.45
+
+
+def persson_area(reduced_pressure):
+    """A/A0 = erf(sqrt(2) p*) for reduced pressures of any shape (Persson 2001)."""
+    return erf(np.sqrt(2) * np.asarray(reduced_pressure, float))
+
+
+def persson_pressure_density(pressure, reduced_pressure):
+    """P(p) over the nominal area, in units of E* h'_rms, at pressures `pressure` in that unit (Persson 2001).
+
+    Two Gaussians of standard deviation 1/2, centred at p* and mirrored at -p*; their integral over p > 0 is
+    `persson_area`.
+    """
+    pressure = np.asarray(pressure, float)
+    gauss = np.exp(-2 * (pressure - reduced_pressure) ** 2) - np.exp(-2 * (pressure + reduced_pressure) ** 2)
+    return np.where(pressure > 0, np.sqrt(2 / np.pi) * gauss, 0.0)
+
+
+def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, points=401):
+    r"""Mean separation over h_rms at reduced pressures of any shape, from the spectrum of the surface.
+
+    Yang & Persson (2008): with w(q) = (pi int_{q_L}^q k^3 C(k) dk)^(-1/2) and P = erf(w p/E*),
+
+        u(p) = sqrt(pi) int dq q^2 C(q) w(q) int_p^inf dp'/p' [gamma + 3 (1 - gamma) P^2] exp(-(w p'/E*)^2).
+
+    It follows from -p A0 du = dU_el, U_el = A0 E* (pi/2) int dq q^2 C P [gamma + (1 - gamma) P^2]. The substitution
+    t = w p'/E* leaves one function of t for all wave numbers.
+
+    Parameters
+    ----------
+    reduced_pressure : p*, positive.
+    spectrum : `icha.surfaces.spectrum.SelfAffineSpectrum`; its isotropic continuum, not the lattice of its cell, is meant.
+    gamma : their parameter; 0.45 unless told.
+    points : wave numbers of the quadrature on either side of the roll-off; odd, for Simpson's rule.
+    """
+    return _over_wave_numbers(lambda t: _stored_share(t, gamma), reduced_pressure, spectrum, points)
+
+
+def persson_stiffness(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, points=401):
+    r"""Contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures, in the theory of Yang & Persson (2008).
+
+    The derivative of `persson_mean_separation`, in closed form but for the integral over the wave numbers:
+
+        -p du/dp = sqrt(pi) int dq q^2 C(q) w(q) [gamma + 3 (1 - gamma) P^2] exp(-(w p/E*)^2).
+
+    For small pressures this is a length u0, so that p falls as exp(-u/u0) and the stiffness is p/u0 (Persson 2007).
+    Parameters as those of `persson_mean_separation`.
+    """
+    decay_length = _over_wave_numbers(lambda t: _share_density(t, gamma), reduced_pressure, spectrum, points)
+    return np.asarray(reduced_pressure, float) / decay_length
+
+
+def _over_wave_numbers(share, reduced_pressure, spectrum, points):
+    """sqrt(pi) int dq q^2 C(q) w(q) share(w p/E*), over h_rms."""
+    pressure = np.asarray(reduced_pressure, float)
+    if np.any(pressure <= 0):
+        raise ValueError("reduced_pressure: must be greater than 0")
+    # In units of q_L and of C0: only the shape of the spectrum matters, C is 1 and then falls. w grows without bound
+    # towards q_L, where the inner integral vanishes: nodes are spaced by the logarithm of q - q_L.
+    rolloff = max(spectrum.period / spectrum.rolloff_wavelength, 1.0)
+    cutoff = spectrum.period / spectrum.short_wavelength
+    falling = -2 * (1 + spectrum.hurst)
+    above = np.geomspace(1e-14, cutoff - 1, points)
+    if rolloff - 1 > 1e-9:
+        above = np.concatenate(
+            [np.geomspace(1e-14, rolloff - 1, points), np.geomspace(rolloff - 1, cutoff - 1, points)[1:]]
+        )
+    q = 1 + above
+    shape = np.maximum(q / rolloff, 1.0) ** falling
+
+    def moment(power, q):
+        """2 pi times the integral of k^power C from q_L to q, in terms of q - 1 for the sake of its rounding."""
+        flat = np.expm1((power + 1) * np.log1p(np.minimum(q - 1, rolloff - 1))) / (power + 1)
+        steep = np.log(np.maximum(q / rolloff, 1.0)) if rolloff > 1 else np.log1p(q - 1)
+        exponent = power + falling + 1
+        growth = steep if abs(exponent) < 1e-12 else np.expm1(exponent * steep) / exponent
+        return 2 * np.pi * (flat + rolloff ** (power + 1) * growth)
+
+    slope2 = moment(3, q)
+    w = np.sqrt(2 / slope2)
+    # The rms slope is the square root of the last slope2, in these units.
+    t = np.multiply.outer(pressure * np.sqrt(slope2[-1]), w)
+    integrand = q**2 * shape * w * share(t) * above
+    separation = np.sqrt(np.pi) * simpson(integrand, x=np.log(above), axis=-1)
+    return separation / np.sqrt(moment(1, q[-1]))
+
+
+def _share_density(t, gamma):
+    """[gamma + 3 (1 - gamma) erf(t)^2] exp(-t^2)."""
+    return (gamma + 3 * (1 - gamma) * erf(t) ** 2) * np.exp(-(t**2))
+
+
+def _stored_share(t, gamma):
+    """Integral of `_share_density`(s)/s over s from t to infinity."""
+    s = np.geomspace(1e-12, 12, 6001)
+    integrand = _share_density(s, gamma)
+    log_s = np.log(s)
+    panels = 0.5 * (integrand[1:] + integrand[:-1]) * np.diff(log_s)
+    tail = np.concatenate([np.cumsum(panels[::-1])[::-1], [0.0]])
+    return np.interp(np.log(np.clip(t, s[0], s[-1])), log_s, tail)

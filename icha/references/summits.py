@@ -1,0 +1,185 @@
+r"""Theories of separate summits: spheres on a rigid plane of heights, each in contact as if it were alone.
+
+Pressures are reduced, p* = p/(E* h'_rms), and separations are those of the plane against the mean plane of the rough
+surface over h_rms: in these theories nothing moves but what a summit flattens, so that is the mean separation. Sources:
+
+- Bush, Gibson & Thomas: Wear 35 (1975) 87-111, doi:10.1016/0043-1648(75)90145-3.
+- Greenwood & Williamson: Proc. R. Soc. Lond. A 295 (1966) 300-319, doi:10.1098/rspa.1966.0242; with the summits of a
+  Gaussian surface as in J. I. McCool, Wear 107 (1986) 37-60, doi:10.1016/0043-1648(86)90045-1, after P. R. Nayak, J.
+  Lubr. Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
+- Fuller & Tabor: Proc. R. Soc. Lond. A 345 (1975) 327-342, doi:10.1098/rspa.1975.0138; its loading: J. A. Greenwood,
+  Tribol. Lett. 65 (2017) 159, doi:10.1007/s11249-017-0938-1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import gamma, pbdv
+
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
+from icha.surfaces.moments import SpectralMoments
+
+# Slope of A/A0 against p* as p* -> 0.
+BUSH_GIBSON_THOMAS_SLOPE = np.sqrt(2 * np.pi)
+# Beyond this area summits are no longer separate.
+SEPARATE_SUMMITS_AREA_LIMIT = 0.1
+
+# The variance of the summits' heights is less than that of all heights by this, over alpha: McCool's 0.8968.
+_SUMMIT_VARIANCE = 1 - 3 * math.sqrt(3) + 16 / math.pi
+
+# In standard deviations from the mean summit: how far summits are summed up, and how far away the plane may be.
+_FARTHEST_SUMMIT = 12.0
+_FARTHEST_PLANE = 10.0
+# Gauss-Legendre quadrature of that sum, between -1 and 1.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
+
+
+def bush_gibson_thomas_area(reduced_pressure):
+    """A/A0 = sqrt(2 pi) p*, the limit of small areas (Bush, Gibson & Thomas 1975)."""
+    return BUSH_GIBSON_THOMAS_SLOPE * np.asarray(reduced_pressure, float)
+
+
+class Summits(NamedTuple):
+    """Summits as spheres of one radius at Gaussian heights.
+
+    density : number per area, m^-2.
+    mean_height : above the mean plane of the surface, m.
+    deviation : standard deviation of their heights, m.
+    radius : m.
+    """
+
+    density: float
+    mean_height: float
+    deviation: float
+    radius: float
+
+
+def gaussian_summits(moments: SpectralMoments) -> Summits:
+    """The summits of an isotropic Gaussian surface: Nayak's means, as McCool (1986) uses them.
+
+    Density m4/(6 pi sqrt(3) m2), mean height 4 sqrt(m0/(pi alpha)), variance (1 - 0.8968/alpha) m0, and the radius of
+    their mean curvature, 3 sqrt(pi)/(8 sqrt(m4)).
+
+    Raises
+    ------
+    ValueError
+        If Nayak's parameter is less than 3/2, which no isotropic surface has.
+    """
+    alpha = moments.nayak_parameter
+    if alpha < 1.5 * (1 - 1e-9):
+        raise ValueError(f"spectral moments: Nayak's parameter is {alpha:.4g}, and at least 1.5 if they are isotropic")
+    return Summits(
+        density=moments.m4 / (6 * math.sqrt(3) * math.pi * moments.m2),
+        mean_height=4 * math.sqrt(moments.m0 / (math.pi * alpha)),
+        deviation=math.sqrt((1 - _SUMMIT_VARIANCE / alpha) * moments.m0),
+        radius=3 * math.sqrt(math.pi) / (8 * math.sqrt(moments.m4)),
+    )
+
+
+def greenwood_williamson_area(reduced_separation, moments: SpectralMoments):
+    """A/A0 = pi eta R sigma F_1(d/sigma) at separations of any shape; d is the plane's height above the mean summit."""
+    summits = gaussian_summits(moments)
+    scale = np.pi * summits.density * summits.radius * summits.deviation
+    return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1)
+
+
+def greenwood_williamson_pressure(reduced_separation, moments: SpectralMoments):
+    """p* = 4/3 eta R^(1/2) sigma^(3/2) F_3/2(d/sigma)/h'_rms at separations of any shape."""
+    summits = gaussian_summits(moments)
+    scale = 4 / 3 * summits.density * math.sqrt(summits.radius * summits.deviation**3) / moments.rms_slope
+    return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1.5)
+
+
+def greenwood_williamson_separation(reduced_pressure, moments: SpectralMoments):
+    """Separation over h_rms at reduced pressures of any shape; `greenwood_williamson_area` of it is the area there.
+
+    Raises
+    ------
+    ValueError
+        If a pressure is not positive, or so small that the theory has no summit of that height.
+    """
+    return separation_at(greenwood_williamson_pressure, reduced_pressure, moments)
+
+
+def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Material, *, pulled: bool = False):
+    """A/A0 of Greenwood & Williamson's summits under the law of Johnson, Kendall & Roberts (Fuller & Tabor 1975).
+
+    Parameters
+    ----------
+    reduced_separation : of the plane, over h_rms, any shape.
+    moments : of the surface, at its own rms slope.
+    material : its range of attraction plays no part.
+    pulled : whether the surfaces are pulled apart after every summit has been in contact. Then, as in Fuller & Tabor,
+        summits hold on until their approach falls to that of jump-off. When surfaces approach each other, as here
+        unless told, the law knows no attraction at a distance: a summit is in contact from approach 0 on, where it
+        jumps to the radius (2 pi dgamma R^2/E*)^(1/3) and is in tension.
+    """
+    law = JKR(material)
+    return _sum_over_summits(lambda a, R: np.pi * a**2, law, reduced_separation, moments, pulled)
+
+
+def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material: Material, *, pulled: bool = False):
+    """p* of the same summits, negative in tension; parameters as those of `fuller_tabor_area`."""
+    law = JKR(material)
+    pressure = _sum_over_summits(law.force, law, reduced_separation, moments, pulled)
+    return pressure / (material.contact_modulus * moments.rms_slope)
+
+
+def separation_at(quantity: Callable, value, moments: SpectralMoments, *arguments):
+    """Where quantity(separation, moments, *arguments), which falls with the separation, has the values `value`.
+
+    Raises
+    ------
+    ValueError
+        If a value is not positive, or is not reached within 10 deviations of the mean summit.
+    """
+    summits = gaussian_summits(moments)
+    middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height
+    value = np.asarray(value, float)
+    if np.any(value <= 0):
+        raise ValueError(f"{value.min():g} is not a value greater than 0")
+    low, high = middle - reach, middle + reach
+    ends = [float(quantity(end, moments, *arguments)) for end in (low, high)]
+    if value.size and not (value.max() <= ends[0] and value.min() >= ends[1]):
+        raise ValueError(
+            f"{value.min():g} to {value.max():g} lies outside what summits reach, {ends[1]:g} to {ends[0]:g}"
+        )
+
+    def root(wanted):
+        return brentq(lambda u: math.log(quantity(u, moments, *arguments) / wanted), low, high, xtol=1e-13)
+
+    return np.array([root(wanted) for wanted in value.ravel()]).reshape(value.shape)
+
+
+def _height_above_summits(reduced_separation, moments, summits):
+    """The plane's height above the mean summit, in standard deviations."""
+    return (np.asarray(reduced_separation, float) * moments.rms_height - summits.mean_height) / summits.deviation
+
+
+def _mean_power_above(t, n):
+    """F_n(t): the mean of (s - t)^n, where it is positive, over standard normal s."""
+    return gamma(n + 1) / math.sqrt(2 * np.pi) * np.exp(-(t**2) / 4) * pbdv(-n - 1, t)[0]
+
+
+def _sum_over_summits(of_summit, law, reduced_separation, moments, pulled):
+    """Sum of of_summit(contact radius, radius) over the summits in contact, per area.
+
+    A summit's contact radius tells its approach, and that its height above the plane.
+    """
+    summits = gaussian_summits(moments)
+    plane = np.asarray(reduced_separation, float)[..., None] * moments.rms_height
+    first = float(law.jump_off_approach(summits.radius)) if pulled else 0.0
+    above, reach = summits.mean_height - plane, _FARTHEST_SUMMIT * summits.deviation
+    limits = (np.maximum(first, above - reach), np.maximum(first, above + reach))
+    start, end = (law.contact_radius(approach, summits.radius) for approach in limits)
+    a = start + (end - start) * (_NODES + 1) / 2
+    heights = (plane + law.approach(a, summits.radius) - summits.mean_height) / summits.deviation
+    density = np.exp(-(heights**2) / 2) / (math.sqrt(2 * np.pi) * summits.deviation)
+    per_radius = density * law.approach_derivative(a, summits.radius)
+    return summits.density * np.sum(of_summit(a, summits.radius) * per_radius * (end - start) / 2 * _WEIGHTS, axis=-1)

@@ -1,0 +1,173 @@
+"""Whether results are what was written: a record of every file, made when it was.
+
+The record of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`, with the file's SHA-256, size
+and time of change. A file of the same size and time is trusted, any other one is hashed; what the storage itself has
+spoilt changes neither, and is found where a file is hashed in any case (`thorough`). A result may be a folder, too.
+
+A record without its result says that the result was there, or was about to be, and is to be made again. Results without
+a record, those of older versions for one, are taken as they are.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from icha.support.atomic_files import whole_file
+
+FOLDER = "checksums"
+
+
+class Record(NamedTuple):
+    """What is known of a result since it was written; of a folder the sum of sizes and the latest time of its files."""
+
+    sha256: str
+    size: int
+    mtime_ns: int
+
+
+def write_record(results: str | os.PathLike, path: str) -> None:
+    """Record the result `path`, given from the campaign's folder `results`.
+
+    Raises
+    ------
+    OSError
+        If there is no such result, or the record cannot be written.
+    """
+    file = Path(results, path)
+    size, mtime_ns = _size_and_time(file)
+    _write(results, path, Record(_sha256(file), size, mtime_ns))
+
+
+def begin(results: str | os.PathLike, path: str) -> None:
+    """Record that a result is about to be written; until it is recorded, whatever is there counts as whole."""
+    _write(results, path, _BEGUN)
+
+
+def distrust(results: str | os.PathLike, path: str) -> None:
+    """Have a result hashed by whoever looks at it next, whatever its size and time."""
+    record = _read(results, path)
+    if record not in (None, _BEGUN):
+        _write(results, path, record._replace(mtime_ns=0))
+
+
+def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -> bool:
+    """Whether the result `path` in the campaign's folder `results` is what was written, as far as that is recorded.
+
+    A file of the recorded size and time is taken for whole, unless all are to be hashed (`thorough`). A file that was
+    only copied or touched has another time and the same content; its record gets the new time, where it can be written.
+
+    A record that cannot be read vouches for nothing: its result does not count as whole.
+    """
+    file = Path(results, path)
+    try:
+        record = _read(results, path)
+    except ValueError:
+        return not file.exists()
+    if record in (None, _BEGUN):
+        return True
+    try:
+        size, mtime_ns = _size_and_time(file)
+    except FileNotFoundError:
+        return True  # nothing there that could be damaged
+    if size != record.size:
+        return False
+    if mtime_ns == record.mtime_ns and not thorough:
+        return True
+    if _sha256(file) != record.sha256:
+        return False
+    if mtime_ns != record.mtime_ns:
+        with contextlib.suppress(OSError):
+            _write(results, path, record._replace(mtime_ns=mtime_ns))
+    return True
+
+
+def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
+    """Paths of all results of a campaign that are there but are not what was written, sorted."""
+    return [path for path in recorded(results) if not is_whole(results, path, thorough=thorough)]
+
+
+def lost(results: str | os.PathLike) -> list[str]:
+    """Paths of all results of a campaign that are recorded but are not there, sorted."""
+    return [path for path in recorded(results) if not os.path.exists(os.path.join(results, path))]
+
+
+def recorded(results: str | os.PathLike) -> Iterator[str]:
+    """Paths of all results that have a record, whether they are there or not, sorted."""
+    top = os.path.join(results, FOLDER)
+    for folder, folders, names in os.walk(top):
+        folders.sort()
+        below = os.path.relpath(folder, top)
+        for name in sorted(names):
+            if name.endswith(".json") and not name.startswith("."):
+                yield os.path.normpath(os.path.join(below, name.removesuffix(".json")))
+
+
+def set_aside(results: str | os.PathLike, path: str) -> Path:
+    """Rename a result to `<name>.damaged`, or `.damaged2` and so on; return the new path.
+
+    Its record stays: the result is lost now, and to be made again.
+
+    Raises
+    ------
+    OSError
+        If it cannot be renamed, in a folder that is read-only for one.
+    """
+    file = Path(results, path)
+    number = 1
+    while (aside := file.with_name(f"{file.name}.damaged{number if number > 1 else ''}")).exists():
+        number += 1
+    file.rename(aside)
+    return aside
+
+
+# No file has this digest.
+_BEGUN = Record("", 0, 0)
+
+
+def _record_file(results, path) -> Path:
+    return Path(results, FOLDER, f"{path}.json")
+
+
+def _read(results, path) -> Record | None:
+    """The record of a result, if it has one; `ValueError` if it cannot be read."""
+    try:
+        with open(os.path.join(results, FOLDER, f"{path}.json"), "rb") as file:
+            return Record(**json.loads(file.read()))
+    except FileNotFoundError:
+        return None
+    except TypeError as error:
+        raise ValueError(f"{_record_file(results, path)}: not a record: {error}") from None
+
+
+def _write(results, path, record: Record) -> None:
+    with whole_file(_record_file(results, path)) as temporary:
+        temporary.write_text(json.dumps(record._asdict()) + "\n", encoding="ascii")
+
+
+def _size_and_time(file) -> tuple[int, int]:
+    if not os.path.isdir(file):
+        status = os.stat(file)
+        return status.st_size, status.st_mtime_ns
+    found = [os.stat(each) for each in _files_in(Path(file))]
+    return sum(status.st_size for status in found), max((status.st_mtime_ns for status in found), default=0)
+
+
+def _sha256(file: Path) -> str:
+    if not file.is_dir():
+        with file.open("rb") as content:
+            return hashlib.file_digest(content, "sha256").hexdigest()
+    digest = hashlib.sha256()
+    for each in _files_in(file):
+        digest.update(f"{_sha256(each)}  {each.relative_to(file).as_posix()}\n".encode())
+    return digest.hexdigest()
+
+
+def _files_in(folder: Path) -> list[Path]:
+    """All files below a folder, sorted, without the mark that Snakemake leaves in folders."""
+    return sorted(each for each in folder.rglob("*") if each.is_file() and each.name != ".snakemake_timestamp")

@@ -1,0 +1,1 @@
+"""Rough surfaces: their spectra, moments and summits, made at random or measured."""

@@ -1,0 +1,1 @@
+"""Measured topographies: reading what instruments and people write, and preparing it for the model."""

@@ -1,0 +1,49 @@
+"""Height maps from files, for surfaces of `kind: file`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from icha.support.validation import flaw_of_heights
+
+_ALLOWED = "allowed: a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
+
+
+def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
+    """Read the heights of a file, (n, n) in m, first axis y.
+
+    Parameters
+    ----------
+    path : `.npy`, or netCDF with a variable `height`.
+    metres_per_unit : the unit of the heights in the file.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or its heights are not a square array of finite numbers.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ValueError(f"no such file; {_ALLOWED}")
+    try:
+        heights = _heights(path)
+    except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
+        raise ValueError(f"cannot be read ({error}); {_ALLOWED}") from None
+    if heights.dtype.kind not in "iuf":
+        raise ValueError(f"holds {heights.dtype}, not real numbers; {_ALLOWED}")
+    if flaw := flaw_of_heights(heights):
+        raise ValueError(f"holds {flaw}; {_ALLOWED}")
+    return heights.astype(float) * metres_per_unit
+
+
+def _heights(path: Path) -> np.ndarray:
+    if path.suffix == ".npy":
+        return np.load(path, allow_pickle=False)
+    if path.suffix == ".nc":
+        import netCDF4
+
+        with netCDF4.Dataset(path) as data:
+            return np.ma.filled(data["height"][...].astype(float), np.nan)
+    raise ValueError(f"unknown kind of file {path.suffix!r}")

@@ -1,0 +1,124 @@
+"""What a rough surface is to statistical theories: three moments of its spectrum, and numbers made of them.
+
+Surfaces are taken to be isotropic: the moments are those of a profile along any direction, as in P. R. Nayak, J.
+Lubr. Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from icha.asperity.material import Material
+from icha.surfaces.surface import Surface
+
+# Contact area over load in the limit of small areas, A E* h'_rms/F, in the theory of Pastewka & Robbins.
+REPULSIVE_AREA_SLOPE = 2.0
+
+
+class SpectralMoments(NamedTuple):
+    """Variances of a profile's height (m0, m^2), slope (m2, 1) and curvature (m4, m^-2)."""
+
+    m0: float
+    m2: float
+    m4: float
+
+    @property
+    def nayak_parameter(self) -> float:
+        """Nayak's alpha = m0 m4/m2^2, the breadth of the spectrum; at least 3/2 for an isotropic surface."""
+        return self.m0 * self.m4 / self.m2**2
+
+    @property
+    def rms_height(self) -> float:
+        """Root mean square height, m."""
+        return self.m0**0.5
+
+    @property
+    def rms_slope(self) -> float:
+        """Root mean square of |grad h|, whose square is twice that of a profile's slope."""
+        return (2 * self.m2) ** 0.5
+
+    @property
+    def rms_laplacian(self) -> float:
+        """Root mean square of the Laplacian of h, 1/m, whose square is 8/3 of that of a profile's curvature."""
+        return (8 / 3 * self.m4) ** 0.5
+
+    def scaled_to_rms_slope(self, rms_slope: float) -> SpectralMoments:
+        """Those of the same topography with its heights multiplied so that the rms slope is `rms_slope`."""
+        factor = (rms_slope / self.rms_slope) ** 2
+        return SpectralMoments(*(moment * factor for moment in self))
+
+
+def spectral_moments(surface: Surface) -> SpectralMoments:
+    """Moments of a profile of the surface, averaged over its directions."""
+    height, slope, laplacian = surface.spectral_moments
+    return SpectralMoments(height, slope / 2, 3 / 8 * laplacian)
+
+
+def stickiness(moments: SpectralMoments, material: Material) -> float:
+    r"""Attraction over repulsion where surfaces touch; those above 1 stick, without adhesion it is 0.
+
+    L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. The contact, of area A, feels
+    the mean repulsive pressure h' E*/kappa with kappa = 2. Around it lies the area of a gap less than the range r of
+    the attraction, of the stress dgamma/r; by Hertz's gap beside a contact of mean diameter d = 4 h'/h'' that area is
+
+        A_att/A = pi [3 h'' r/(16 h'^2)]^(2/3).
+
+    The ratio of the two forces is kappa/kappa_att in their notation, and their criterion for sticking,
+
+        (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03,
+
+    is that it exceeds 1. h' is the rms slope, h'' the rms Laplacian. They ask for an attraction of short range, whose
+    area stays small beside A: J. M. Monti, A. Sanner and L. Pastewka, Tribol. Lett. 69 (2021),
+    doi:10.1007/s11249-021-01454-6. The range of the material stands for r.
+
+    Parameters
+    ----------
+    moments : of the surface, at its own rms slope.
+    material : contact modulus, surface energy and range of attraction.
+    """
+    slope, reach = moments.rms_slope, material.interaction_range
+    attractive_area = np.pi * np.cbrt(3 * moments.rms_laplacian * reach / (16 * slope**2)) ** 2
+    return float(REPULSIVE_AREA_SLOPE * material.adhesion_length / (slope * reach) * attractive_area)
+
+
+def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Wave numbers (rad/m) and isotropic power spectrum C(q) (m^4): the mean over the wave vectors of a ring.
+
+    The integral of C over the plane of wave vectors is the mean square height. Rings are one wave number 2 pi/L wide,
+    from the tenth on a tenth of their wave number; they end where the grid does not hold all their directions. A free
+    square is multiplied by Hann's window first, and C divided by the mean square of that, so that the step from one
+    edge to the other does not show.
+    """
+    edges, shown, scale = _ring_edges(surface), surface, 1.0
+    if surface.free:
+        hann = np.sin(np.pi * (np.arange(surface.grid) + 0.5) / surface.grid) ** 2
+        shown = Surface(surface.heights * (hann[:, None] * hann), surface.period)
+        scale = 1 / np.mean(hann**2) ** 2
+
+    def rings(k2, count, power):
+        k = np.sqrt(k2)
+        ring = np.searchsorted(edges, k.ravel(), side="right")
+        count = np.broadcast_to(count, k.shape)
+        sums = (count, count * k, power)
+        return [np.bincount(ring, weights=each.ravel(), minlength=len(edges) + 1) for each in sums]
+
+    count, wave_number, power = np.sum(shown.by_wave_vector(rings), axis=0)[:, 1:-1]
+    unit = 2 * np.pi / surface.period
+    return unit * wave_number / count, scale * power / count / unit**2
+
+
+def ring_edges(surface: Surface) -> np.ndarray:
+    """Wave numbers (rad/m) of the edges of the rings of `radial_power_spectrum`, one more than there are rings."""
+    return 2 * np.pi / surface.period * _ring_edges(surface)
+
+
+def _ring_edges(surface):
+    """Edges of the rings in 2 pi/L."""
+    last = (surface.grid - 1) // 2
+    edges = [0.5]
+    while edges[-1] < last:
+        edges.append(min(max(edges[-1] + 1, math.floor(1.1 * edges[-1]) + 0.5), last + 0.5))
+    return np.array(edges)

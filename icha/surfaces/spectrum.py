@@ -1,0 +1,198 @@
+"""Self-affine spectra with roll-off and their realisations (Violano & Afferrante, eq. PSD).
+
+C(q) = C0 for q_L <= q < q_0, C0 (q/q_0)^(-2(1+H)) for q_0 <= q < q_1, and 0 elsewhere; q_L = 2 pi / L. The
+convention is that the integral of C over the wave-vector plane is h_rms^2, so one mode of the periodic cell
+carries |h_q|^2 = C(q) (2 pi/L)^2.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.fft
+
+from icha.support.parallel import blocks, on_cores
+from icha.support.validation import integer, number, positive
+from icha.surfaces.surface import Surface
+
+# Wave numbers are compared in units of 2 pi / L; this keeps |k| = 64 out of a band that ends at L/lambda_s = 64
+# whatever the rounding of the quotient.
+_ROUNDING = 1e-9
+
+AMPLITUDES = ("fixed", "gaussian")
+
+# Rows or columns that are transformed at a time.
+_LINES = 64
+
+
+@dataclass(frozen=True)
+class SelfAffineSpectrum:
+    """Power spectral density of a self-affine surface, normalised by its rms slope.
+
+    Parameters
+    ----------
+    period : L, side of the periodic cell, m.
+    rolloff_wavelength : 2 pi / q_0, m; at most the period.
+    short_wavelength : 2 pi / q_1, the short cut-off, m; less than the roll-off wavelength.
+    hurst : H, in (0, 1].
+    rms_slope : h'_rms; the sum of q^2 |h_q|^2 over the lattice of the cell equals its square exactly.
+
+    Raises
+    ------
+    ValueError
+        Naming the parameter whose value is not allowed.
+    """
+
+    period: float
+    rolloff_wavelength: float
+    short_wavelength: float
+    hurst: float
+    rms_slope: float = 1.0
+
+    def __post_init__(self):
+        """Check the values."""
+        for name in ("period", "rolloff_wavelength", "short_wavelength"):
+            object.__setattr__(self, name, positive(name, getattr(self, name), "metres"))
+        object.__setattr__(self, "rms_slope", positive("rms_slope", self.rms_slope))
+        object.__setattr__(self, "hurst", number("hurst", self.hurst))
+        if not 0 < self.hurst <= 1:
+            raise ValueError(f"hurst: {self.hurst!r} must lie in (0, 1]")
+        if self.rolloff_wavelength > self.period * (1 + _ROUNDING):
+            raise ValueError(
+                f"rolloff_wavelength: {self.rolloff_wavelength!r} m must not exceed the period {self.period!r} m"
+            )
+        if self.short_wavelength >= self.rolloff_wavelength:
+            raise ValueError(
+                f"short_wavelength: {self.short_wavelength!r} m must be less than the roll-off wavelength "
+                f"{self.rolloff_wavelength!r} m"
+            )
+        if not len(self._band[0]):
+            raise ValueError(
+                f"short_wavelength: {self.short_wavelength!r} m leaves no wave that fits the period {self.period!r} m"
+            )
+
+    def psd(self, q):
+        """C(q) in m^4 for wave numbers `q` (any shape) in rad/m."""
+        q = np.asarray(q, dtype=float)
+        return self.plateau * self._shape(q * self.period / (2 * np.pi))
+
+    def _shape(self, k):
+        """C/C0 for wave numbers in units of 2 pi / L."""
+        k0 = self.period / self.rolloff_wavelength
+        k1 = self.period / self.short_wavelength
+        falling = np.maximum(k / k0, 1.0) ** (-2 * (1 + self.hurst))
+        return np.where((k >= 1 - _ROUNDING) & (k < k1 * (1 - _ROUNDING)), falling, 0.0)
+
+    @cached_property
+    def _band(self):
+        """Wave vectors (kx, ky) of one half of the band, and |k|, in units of 2 pi / L.
+
+        They are ordered by max(|kx|, |ky|), so that neither the grid nor a smaller short cut-off changes
+        which random number a mode receives: finer surfaces of one seed only add shorter waves.
+        """
+        m = math.ceil(self.period / self.short_wavelength)
+        kx, ky = np.meshgrid(np.arange(m + 1), np.arange(-m, m + 1))
+        kx, ky = kx.ravel(), ky.ravel()
+        half = (kx > 0) | (ky > 0)
+        kx, ky = kx[half], ky[half]
+        order = np.lexsort((ky, kx, np.maximum(kx, np.abs(ky))))
+        kx, ky = kx[order], ky[order]
+        k = np.hypot(kx, ky)
+        inside = self._shape(k) > 0
+        return kx[inside], ky[inside], k[inside], inside
+
+    @cached_property
+    def plateau(self) -> float:
+        """C0 in m^4, such that the modes of the periodic cell have exactly the rms slope."""
+        _, _, k, _ = self._band
+        q = 2 * np.pi / self.period
+        slope2 = 2 * float(np.sum(self._shape(k) * k**2)) * q**4
+        return self.rms_slope**2 / slope2
+
+    @property
+    def rms_height(self) -> float:
+        """Root mean square height of the periodic cell's modes, m."""
+        _, _, k, _ = self._band
+        q = 2 * np.pi / self.period
+        return math.sqrt(2 * self.plateau * float(np.sum(self._shape(k))) * q**2)
+
+    def continuum_rms_height(self) -> float:
+        """h_rms in m from integrals over the plane of wave vectors, as if the cell were infinite.
+
+        h_rms^2 = 2 pi C0 [(q0^2-qL^2)/2 + q0^2 (1-(q1/q0)^(-2H))/(2H)], and for the slope q^3 under the integral.
+        The lattice of a finite cell differs from it by the sampling of its few longest waves.
+        """
+        q_l = 2 * np.pi / self.period
+        q_0 = 2 * np.pi / self.rolloff_wavelength
+        ratio = self.rolloff_wavelength / self.short_wavelength
+        hurst = self.hurst
+        height2 = (q_0**2 - q_l**2) / 2 + q_0**2 * (1 - ratio ** (-2 * hurst)) / (2 * hurst)
+        # (ratio^(2-2H) - 1)/(2-2H) tends to ln(ratio) as H -> 1.
+        growth = math.log(ratio) if hurst == 1 else math.expm1((2 - 2 * hurst) * math.log(ratio)) / (2 - 2 * hurst)
+        slope2 = (q_0**4 - q_l**4) / 4 + q_0**4 * growth
+        return self.rms_slope * math.sqrt(height2 / slope2)
+
+    def cells_per_short_wave(self, grid: int) -> float:
+        """Grid cells per shortest wavelength on a grid of `grid` nodes a side."""
+        return grid * self.short_wavelength / self.period
+
+    def realise(self, grid: int, seed: int, amplitudes: str = "fixed") -> Surface:
+        """Draw a periodic surface by spectral synthesis with random phases.
+
+        Parameters
+        ----------
+        grid : nodes along a side. At least 2 per shortest wavelength (an error below, a warning under 4).
+        seed : seed of the random phases, a non-negative integer.
+        amplitudes : "fixed" by the spectrum (height and slope are then the same for every seed), or "gaussian".
+
+        Returns
+        -------
+        Surface of zero mean.
+
+        Raises
+        ------
+        ValueError
+            Naming the argument whose value is not allowed.
+        """
+        grid = integer("grid", grid, 8)
+        seed = integer("seed", seed, 0)
+        if amplitudes not in AMPLITUDES:
+            raise ValueError(f"amplitudes: {amplitudes!r} must be one of {', '.join(AMPLITUDES)}")
+        cells = self.cells_per_short_wave(grid)
+        if cells < 2 * (1 - _ROUNDING):
+            raise ValueError(
+                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; "
+                f"at least {math.ceil(2 * self.period / self.short_wavelength * (1 - _ROUNDING))} nodes are needed"
+            )
+        if cells < 4 * (1 - _ROUNDING):
+            warnings.warn(
+                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; 4 are the least advisable, "
+                "8 recommended",
+                stacklevel=2,
+            )
+        kx, ky, k, inside = self._band
+        random = np.random.Generator(np.random.PCG64(seed)).random((inside.size, 2))[inside]
+        size = np.sqrt(self.plateau * self._shape(k)) * (2 * np.pi / self.period)
+        if amplitudes == "gaussian":
+            size = size * np.sqrt(-np.log1p(-random[:, 1]))
+        modes = size * np.exp(2j * np.pi * random[:, 0])
+        # Columns of shorter waves are empty and need no transform along y.
+        half = np.zeros((grid, kx.max() + 1), dtype=complex)
+        half[ky % grid, kx] = modes
+        on_axis = kx == 0
+        half[-ky[on_axis] % grid, 0] = np.conj(modes[on_axis])
+        heights = np.empty((grid, grid))
+
+        def along_y(columns):
+            half[:, columns] = scipy.fft.ifft(half[:, columns], axis=0, norm="forward", workers=1)
+
+        def along_x(rows):
+            heights[rows] = scipy.fft.irfft(half[rows], n=grid, axis=1, norm="forward", workers=1)
+
+        on_cores(along_y, blocks(half.shape[1], _LINES))
+        on_cores(along_x, blocks(grid, _LINES))
+        return Surface(heights, self.period)

@@ -1,0 +1,230 @@
+"""Summits of a surface: positions, heights and radii of curvature, found below the grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.ndimage
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.spatial import cKDTree
+
+from icha.half_space.interaction import cell_of
+from icha.support.parallel import blocks, on_cores
+from icha.surfaces.surface import Surface
+
+# A quintic spline reproduces a parabola exactly, depends on far nodes only weakly (0.43 per cell), and at eight
+# cells per wavelength has the second derivatives of a sine to 4e-4.
+_DEGREE = 5
+# Value, slope and curvature of the quintic spline at a node, from the coefficients of the five nodes around.
+_VALUE = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120
+_SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24
+_CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6
+
+# Quintic B-splines of the six nodes around a point, as polynomials of its way t from the third of them to the fourth
+# (rows: nodes; columns: powers of t), and their first and second derivatives.
+_BASIS = (
+    np.array(
+        [
+            [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
+            [26.0, -50.0, 20.0, 20.0, -20.0, 5.0],
+            [66.0, 0.0, -60.0, 0.0, 30.0, -10.0],
+            [26.0, 50.0, 20.0, -20.0, -20.0, 10.0],
+            [1.0, 5.0, 10.0, 10.0, 5.0, -5.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+    / 120
+)
+_BASIS_SLOPE = _BASIS[:, 1:] * np.arange(1, 6)
+_BASIS_CURVATURE = _BASIS_SLOPE[:, 1:] * np.arange(1, 5)
+
+_MAX_NEWTON_STEPS = 30
+# In cells: the last step of a converged search, how far from its node it may end, and when two ends are the same.
+_CONVERGED = 1e-9
+_FARTHEST = 1.5
+_SAME_SUMMIT = 1e-3
+# Less curvature than this part of the surface's mean is rounding on a plateau.
+_FLAT = 1e-6
+# Nodes beyond the edges of a free square, after which the spline has forgotten what follows: 0.43^32 = 2e-12.
+_BEYOND = 32
+# Rows or columns of the grid, and points between them, that are worked on at a time, which bounds the memory.
+_LINES = 16
+_POINTS = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Asperities:
+    """The summits of a surface.
+
+    position : (n, 2) array, (x, y) in [0, period), m.
+    height : (n,) array, above the mean plane, m.
+    radius : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
+    period : side of the square, m.
+    free : whether it is single, on a free half-space, or repeats.
+    """
+
+    position: np.ndarray
+    height: np.ndarray
+    radius: np.ndarray
+    period: float
+    free: bool = False
+
+    @property
+    def cell(self) -> float:
+        """Period of positions, m: of a single square twice the side, where all ways are the shortest."""
+        return cell_of(self.period, self.free)
+
+    def __len__(self) -> int:
+        """Number of asperities."""
+        return len(self.height)
+
+
+def find_summits(surface: Surface) -> Asperities:
+    """All summits of a surface: the maxima, with negative-definite curvature, of a quintic spline through its nodes.
+
+    Comparing every node with its neighbours misses and misplaces elongated summits: on a crest oblique to the grid
+    the highest node can lie cells away from the summit, or there is none, and the contact area then depends on the
+    grid by some per cent. Instead Newton's method starts from every node whose own parabola has its top in a cell
+    next to it, and only a start that converges nearby counts, since near-degenerate curvatures throw the others far
+    away.
+
+    The edges of a free square have no maxima: a crest that runs over an edge has its top outside. There the heights go
+    on by point reflection at the edge, and summits count that lie between the outermost nodes.
+
+    Returns
+    -------
+    Asperities, ordered as the nodes from which they were found.
+
+    Raises
+    ------
+    ValueError
+        If the surface has no summit with negative-definite curvature.
+    """
+    spacing, beyond = surface.spacing, _BEYOND if surface.free else 0
+    heights = surface.heights
+    if surface.free:
+        heights = np.pad(heights, beyond, mode="reflect", reflect_type="odd")
+    grid = len(heights)
+    coefficients = _spline_coefficients(heights)
+    node, flat = _nodes_near_summits(coefficients)
+    searches = on_cores(lambda some: _climb(coefficients, node[some], flat), blocks(len(node), _POINTS))
+    at = np.concatenate([np.empty((0, 2)), *searches])
+    # Several nodes lead to one summit: the first stands for it.
+    twice = np.sort(cKDTree(at, boxsize=grid).query_pairs(_SAME_SUMMIT, output_type="ndarray"), axis=1)
+    at = np.delete(at, twice[:, 1], axis=0)
+    if surface.free:
+        at = at[np.all((at > beyond) & (at < beyond + surface.grid - 1), axis=1)]
+    if not len(at):
+        raise ValueError("heights: the surface has no summit with negative-definite curvature")
+    there = on_cores(lambda some: _spline(coefficients, at[some]), blocks(len(at), _POINTS))
+    height, _, _, hyy, hyx, hxx = np.concatenate(there, axis=1)
+    position = (at[:, ::-1] - beyond) * spacing
+    position[position >= surface.period] = 0.0
+    return Asperities(
+        position=position,
+        height=height,
+        radius=spacing**2 / np.sqrt(hyy * hxx - hyx**2),
+        period=surface.period,
+        free=surface.free,
+    )
+
+
+def _spline_coefficients(heights):
+    """Coefficients (n, n) of the periodic quintic spline through the heights."""
+    coefficients = np.empty_like(heights)
+
+    def along_x(rows):
+        _spline_filter(heights[rows], output=coefficients[rows])
+
+    def along_y(columns):
+        coefficients[:, columns] = _spline_filter(np.ascontiguousarray(coefficients[:, columns].T)).T
+
+    on_cores(along_x, blocks(len(heights), _LINES))
+    on_cores(along_y, blocks(len(heights), _LINES))
+    return coefficients
+
+
+def _spline_filter(lines, output=np.float64):
+    return scipy.ndimage.spline_filter1d(lines, order=_DEGREE, axis=1, output=output, mode="grid-wrap")
+
+
+def _climb(coefficients, node, flat):
+    """The summits (k, 2), in cells, to which Newton's method leads from those of the nodes (m, 2) that have one."""
+    grid = len(coefficients)
+    at, converged = node.copy(), np.zeros(len(node), dtype=bool)
+    moving = np.arange(len(node))
+    for _ in range(_MAX_NEWTON_STEPS):
+        _, *derivatives = _spline(coefficients, np.mod(at[moving], grid))
+        concave, _, step = _newton_step(*derivatives, flat)
+        at[moving] += np.clip(step, -0.5, 0.5)
+        near = concave & (np.max(np.abs(at[moving] - node[moving]), axis=1) <= _FARTHEST)
+        small = np.max(np.abs(step), axis=1) <= _CONVERGED
+        converged[moving] = near & small
+        moving = moving[near & ~small]
+        if not len(moving):
+            break
+    at = np.mod(at[converged], grid)
+    at[at >= grid] = 0.0
+    return at
+
+
+def _nodes_near_summits(coefficients):
+    """Nodes (k, 2) from which Newton's step to a maximum is at most a cell, and the curvature that counts as flat.
+
+    Curvatures are in metres per squared cell.
+    """
+    grid = len(coefficients)
+
+    def examine(rows):
+        block = coefficients[np.arange(rows.start - 2, rows.stop + 2) % grid]
+        five = sliding_window_view(block, 5, axis=0)
+        value, slope, curvature = (np.einsum("ijk,k->ij", five, weights) for weights in (_VALUE, _SLOPE, _CURVATURE))
+
+        def along_x(partial, weights):
+            return scipy.ndimage.correlate1d(partial, weights, axis=1, mode="wrap").ravel()
+
+        hyy, hyx, hxx = along_x(curvature, _VALUE), along_x(slope, _SLOPE), along_x(value, _CURVATURE)
+        concave = np.flatnonzero((hyy * hxx > hyx**2) & (hyy < 0))
+        gradient = along_x(slope, _VALUE)[concave], along_x(value, _SLOPE)[concave]
+        _, determinant, step = _newton_step(*gradient, hyy[concave], hyx[concave], hxx[concave], 0.0)
+        close = np.max(np.abs(step), axis=1) <= 1
+        row, column = np.divmod(concave[close], grid)
+        return np.column_stack([row + rows.start, column, determinant[close]]), np.sum(np.abs(hyy + hxx))
+
+    found, traces = zip(*on_cores(examine, blocks(grid, _LINES)), strict=True)
+    found = np.concatenate(found)
+    flat = _FLAT * float(np.sum(traces)) / grid**2
+    return found[found[:, 2] > flat**2, :2], flat
+
+
+def _spline(coefficients, at):
+    """The spline's value and its derivatives y, x, yy, yx, xx at points (k, 2) in cells, each (k,)."""
+    grid = len(coefficients)
+    floor = np.floor(at).astype(int).T
+    (ty, tx), nodes = at.T - floor, np.arange(-2, 4)[:, None]
+    row, column = np.mod(floor[0] + nodes, grid), np.mod(floor[1] + nodes, grid)
+    around = coefficients[row[:, None], column[None, :]]
+    # First along y, then along x: what is left are the six nodes of a row.
+    by = [np.einsum("ik,ijk->jk", basis, around) for basis in _basis(ty)]
+    bx = _basis(tx)
+    return [np.einsum("jk,jk->k", by[i], bx[j]) for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
+
+
+def _basis(t):
+    """Value, slope and curvature (6, k) of the six quintic B-splines around points at t in [0, 1), (k,)."""
+    powers = np.cumprod(np.vstack([np.ones_like(t), np.broadcast_to(t, (_DEGREE, len(t)))]), axis=0)
+    return [
+        np.einsum("ij,jk->ik", polynomial, powers[: polynomial.shape[1]])
+        for polynomial in (_BASIS, _BASIS_SLOPE, _BASIS_CURVATURE)
+    ]
+
+
+def _newton_step(gy, gx, hyy, hyx, hxx, flat):
+    """Whether the Hessian is negative definite, its determinant, and Newton's step (..., 2), zero where it is not."""
+    determinant = hyy * hxx - hyx**2
+    concave = (determinant > flat**2) & (hyy + hxx < 0)
+    safe = np.where(concave, -determinant, 1.0)
+    step = np.stack([(hxx * gy - hyx * gx) / safe, (hyy * gx - hyx * gy) / safe], axis=-1)
+    step[~concave] = 0.0
+    return concave, determinant, step

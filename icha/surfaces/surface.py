@@ -1,0 +1,200 @@
+"""A square height map: the rigid rough surface, looking towards the half-space.
+
+Heights are in metres and positive towards the elastic body. The first axis of an array of heights is y,
+the second x; node (iy, ix) lies at (x, y) = (ix, iy) * spacing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.fft
+
+from icha.support.parallel import blocks, on_cores
+from icha.support.validation import flaw_of_heights, integer, positive
+
+# What lies beyond the square: the same square again and again, or nothing but the half-space.
+PERIODIC, FREE = "periodic", "free"
+BOUNDARIES = (PERIODIC, FREE)
+
+# Rows or columns that are transformed at a time.
+_LINES = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A rough surface of zero mean height: one cell of a periodic one, or a single square.
+
+    Parameters
+    ----------
+    heights : (n, n) array, metres. Its mean is removed; the array is copied and made read-only.
+    period : side of the square in metres; of a periodic surface its period.
+    boundary : "periodic" in both directions, or "free": one square on a half-space that goes on beyond it.
+
+    Raises
+    ------
+    ValueError
+        If the heights are not a square array of at least 8 x 8 finite numbers, or all the same, or the period
+        is not a positive number, or the boundary is neither of the two.
+    """
+
+    heights: np.ndarray
+    period: float
+    boundary: str = PERIODIC
+
+    def __post_init__(self):
+        """Check the values and freeze them."""
+        try:
+            given = np.asarray(self.heights)
+            if given.dtype.kind not in "fiu":
+                raise TypeError(f"they are of type {given.dtype.name}")
+            if np.ma.is_masked(self.heights):
+                raise ValueError("some are masked; fill or crop them first")
+            heights = np.array(given, dtype=np.float64, order="C")
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
+        if flaw := flaw_of_heights(heights):
+            raise ValueError(f"heights: {flaw}")
+        heights -= heights.mean()
+        heights.flags.writeable = False
+        object.__setattr__(self, "heights", heights)
+        object.__setattr__(self, "period", positive("period", self.period, "metres"))
+        if self.boundary not in BOUNDARIES:
+            raise ValueError(f"boundary: {self.boundary!r} must be one of {', '.join(BOUNDARIES)}")
+
+    @property
+    def grid(self) -> int:
+        """Number of nodes along a side."""
+        return self.heights.shape[0]
+
+    @property
+    def spacing(self) -> float:
+        """Distance between neighbouring nodes, metres."""
+        return self.period / self.grid
+
+    @property
+    def free(self) -> bool:
+        """Whether it is a single square."""
+        return self.boundary == FREE
+
+    def require_periodic(self, what: str) -> None:
+        """Raise ValueError, naming what it is for, if the surface is a free square."""
+        if self.free:
+            raise ValueError(f"boundary: {FREE!r}; {what} needs a surface of boundary {PERIODIC!r}")
+
+    def by_wave_vector(self, function) -> list:
+        """Results of `function(k2, count, power)` for all wave vectors 2 pi/L (kx, ky) but zero, in blocks.
+
+        k2 = kx^2 + ky^2; power: |h_q|^2, m^2, both (n, m); count (m,): 2 where the power is that of two opposite wave
+        vectors together, else 1. The heights are taken as one period, whatever the boundary.
+        """
+        n = self.grid
+        half = np.empty((n, n // 2 + 1), dtype=complex)
+
+        def along_x(rows):
+            half[rows] = scipy.fft.rfft(self.heights[rows], axis=1, norm="forward", workers=1)
+
+        ky2 = scipy.fft.fftfreq(n, 1 / n) ** 2
+
+        def along_y(columns):
+            modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
+            power = modes.real**2 + modes.imag**2
+            # The half spectrum holds every column but the first (and, on even grids, the last) only once.
+            kx = np.arange(columns.start, columns.stop)
+            count = np.where((kx > 0) & (2 * kx < n), 2.0, 1.0)
+            power *= count
+            if columns.start == 0:
+                power[0, 0] = 0.0
+            return function(ky2[:, None] + kx**2, count, power)
+
+        on_cores(along_x, blocks(n, _LINES))
+        return on_cores(along_y, blocks(n // 2 + 1, _LINES))
+
+    @cached_property
+    def spectral_moments(self) -> tuple[float, float, float]:
+        """Sums of |h_q|^2, q^2 |h_q|^2 and q^4 |h_q|^2 over all wave vectors: m^2, 1, m^-2.
+
+        They are the variance of height, the squared rms slope |grad h| and the squared rms of the Laplacian. Those of a
+        free square, which has no spectrum of its own, are means over its nodes, of derivatives of a quintic spline.
+        """
+        if self.free:
+            return _mean_squares(self.heights, self.spacing)
+
+        def sums(k2, _, power):
+            return [np.sum(power), np.sum(power * k2), np.sum(power * k2**2)]
+
+        moments = np.sum(self.by_wave_vector(sums), axis=0)
+        q2 = (2 * np.pi / self.period) ** 2
+        return float(moments[0]), float(moments[1] * q2), float(moments[2] * q2**2)
+
+    @property
+    def rms_height(self) -> float:
+        """Root mean square height, metres."""
+        return self.spectral_moments[0] ** 0.5
+
+    @property
+    def rms_slope(self) -> float:
+        """Root mean square of |grad h|, by the moments above (not by finite differences)."""
+        return self.spectral_moments[1] ** 0.5
+
+    @property
+    def rms_curvature(self) -> float:
+        """Root mean square curvature of a profile, sqrt(3/8 sum q^4 |h_q|^2) for an isotropic surface, 1/m.
+
+        Its inverse is the radius R_c in the Tabor parameter of the Contact Mechanics Challenge (60.1 nm there).
+        """
+        return (3 / 8 * self.spectral_moments[2]) ** 0.5
+
+    def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
+        """The same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
+        rms_slope = positive("rms_slope", rms_slope, "1")
+        factor = rms_slope / self.rms_slope
+        scaled = replace(self, heights=self.heights * factor)
+        # Known already; `cached_property` keeps its values there.
+        vars(scaled)["spectral_moments"] = tuple(moment * factor**2 for moment in self.spectral_moments)
+        return scaled
+
+    def refined(self, factor: int) -> Surface:
+        """The same topography on a grid `factor` times as fine, by its trigonometric interpolant; old nodes keep their
+        heights.
+
+        Raises
+        ------
+        ValueError
+            If the factor is not an integer of at least 1, or the surface is a free square.
+        """
+        self.require_periodic("a trigonometric interpolant")
+        if integer("factor", factor, 1) == 1:
+            return self
+        # Slow to import, and seldom needed.
+        from scipy.signal import resample
+
+        heights = self.heights
+        for axis in (0, 1):
+            heights = resample(heights, factor * self.grid, axis=axis)
+        return Surface(heights, self.period)
+
+
+def _mean_squares(heights, spacing):
+    """Mean squares over the nodes of height, slope and Laplacian, by quintic splines along both axes."""
+    # Slow to import, and seldom needed.
+    from scipy.interpolate import make_interp_spline
+
+    n = len(heights)
+    nodes = np.arange(n) * spacing
+    laplacian = np.empty_like(heights)
+
+    def along_x(rows):
+        spline = make_interp_spline(nodes, heights[rows], k=5, axis=1)
+        laplacian[rows] = spline(nodes, 2)
+        return np.sum(spline(nodes, 1) ** 2)
+
+    def along_y(columns):
+        spline = make_interp_spline(nodes, heights[:, columns], k=5, axis=0)
+        laplacian[:, columns] += spline(nodes, 2)
+        return np.sum(spline(nodes, 1) ** 2)
+
+    slope2 = sum(sum(on_cores(along, blocks(n, _LINES))) for along in (along_x, along_y))
+    return float(np.mean(heights**2)), float(slope2 / n**2), float(np.mean(laplacian**2))

@@ -1,0 +1,302 @@
+"""Checks of results pass on true runs and catch each kind of damage."""
+
+import cyclic_campaign as cyclic
+import numpy as np
+import pytest
+import small_campaign as small
+
+import icha
+from icha.analysis.checks import (
+    Check,
+    check_campaign,
+    check_run,
+    check_solution,
+    read_checks,
+    refuse_unknown_failures,
+    worst,
+    write_checks,
+)
+from icha.datasets.campaign import RunLabels, campaign_tree
+from icha.references.boundary_elements import boundary_elements
+
+
+def failed(run):
+    return {check.name for check in check_run(run) if not check.passed}
+
+
+@pytest.mark.parametrize("material", ["soft", "hertz"])
+def test_true_runs_pass(material):
+    run = small.run(material=material)
+    checks = check_run(run, "a run")
+    assert failed(run) == set()
+    assert len(checks) >= 12
+    assert {check.subject for check in checks} == {"a run"}
+
+
+def scaled(name, factor, index=...):
+    def damage(run):
+        run[name].values[index] *= factor
+
+    return damage
+
+
+def written(name, value, index=...):
+    def damage(run):
+        run[name].values[index] = value
+
+    return damage
+
+
+def risen(*, united):
+    """The surfaces further apart at a step, where spots have united or where nothing has happened."""
+
+    def damage(run):
+        run["jump_in_count"].values[...] = 0
+        run["coalescence_count"].values[...] = [0] * 4 + [united] * (run.sizes["step"] - 4)
+        run["mean_separation"].values[4] *= 1.5
+
+    return damage
+
+
+DAMAGES = {
+    "residual": written("residual", 1e-6, 2),
+    "converged": written("converged", 0, 1),
+    "targets": scaled("step_target", 1 + 1e-6, 3),
+    "area rises": scaled("contact_area_fraction", 0.3, 4),
+    "pressure rises": scaled("nominal_pressure", 0.1, 4),
+    "separation falls": risen(united=0),
+    "separation falls where spots unite": risen(united=1),
+    "area from P(p)": scaled("pressure_density", 1 + 1e-6),
+    "load from P(p)": scaled("pressure_bin_mean", 1 + 1e-6),
+    "P(u) complete": scaled("gap_density", 1 + 1e-6),
+    "area of spots": scaled("spot_radius", 1 + 1e-6, 0),
+    "load of spots": scaled("spot_force", -1, 0),
+    "finite": written("gap_density", np.nan, (0, 5)),
+    "stiffness": written("contact_stiffness", -1.0, 2),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_each_kind_of_damage_is_caught_by_its_check(name):
+    run = small.run(material="hertz").copy(deep=True)
+    DAMAGES[name](run)
+    assert name in failed(run)
+
+
+def test_a_jump_in_may_push_surfaces_apart_that_keep_an_area():
+    run = small.run(material="soft").copy(deep=True)
+    run["mean_separation"].values[4] = 1.1 * run["mean_separation"].values[3]
+    run["step_target"].values[4] = run["mean_separation"].values[4]
+    for name in ("jump_in_count", "coalescence_count"):
+        run[name].values[...] = 0
+    assert "separation falls" in failed(run)
+    run["jump_in_count"].values[4:] = 1
+    assert "separation falls" not in failed(run)
+
+
+@pytest.mark.parametrize("material", ["soft", "hertz"])
+def test_runs_that_come_back_pass(material):
+    run = cyclic.run(material=material, between=2)
+    assert failed(run) == set()
+    names = {check.name for check in check_run(run)}
+    assert {"events", "loss adds up", "loss is the work", "pull-off pressure", "separated: spots"} <= names
+    # With adhesion a loop has an area.
+    assert ("loop closes" in names) == (material == "hertz")
+    assert float(run["hysteresis_loss"]) > 0 or material == "hertz"
+
+
+CYCLE_DAMAGES = {
+    "targets": scaled("mean_separation", 1 + 1e-6, -1),
+    "finite": written("work", np.nan, 3),
+    "events": written("split_count", 1, -1),
+    "jumps lose energy": written("dissipated_by_jump_off", -1.0, -1),
+    "loss adds up": written("loss_unattributed", 1.0),
+    "loss is the work": scaled("work", 1 + 1e-6, -1),
+    "separated: spots": written("spot_count", 1, -1),
+    "separated: pressure": written("nominal_pressure", -1e-3, -1),
+    "pull-off pressure": scaled("pull_off_pressure", 1 + 1e-6),
+}
+
+
+@pytest.mark.parametrize("name", CYCLE_DAMAGES)
+def test_each_kind_of_damage_to_a_cycle_is_caught_by_its_check(name):
+    run = cyclic.run(between=2).copy(deep=True)
+    CYCLE_DAMAGES[name](run)
+    assert name in failed(run)
+
+
+def test_a_loop_without_adhesion_must_close_unless_spots_have_united():
+    run = cyclic.run(material="hertz").copy(deep=True)
+    largest = float(np.abs(run["work"]).max())
+    for name in ("hysteresis_loss", "loss_by_coalescence"):
+        run[name].values[...] += 2e-8 * largest
+    run["work"].values[-1] += 2e-8 * largest
+    assert failed(run) == {"loop closes"}
+    run["coalescence_count"].values[-1] = 1
+    run["event_kind"].values[-1] = 2
+    run["jump_off_count"].values[-1] -= 1
+    assert failed(run) == set()
+
+
+def test_the_way_back_need_not_rise_but_the_way_in_must():
+    run = cyclic.run(material="hertz", between=2).copy(deep=True)
+    assert float(run["contact_area_fraction"].diff("step").min()) < 0
+    run["contact_area_fraction"].values[1] *= 1e-3
+    assert "area rises" in failed(run)
+
+
+def test_a_union_may_take_load_from_a_step_but_not_from_a_stop():
+    run = cyclic.run(material="hertz", between=2).copy(deep=True)
+    between = int(np.flatnonzero(run["step_kind"].values == "path")[0])
+    unions = run["coalescence_count"].values
+    for name in ("nominal_pressure", "contact_area_fraction"):
+        run[name].values[between] = 0.99 * run[name].values[between - 1]
+    assert {"pressure rises", "area rises"} <= failed(run)
+    unions[between:] = 1
+    assert {"pressure rises", "area rises"}.isdisjoint(failed(run))
+    stop = int(np.flatnonzero(run["leg"].values == 0)[-1])
+    unions[stop:] = 2
+    run["nominal_pressure"].values[stop] = 0.99 * run["nominal_pressure"].values[between - 1]
+    assert "pressure rises" in failed(run) and "area rises" not in failed(run)
+
+
+def test_a_turning_point_without_a_load_is_met_within_the_accuracy_of_the_others():
+    run = cyclic.run(material="hertz").copy(deep=True)
+    run["step_kind"].values[-1] = "reduced_pressure"
+    run["step_target"].values[-1] = 0.0
+    assert "targets" not in failed(run)
+    run["reduced_pressure"].values[-1] = 1e-6
+    assert "targets" in failed(run)
+
+
+def test_cyclic_campaign_passes():
+    assert all(check.passed for check in check_campaign(cyclic.tree()))
+
+
+@pytest.fixture(scope="module")
+def solution():
+    rough = icha.SelfAffineSpectrum(
+        period=100e-6, rolloff_wavelength=50e-6, short_wavelength=12.5e-6, hurst=0.8, rms_slope=1.0
+    )
+    return boundary_elements(rough.realise(grid=64, seed=1), icha.Material(25e6, 0.05, 150e-9), 0.01)
+
+
+def test_boundary_elements_pass(solution):
+    assert all(check.passed for check in check_solution(solution))
+
+
+SOLUTION_DAMAGES = {
+    "finite": ("gap_density", np.nan),
+    "converged": ("residual", 1.01e-8),
+    "load": ("nominal_pressure", 1.002 * 25e6 * 0.01),
+    "resolved": ("strength_number", 0.51),
+    "P(u) complete": ("contact_area_fraction_raw", 0.5),
+    "area from P(p)": ("contact_area_fraction_raw", 0.5),
+    "load from P(p)": ("outside_pressure", -1.0),
+}
+
+
+@pytest.mark.parametrize("name", SOLUTION_DAMAGES)
+def test_damaged_boundary_elements_are_caught(name, solution):
+    variable, value = SOLUTION_DAMAGES[name]
+    damaged = solution.assign({variable: solution[variable] * 0 + value})
+    caught = {check.name.removeprefix("boundary elements: ") for check in check_solution(damaged) if not check.passed}
+    assert name in caught
+
+
+def test_a_lost_spot_is_caught():
+    run = small.run()
+    assert {"area of spots", "load of spots"} <= failed(run.isel(spot=slice(1, None)))
+
+
+def test_adhesion_may_soften_the_contact():
+    run = small.run(material="soft").copy(deep=True)
+    run["contact_stiffness"].values[0] = -1.0
+    assert "stiffness" not in {check.name for check in check_run(run)}
+
+
+def test_a_run_without_steps_fails():
+    run = small.run().isel(step=slice(0, 0), snapshot=slice(0, 0), spot=slice(0, 0))
+    assert failed(run) == {"steps"}
+
+
+def test_campaign_passes_and_names_its_runs():
+    checks = check_campaign(small.tree())
+    assert all(check.passed for check in checks)
+    assert {str(labels) for labels, _ in small.runs()} <= {check.subject for check in checks}
+
+
+def test_missing_runs_fail_unless_nobody_asked_for_them():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    asked = [labels for labels, _ in runs]
+    tree = campaign_tree(runs[:-1], design=asked)
+    assert {check.name for check in check_campaign(tree) if not check.passed} == {"no run missing"}
+    sparse = campaign_tree(runs[:-1])
+    assert all(check.passed for check in check_campaign(sparse))
+    assert all(check.passed for check in check_campaign(sparse, asked[:-1]))
+    lacking = [check for check in check_campaign(sparse, asked) if not check.passed]
+    assert [check.name for check in lacking] == ["all runs"]
+    assert lacking[0].subject == str(RunLabels("slopes", "rough", 1, 0.2, "hertz"))
+
+
+def test_failed_runs_have_one_check_with_their_reason():
+    """Also one that has not reached a single stop; nothing of what is left of it is checked."""
+    runs = {labels: run for labels, run in small.runs() if labels.study == "slopes"}
+    one, other, *_ = runs
+    nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
+    runs[one] = runs[one].isel(nothing).assign_attrs(incomplete="the path ends before it begins")
+    runs[other] = runs[other].copy(deep=True)
+    runs[other]["converged"][2:4] = 0
+    checks = check_campaign(campaign_tree(runs.items()), list(runs))
+    failed = {check.subject: (check.name, check.description) for check in checks if not check.passed}
+    assert failed == {
+        str(one): ("completed", "the path ends before it begins"),
+        str(other): ("completed", "2 of its steps did not converge"),
+    }
+    assert sum(check.subject in failed for check in checks) == 2
+    assert sum(check.name == "completed" and check.passed for check in checks) == 2
+
+
+def test_only_failures_that_are_known_are_let_through():
+    checks = [Check("a", 2.0, 1.0, False, "what a is", "x"), Check("a", 0.0, 1.0, True, "what a is", "y")]
+    refuse_unknown_failures(checks, ["x"])
+    refuse_unknown_failures(checks[1:], [])
+    with pytest.raises(ValueError, match=r"^x: a: 2 .what a is.; allowed: at most 1$"):
+        refuse_unknown_failures(checks, [])
+    with pytest.raises(ValueError, match=r"^y: is said to fail, and all of its checks passed$"):
+        refuse_unknown_failures(checks, ["x", "y"])
+    with pytest.raises(ValueError, match=r"^z: is said to fail"):
+        refuse_unknown_failures(checks, ["x", "z"])
+
+
+def test_worst_prefers_failures_and_then_large_values():
+    checks = [Check("a", v, 1.0, p, "", s) for v, p, s in ((0.5, True, "x"), (0.1, False, "y"), (0.9, True, "z"))]
+    assert [check.subject for check in worst(checks)] == ["y"]
+    assert [check.subject for check in worst([checks[0], checks[2]])] == ["z"]
+
+
+def test_findings_can_be_kept(tmp_path):
+    checks = check_campaign(small.tree())
+    write_checks(checks, tmp_path / "checks.json")
+    assert read_checks(tmp_path / "checks.json") == checks
+    first = (tmp_path / "checks.json").read_bytes()
+    write_checks(checks, tmp_path / "checks.json")
+    assert (tmp_path / "checks.json").read_bytes() == first
+
+
+def test_values_not_finite_can_be_kept_too(tmp_path):
+    run = small.run().copy(deep=True)
+    run["residual"].values[0] = np.nan
+    write_checks(check_run(run), tmp_path / "checks.json")
+    assert {"finite", "residual"} <= {check.name for check in read_checks(tmp_path / "checks.json") if not check.passed}
+
+
+def test_spots_that_reach_over_the_edge_of_a_free_square_keep_the_identities():
+    spectrum = icha.SelfAffineSpectrum(
+        period=100e-6, rolloff_wavelength=50e-6, short_wavelength=12.5e-6, hurst=0.8, rms_slope=1.0
+    )
+    surface = icha.Surface(spectrum.realise(grid=64, seed=1).heights, 100e-6, boundary="free")
+    material = icha.Material(contact_modulus=25e6, surface_energy=0.0, interaction_range=20e-9)
+    run = icha.simulate(surface, material, icha.Path(area_fractions=[0.02, 0.1]))
+    assert float(run["area_beyond_edges"].max()) > 1e-6  # or the test says nothing
+    assert failed(run) == set()

@@ -1,0 +1,213 @@
+"""The error is nothing for a state compared with itself, and the exact number for one changed by a known amount."""
+
+import numpy as np
+import pytest
+import small_campaign as small
+import xarray as xr
+from compared_campaign import own_solution, runs, solutions, tree
+
+from icha.analysis.model_error import (
+    SHARED,
+    SUMMARISED,
+    compare_state,
+    contact_of_spots,
+    gap_distribution_distance,
+    jaccard,
+    model_error,
+    pressure_distribution_distance,
+    shared,
+    state_of,
+)
+from icha.datasets.bins import GAP_BINS, PRESSURE_BINS
+from icha.datasets.campaign import RunLabels, campaign_tree, find_snapshot
+from icha.datasets.files import read_campaign, write_dataset
+from icha.datasets.labels import SolutionLabels
+from icha.references.boundary_elements import boundary_elements
+
+
+def test_a_state_is_no_distance_from_itself():
+    errors = model_error(tree(), solutions())["truth"]
+    for name in ("area_error", "separation_error", "gap_distribution_distance", "pressure_distribution_distance"):
+        np.testing.assert_allclose(errors[name].values, 0, atol=1e-12)
+    for name in ("jaccard", "shared_of_icha", "shared_of_boundary_elements"):
+        np.testing.assert_array_equal(errors[name].values, 1)
+    assert errors["area_error"].dims == ("surface", "seed", "rms_slope", "material", "reduced_pressure")
+    assert errors["area_error"].shape == (1, 3, 1, 2, 2)
+
+
+def test_relative_errors_are_those_put_in():
+    errors = model_error(tree(), solutions(area=lambda labels: 1.25, separation=0.8))["truth"]
+    np.testing.assert_allclose(errors["area_error"].values, 1 / 1.25 - 1, rtol=1e-12)
+    np.testing.assert_allclose(errors["separation_error"].values, 1 / 0.8 - 1, rtol=1e-12)
+    run = runs()["one", "rough", 2, 1.0, "hertz"]
+    at = find_snapshot(run, "reduced_pressure", 1e-2)
+    place = {"surface": "rough", "seed": 2, "rms_slope": 1.0, "material": "hertz", "reduced_pressure": 1e-2}
+    state = errors.to_dataset().sel(place)
+    assert float(state["contact_area_fraction"]) == float(state_of(run, at)["contact_area_fraction"])
+    edges = np.diff(state["pressure_bin_edges"].values)
+    area = float(state["contact_area_fraction"])
+    assert float(np.sum(state["pressure_density"].values * edges)) == pytest.approx(area, rel=1e-9)
+
+
+def test_energetic_area_counts_with_adhesion_only():
+    errors = model_error(tree(), solutions(area=lambda labels: 1.25))["truth"].to_dataset()
+    np.testing.assert_allclose(errors["energetic_area_error"].sel(material="soft"), 1 / 1.5 - 1, rtol=1e-12)
+    bare = errors.sel(material="hertz")
+    np.testing.assert_array_equal(bare["energetic_area_error"], bare["area_error"])
+
+
+def test_scatter_over_the_seeds():
+    factor = {1: 1.1, 2: 1.2, 3: 1.6}
+    pairs = solutions(area=lambda labels: factor[labels.seed])
+    errors = model_error(tree(), reversed(pairs))["truth"]
+    expected = np.array([1 / 1.1, 1 / 1.2, 1 / 1.6]) - 1
+    np.testing.assert_allclose(errors["area_error_mean"].values, expected.mean(), rtol=1e-12)
+    deviation = np.sqrt(np.sum((expected - expected.mean()) ** 2) / 2)
+    np.testing.assert_allclose(errors["area_error_deviation"].values, deviation, rtol=1e-12)
+    single = model_error(tree(), [pair for pair in pairs if pair[0].seed == 2])["truth"]
+    np.testing.assert_allclose(single["area_error_mean"].values, 1 / 1.2 - 1, rtol=1e-12)
+    assert not [f"{name}_deviation" for name in SUMMARISED if f"{name}_deviation" in single]
+
+
+def distribution(gaps=(), pressures=(), rms_height=2e-6, unit=5e6):
+    """A state whose area lies in single bins: pairs of bin and part of the nominal area."""
+    gap, pressure, mean = (
+        np.zeros(len(GAP_BINS) - 1),
+        np.zeros(len(PRESSURE_BINS) - 1),
+        np.zeros(len(PRESSURE_BINS) - 1),
+    )
+    for k, part in gaps:
+        gap[k] = part / (np.diff(GAP_BINS)[k] * rms_height)
+    for k, part, value in pressures:
+        pressure[k], mean[k] = part / (np.diff(PRESSURE_BINS)[k] * unit), value
+    return xr.Dataset(
+        {
+            "gap_density": ("gap_bin", gap),
+            "gap_bin_edges": ("gap_edge", GAP_BINS * rms_height),
+            "pressure_density": ("pressure_bin", pressure),
+            "pressure_bin_mean": ("pressure_bin", mean),
+            "pressure_bin_edges": ("pressure_edge", PRESSURE_BINS * unit),
+        }
+    )
+
+
+def test_distances_of_shifted_peaks_are_exact():
+    # All area in one bin of the gap each: what must be moved is all of it, from centre to centre.
+    centre = np.sqrt(GAP_BINS[1:] * GAP_BINS[:-1]) * 2e-6
+    one, other = distribution(gaps=[(50, 1.0)]), distribution(gaps=[(70, 1.0)])
+    assert gap_distribution_distance(one, other) == pytest.approx(centre[70] - centre[50], rel=1e-12)
+    # A tenth in contact more: it goes from the bin to gap zero.
+    other = distribution(gaps=[(50, 0.9)])
+    assert gap_distribution_distance(one, other) == pytest.approx(0.1 * centre[50], rel=1e-9)
+    # 2 % at 3 MPa and 1 % at 6 MPa carry the same: half of the area comes from zero, half goes on by 3 MPa.
+    one, other = distribution(pressures=[(200, 0.02, 3e6)]), distribution(pressures=[(230, 0.01, 6e6)])
+    assert pressure_distribution_distance(one, other) == pytest.approx(0.01 * 3e6 + 0.01 * 3e6, rel=1e-9)
+    assert pressure_distribution_distance(one, other) == pressure_distribution_distance(other, one)
+    # Tension counts as any other pressure.
+    other = distribution(pressures=[(200, 0.02, 3e6), (150, 0.01, -2e6)])
+    assert pressure_distribution_distance(one, other) == pytest.approx(0.01 * 2e6, rel=1e-9)
+
+
+def test_overlap_of_maps():
+    one, other, empty = np.zeros((3, 4, 4), bool)
+    one[0, :3], other[0, 1:] = True, True
+    assert jaccard(one, other) == jaccard(other, one) == 0.5
+    other[1] = True
+    assert shared(one, other) == pytest.approx(2 / 3) and shared(other, one) == pytest.approx(2 / 7)
+    assert jaccard(empty, empty) == 1 and jaccard(one, empty) == 0
+    assert shared(empty, one) == 1 and shared(one, empty) == 0
+
+
+def test_spots_lie_where_boundary_elements_find_contact():
+    """A map that is mirrored, transposed or shifted by a few cells shares next to nothing with the solution."""
+    run = runs()["one", "rough", 1, 1.0, "hertz"]
+    solution = boundary_elements(small.surface(), small.MATERIALS["hertz"], 3e-3, refinement=2, seed=1)
+    compared = compare_state(run, 0, solution)
+    assert compared["jaccard"] > 0.5
+    spots = contact_of_spots(run, 0, solution.sizes["x"])
+    contact = solution["contact"].values == 1
+    assert compared["jaccard"] == jaccard(spots, contact)
+    for other in (contact.T, contact[::-1], contact[:, ::-1], np.roll(contact, 8, 0), np.roll(contact, 8, 1)):
+        assert jaccard(spots, other) < 0.3
+    # Both carry the same load: less contact is at higher pressure, so the distance is at least the areas' difference
+    # times the lowest pressure, and it is less than twice the mean pressure in any case.
+    assert 0 < compared["pressure_distribution_distance"] < 2
+    assert abs(compared["area_error"]) < 0.3 and abs(compared["separation_error"]) < 0.1
+
+
+def test_several_entries_and_a_part_of_a_study(tmp_path):
+    adhesive = solutions("adhesive", lambda labels: labels.material == "soft" and labels.seed == 3)
+    bare = solutions("bare", lambda labels: labels.material == "hertz")
+    errors = model_error(tree(), [*adhesive, *bare], attrs={"license": "CC0-1.0"})
+    assert list(errors.children) == ["adhesive", "bare"] and errors.attrs["license"] == "CC0-1.0"
+    assert errors["bare"]["material"].values.tolist() == ["hertz"]
+    assert errors["adhesive"]["seed"].values.tolist() == [3] and errors["adhesive"].attrs["study"] == "one"
+    assert float(errors["bare"]["surface_energy"].sel(material="hertz")) == 0
+    for name in ("a.nc", "b.nc"):
+        write_dataset(errors, tmp_path / name)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+    read = read_campaign(tmp_path / "a.nc")
+    np.testing.assert_array_equal(read["bare"]["jaccard"].values, errors["bare"]["jaccard"].values)
+    for variable in errors["bare"].to_dataset().variables.values():
+        assert "units" in variable.attrs and "long_name" in variable.attrs
+
+
+STATE = r"entry truth, run one/rough/seed1/slope1/soft, reduced pressure 0\.003: "
+
+
+@pytest.mark.parametrize("name", SHARED)
+def test_another_contact_is_refused(name):
+    labels = RunLabels("one", "rough", 1, 1.0, "soft")
+    solution = own_solution(runs()[labels], 3e-3)
+    changed = solution.assign({name: solution[name] * 1.001})
+    with pytest.raises(ValueError, match=STATE + name):
+        model_error(tree(), [(SolutionLabels("truth", *labels, 3e-3), changed)])
+
+
+def test_what_cannot_be_compared_is_named():
+    labels = RunLabels("one", "rough", 1, 1.0, "soft")
+    place = SolutionLabels("truth", *labels, 3e-3)
+    solution = own_solution(runs()[labels], 3e-3)
+    with pytest.raises(ValueError, match=STATE + "seed is 1 for the run, 2 for the solution"):
+        model_error(tree(), [(place, solution.assign(seed=2))])
+    with pytest.raises(ValueError, match=STATE + r"the solution is one of reduced pressure 0\.01"):
+        model_error(tree(), [(place, own_solution(runs()[labels], 1e-2))])
+    with pytest.raises(ValueError, match=r"reduced pressure 0\.02: no snapshot of reduced_pressure 0\.02; there are"):
+        model_error(tree(), [(place._replace(reduced_pressure=0.02), solution)])
+    with pytest.raises(ValueError, match=r"run one/rough/seed9/slope1/soft.*no seed 9"):
+        model_error(tree(), [(place._replace(seed=9), solution)])
+    with pytest.raises(ValueError, match=STATE + "this solution is given twice"):
+        model_error(tree(), [(place, solution)] * 2)
+    with pytest.raises(ValueError, match=STATE + "boundary elements have a contact area of 0"):
+        model_error(tree(), [(place, own_solution(runs()[labels], 3e-3, area=0.0))])
+    with pytest.raises(ValueError, match=r"entry truth, run .*/hertz, reduced pressure 0\.01: no solution"):
+        model_error(tree(), solutions()[:-1])
+    with pytest.raises(ValueError, match="at least one"):
+        model_error(tree(), [])
+
+
+def test_runs_that_ended_early_do_not_count(tmp_path):
+    """Of three seeds one run has failed; of the other material two have, and one has not been solved for."""
+    factor = {1: 1.1, 2: 1.2, 3: 1.6}
+    failed = [RunLabels("one", "rough", 3, 1.0, "soft"), *(RunLabels("one", "rough", k, 1.0, "hertz") for k in (1, 2))]
+    nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
+    members = {
+        labels: run.isel(nothing).assign_attrs(incomplete="sticky") if labels in failed else run
+        for labels, run in runs().items()
+    }
+    pairs = solutions(area=lambda labels: factor[labels.seed])
+    unsolved = RunLabels("one", "rough", 3, 1.0, "hertz")
+    pairs = [(labels, solution) for labels, solution in pairs if labels.run != unsolved]
+    errors = model_error(campaign_tree(members.items()), pairs)
+    write_dataset(errors, tmp_path / "e.nc")
+    for entry in (errors["truth"].to_dataset(), read_campaign(tmp_path / "e.nc")["truth"].to_dataset()):
+        soft, bare = (entry.isel(surface=0, rms_slope=0).sel(material=name) for name in ("soft", "hertz"))
+        assert soft["status"].values.tolist() == [0, 0, 1] and bare["status"].values.tolist() == [1, 1, 3]
+        known = np.array([1 / 1.1, 1 / 1.2]) - 1
+        np.testing.assert_allclose(soft["area_error"].values, [[known[0]] * 2, [known[1]] * 2, [np.nan] * 2])
+        np.testing.assert_allclose(soft["area_error_mean"].values, known.mean())
+        np.testing.assert_allclose(soft["area_error_deviation"].values, abs(known[0] - known[1]) / np.sqrt(2))
+        assert np.isnan(bare["area_error"]).all() and np.isnan(bare["area_error_mean"]).all()
+    one_left = campaign_tree({**runs(), failed[1]: members[failed[1]], failed[2]: members[failed[2]]}.items())
+    bare = model_error(one_left, solutions())["truth"].to_dataset().sel(material="hertz")
+    assert np.isfinite(bare["area_error_mean"]).all() and np.isnan(bare["area_error_deviation"]).all()

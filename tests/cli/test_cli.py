@@ -1,0 +1,399 @@
+"""The command line without Snakemake: what it says, what it writes, how it refuses."""
+
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import small_campaign as small
+import yaml
+from conftest import REPOSITORY
+from typer.testing import CliRunner
+
+from icha.cli import app
+from icha.cli.events import Watch, last_line, reason_of
+from icha.cli.live import LiveView, duration
+from icha.cli.show import sparkline
+from icha.configuration.expansion import run_cases, run_sha256
+from icha.configuration.load import load_configuration
+from icha.datasets.files import write_dataset, write_surface
+from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
+from icha.support.checksums import damaged, write_record
+
+
+def icha(*arguments):
+    """Call the program in this process; whatever users do, there must be no traceback."""
+    called = CliRunner().invoke(app, [str(each) for each in arguments])
+    assert called.exception is None or isinstance(called.exception, SystemExit), called.exception
+    return called
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A project without results, as the working directory."""
+    for part in ("Snakefile", "config", "workflow/rules", "workflow/schemas", "profiles"):
+        source, target = REPOSITORY / part, tmp_path / "project" / part
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copytree(source, target) if source.is_dir() else shutil.copyfile(source, target)
+    monkeypatch.chdir(tmp_path / "project")
+    return tmp_path / "project"
+
+
+def test_every_command_explains_itself():
+    overview = icha("--help")
+    assert overview.exit_code == 0
+    for command in ("new", "describe", "run", "simulate", "show", "check"):
+        assert command in overview.output
+        told = icha(command, "--help")
+        assert told.exit_code == 0 and "Usage:" in told.output and len(told.output.splitlines()) > 6
+    assert icha("--version").output.startswith("icha ")
+    assert icha("nonsense").exit_code == 2
+
+
+@pytest.mark.parametrize("options", [[], ["--pull-off"], ["--boundary-elements", "--pull-off"]])
+def test_a_new_campaign_is_valid_as_it_is(project, options):
+    written = icha("new", "mine", *options)
+    assert written.exit_code == 0 and "config/campaigns/mine.yaml written" in written.output
+    file = project / "config/campaigns/mine.yaml"
+    campaign = load_configuration(file).campaign
+    assert campaign.name == "mine" and ("pull" in campaign.studies) == ("--pull-off" in options)
+    first = file.read_text().splitlines()[0]
+    schema = file.parent / first.removeprefix("# yaml-language-server: $schema=")
+    assert json.loads(schema.read_text())["$schema"]
+    seconds = time_on(plan(campaign, project / "results/mine"), 2)
+    assert seconds < 60, "a template is to be quick"
+
+
+def test_the_examples_in_the_comments_of_a_new_campaign_are_valid_too(project):
+    icha("new", "mine")
+    file = project / "config/campaigns/mine.yaml"
+    text = file.read_text()
+    for start, lines in (("# vary:", 1), ("# cases:", 3), ("# defaults:", 2), ("# publication:", 4)):
+        head, tail = text.split(start)
+        block = (start + tail).splitlines()[:lines]
+        (project / "config/campaigns/example.yaml").write_text(
+            head + "\n".join(line.replace("# ", "", 1) for line in block) + "\n" + "\n".join(tail.splitlines()[lines:])
+        )
+        assert run_cases(load_configuration(project / "config/campaigns/example.yaml").campaign), start
+
+
+def test_a_measured_file_is_asked_what_it_knows(project):
+    lines = [f"{x * 1e-6:.7e} {y * 1e-6:.7e} {np.sin(x * y) * 1e-7:.7e}" for y in range(12) for x in range(12)]
+    Path("scan 1.xyz").write_text("\n".join(lines))
+    written = icha("new", "scan", "--measured", "scan 1.xyz")
+    assert written.exit_code == 0
+    section = yaml.safe_load(Path("config/campaigns/scan.yaml").read_text())["surfaces"]["scan_1"]
+    assert section["kind"] == "measured" and section["path"] == "../../scan 1.xyz"
+    text = Path("config/campaigns/scan.yaml").read_text()
+    assert "12 x 12 points over 1.2e-05 x 1.2e-05 in its coordinates\n" in text and "It runs as it is" not in text
+    assert section["lateral_unit"] is None and "to fill in: surfaces.scan_1.lateral_unit" in written.output
+    # Coordinates without a unit, heights without one: nothing is made up.
+    assert section["height_unit"] is None and "to fill in: surfaces.scan_1.height_unit" in written.output
+    assert icha("new", "other", "--measured", "none.xyz").exit_code == 2
+    Path("words.txt").write_text("no heights in here\n")
+    refused = icha("new", "other", "--measured", "words.txt")
+    assert refused.exit_code == 2 and "words.txt" in refused.output
+    Path("empty.txt").write_text("\n \n")
+    refused = icha("new", "other", "--measured", "empty.txt")
+    assert refused.exit_code == 2 and "empty.txt: the file is empty" in refused.output
+    assert icha("new", "other", "--data", "z").exit_code == 2
+    assert not Path("config/campaigns/other.yaml").exists()
+
+
+def test_one_of_several_datasets_of_a_measured_file_is_chosen_by_its_name(project):
+    with h5py.File("my.h5", "w") as file:
+        for name in ("first", "second"):
+            file[name] = np.random.default_rng(1).normal(size=(16, 16))
+            file[name].attrs["units"] = "nm"
+    refused = icha("new", "two", "--measured", "my.h5")
+    told = " ".join(refused.output.split())
+    assert refused.exit_code == 2 and "allowed: first, second; say which by --data NAME" in told
+    assert icha("new", "two", "--measured", "my.h5", "--data", "third").exit_code == 2
+    written = icha("new", "two", "--measured", "my.h5", "--data", "second")
+    assert written.exit_code == 0 and "to fill in: surfaces.my.size" in written.output
+    file = Path("config/campaigns/two.yaml")
+    assert "It runs once the keys marked" in file.read_text() and "lateral_unit" not in file.read_text()
+    file.write_text(file.read_text().replace("size: ", "size: 16 um"))
+    assert load_configuration(file).campaign.surfaces["my"].data == "second"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["new", "Mine"], "'Mine' is not a name; allowed: lower-case letters"),
+        (["new", "smoke"], "config/campaigns/smoke.yaml is there already"),
+        (["describe", "nonsense"], "nonsense: no such file and no campaign of that name; there are: cmc_full,"),
+        (["run", "nonsense"], "nonsense: no such file"),
+        (["run", "smoke", "--cores", "some"], "'some' is neither a number of cores"),
+        (["run", "smoke", "--profile", "none"], "--profile none: no folder with a config.yaml; there are: default"),
+        (["simulate", "none/run.nc"], "none/run.nc: no such folder as none"),
+        (["simulate", "run.nc", "--modulus", "25"], "'25': the unit is missing; allowed: such as '25 MPa'"),
+        (["simulate", "run.nc", "--period", "1 kg"], "is not a unit of length"),
+        (["simulate", "run.nc", "--hurst", "2"], "hurst: 2.0 must lie in (0, 1]"),
+        (["simulate", "run.nc", "--grid", "32", "--rolloff", "20 um"], "--short 25 um, which is 8 grid cells if left"),
+        (["simulate", "run.nc", "--short", "30 um", "--rolloff", "20 um"], "give a smaller --short or a longer --roll"),
+        (["simulate", "run.nc", "--pressures", "a,b"], "'a,b' is no list of numbers"),
+        (["simulate", "run.nc", "--pressures", "0.1,0.01"], "strictly increasing"),
+        (["simulate", "run.nc", "--pressures", "0.1", "--areas", "0.1"], "exactly one must be given"),
+        (["simulate", "run.nc", "--surface", "none.nc"], "none.nc: no such file"),
+        (["simulate", "run.nc", "--surface", "none.npy"], "none.npy: no such file"),
+        (["show", "Snakefile"], "Snakefile: not a readable netCDF file"),
+        (["show", "Snakefile", "--plot", "a.txt"], "--plot a.txt: ends in '.txt'; allowed: .png"),
+        (["check", "none.nc"], "none.nc: no such file"),
+    ],
+)
+def test_mistakes_are_messages_and_status_2(project, arguments, message):
+    refused = icha(*arguments)
+    assert refused.exit_code == 2
+    assert message in " ".join(refused.output.split())
+    assert not Path("run.nc").exists() and not Path("results").exists()
+
+
+def test_what_the_system_refuses_is_a_message_and_status_1(project):
+    write_surface("surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    refused = icha("show", "surface.nc", "--plot", "/proc/none/p.png")
+    assert refused.exit_code == 1 and "Error: /proc/none: No such file or directory" in refused.output
+    shutil.rmtree("config/campaigns")
+    Path("config/campaigns").write_text("a file where a folder is wanted")
+    refused = icha("new", "mine")
+    assert refused.exit_code == 1 and "config/campaigns: " in refused.output
+
+
+def test_a_wrong_configuration_says_all_that_is_wrong(project):
+    text = Path("config/campaigns/smoke.yaml").read_text().replace("25 MPa", "25", 1).replace("grid: 64", "grid: 6")
+    Path("wrong.yaml").write_text(text)
+    for command in ("describe", "run"):
+        refused = icha(command, "wrong.yaml")
+        assert refused.exit_code == 2
+        assert "wrong.yaml: materials.cmc.contact_modulus" in refused.output and "grid: 6" in refused.output
+
+
+def test_outside_of_a_project_the_program_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for command in (["run"], ["describe"], ["new", "mine"]):
+        refused = icha(*command)
+        assert refused.exit_code == 2 and "no ICHA project" in refused.output
+
+
+TINY = """
+name: tiny
+title: Tiny
+summary: For tests.
+license: CC0-1.0
+surfaces:
+  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 40 um, short_wavelength: 14.3 um, hurst: 0.8, grid: 32}
+materials:
+  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
+  soft: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 2 nm}
+studies:
+  load:
+    surfaces: [rough]
+    seeds: [1, 2]
+    rms_slopes: [1.0]
+    materials: [bare, soft]
+    targets: {reduced_pressures: [1.0e-3, 1.0e-2]}
+"""
+
+
+def test_what_is_there_is_told_from_what_is_to_do(project):
+    Path("tiny.yaml").write_text(TINY)
+    campaign, results = load_configuration("tiny.yaml").campaign, project / "results/tiny"
+    done, changed, failed, missing = run_cases(campaign)
+    reason = "the path ends early"
+    for case, attrs in (
+        (done, {"config_sha256": run_sha256(campaign, done)}),
+        (changed, {"config_sha256": "0" * 64}),
+        (failed, {"config_sha256": run_sha256(campaign, failed), "incomplete": reason}),
+    ):
+        (results / f"runs/{case.path}.nc").parent.mkdir(parents=True, exist_ok=True)
+        write_dataset(small.run().assign_attrs(attrs), results / f"runs/{case.path}.nc")
+    states = {item.path: item.state for item in plan(campaign, results)}
+    for case, state in ((done, DONE), (changed, CHANGED), (failed, FAILED), (missing, TO_DO)):
+        assert states[f"runs/{case.path}.nc"] == state
+    assert failed_runs(campaign, results) == {failed.path: reason}
+    sums = total(item for item in plan(campaign, results) if item.is_run)
+    assert (sums.count, sums.done, sums.failed, sums.to_do) == (4, 1, 1, 2)
+    told = icha("describe", "tiny.yaml", "--runs")
+    assert told.exit_code == 0
+    assert "4 runs, 2 to do" in told.output and "1 run there, but with other settings" in told.output
+    assert f"failed: runs/{failed.path}.nc: {reason}" in " ".join(told.output.split())
+
+
+def test_files_that_were_cut_off_are_damaged_and_to_do_again(project):
+    Path("tiny.yaml").write_text(TINY)
+    campaign, results = load_configuration("tiny.yaml").campaign, project / "results/tiny"
+    whole, cut, *_ = (f"runs/{case.path}.nc" for case in run_cases(campaign))
+    sha256 = run_sha256(campaign, run_cases(campaign)[0])
+    empty = ["surfaces/rough/seed2.nc", "references/rough.nc", "dataset/tiny.nc", "aggregated/tiny.nc"]
+    for path in (whole, cut, *empty):
+        (results / path).parent.mkdir(parents=True, exist_ok=True)
+        write_dataset(small.run().assign_attrs(config_sha256=sha256), results / path)
+        write_record(results, path)
+    assert damaged(results) == []
+    (results / cut).write_bytes((results / cut).read_bytes()[:-100])
+    for path in empty:
+        (results / path).write_bytes(b"")
+    assert set(damaged(results)) == {cut, *empty}
+    states = {item.path: item.state for item in plan(campaign, results)}
+    assert states[whole] == DONE and states[cut] == DAMAGED and states["surfaces/rough/seed2.nc"] == DAMAGED
+    sums = total(item for item in plan(campaign, results) if item.is_run)
+    assert (sums.done, sums.to_do) == (1, 3)
+    told = icha("describe", "tiny.yaml").output
+    for path in (cut, *empty):
+        assert f"damaged: {path}: to do again" in told
+    assert "other settings" not in told
+
+
+def test_jobs_that_were_slow_make_the_rest_expected_slower(project):
+    Path("tiny.yaml").write_text(TINY)
+    campaign, results = load_configuration("tiny.yaml").campaign, project / "results/tiny"
+
+    def left():
+        return time_on([item for item in plan(campaign, results) if item.is_run], 1)
+
+    before = left()
+    for case in run_cases(campaign)[:3]:
+        (results / f"runs/{case.path}.nc").parent.mkdir(parents=True, exist_ok=True)
+        write_dataset(
+            small.run().assign_attrs(config_sha256=run_sha256(campaign, case)), results / f"runs/{case.path}.nc"
+        )
+        benchmark = results / f"benchmarks/runs/{case.path}.jsonl"
+        benchmark.parent.mkdir(parents=True, exist_ok=True)
+        benchmark.write_text(json.dumps({"s": 100.0}) + "\n")
+    # One of four is left, of which much more is expected.
+    assert left() > 5 * before
+
+
+def test_time_on_several_cores_is_never_less_than_the_longest_job(project):
+    Path("tiny.yaml").write_text(TINY)
+    items = plan(load_configuration("tiny.yaml").campaign, project / "results/tiny")
+    assert time_on(items, 2) == pytest.approx(total(items).work / 2)
+    assert time_on(items, 10**6) == total(items).longest
+
+
+def test_one_run_without_the_workflow(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    options = ["--grid", "32", "--rolloff", "50 um", "--short", "20 um"]
+    made = icha("simulate", "run.nc", *options, "--pressures", "1e-3,1e-2")
+    assert made.exit_code == 0 and "2 steps" in made.output
+    checked = icha("check", "run.nc")
+    assert checked.exit_code == 0 and "run dataset, all is well" in checked.output
+    shown = icha("show", "run.nc", "--plot", "run.png")
+    assert shown.exit_code == 0 and "1.0000e-02" in shown.output
+    assert Path("run.png").read_bytes().startswith(b"\x89PNG")
+    refused = icha("simulate", "run.nc", *options)
+    assert refused.exit_code == 2 and "--force replaces it" in refused.output
+    sticky = icha("simulate", "sticky.nc", *options, "--modulus", "10 kPa", "--energy", "0.5 J/m^2")
+    assert sticky.exit_code == 1 and "failed:" in sticky.output
+    flawed = icha("check", "run.nc", "sticky.nc")
+    assert flawed.exit_code == 1 and "sticky.nc: run dataset, 1 flaw" in flawed.output
+    assert "the run failed: the path ends" in flawed.output
+    # Every file is checked, whatever the others are.
+    Path("bad.npy").write_bytes(b"")
+    mixed = icha("check", "bad.npy", "none.nc", "sticky.nc", "run.nc")
+    assert mixed.exit_code == 2
+    for told in ("bad.npy: not a readable", "none.nc: no such file", "sticky.nc: run", "run.nc: run dataset, all is"):
+        assert told in mixed.output
+
+
+@pytest.mark.parametrize("options", [["--grid", "32"], ["--grid", "16"], ["--grid", "32", "--period", "1 mm"]])
+def test_the_left_out_options_of_a_single_run_fit_each_other(tmp_path, monkeypatch, options):
+    monkeypatch.chdir(tmp_path)
+    made = icha("simulate", "run.nc", *options, "--energy", "0 J/m^2", "--pressures", "1e-3")
+    assert made.exit_code == 0 and "1 step" in made.output
+
+
+def test_surfaces_and_campaigns_are_shown(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_surface("surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    write_dataset(small.tree(), "campaign.nc")
+    shown = icha("show", "surface.nc", "--plot", "surface.pdf")
+    assert shown.exit_code == 0 and "Hurst exponent: 0.8" in shown.output
+    shown = icha("show", "campaign.nc", "--plot", "campaign.svg")
+    assert shown.exit_code == 0 and "slopes: 1 surface, 1 seed, 2 rms_slope, 2 material" in shown.output
+    assert Path("surface.pdf").stat().st_size and Path("campaign.svg").stat().st_size
+    one = icha("show", "campaign.nc", "--study", "single")
+    assert "single: " in one.output and "slopes: " not in one.output
+    refused = icha("show", "campaign.nc", "--study", "none")
+    assert refused.exit_code == 2 and "there are: slopes, single" in refused.output
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def started(number, rule="run", **more):
+    return {"event": "job_info", "jobid": number, "rule_name": rule, "rule_msg": f"Sweep {number}"} | {
+        "output": [f"results/tiny/runs/{number}.nc"],
+        "log": more.get("log", []),
+    }
+
+
+@pytest.fixture
+def watch():
+    clock = Clock()
+    watch = Watch({f"results/tiny/runs/{k}.nc": 10.0 for k in range(4)}, clock)
+    watch.take({"event": "resources_info", "cores": 2})
+    watch.take({"event": "run_info", "stats": {"run": 4, "all": 1, "total": 5}})
+    return watch
+
+
+def test_events_are_counted_by_rule(watch):
+    assert watch.job_count == 4  # not `all`, which computes nothing
+    for number in (0, 1, 2):
+        watch.take(started(number))
+    watch.take(started(9, rule="all"))
+    assert watch.take({"event": "job_finished", "job_id": 0}).title == "Sweep 0"
+    assert watch.take({"event": "job_error", "jobid": 1}).rule == "run"
+    assert watch.counts() == [("run", 1, 1, 1, 4)]
+    assert watch.take({"event": "job_finished", "job_id": 9}) is None
+
+
+def test_time_left_follows_what_jobs_take(watch):
+    assert watch.seconds_left() == pytest.approx(4 * 10 / 2)
+    watch.take(started(0))
+    watch.take(started(1))
+    watch.clock.now = 30.0
+    watch.take({"event": "job_finished", "job_id": 0})
+    watch.take({"event": "job_finished", "job_id": 1})
+    # Two jobs of 10 s took 30 s each: about three times as long is expected of the other two.
+    assert 2 * 10 * 2 / 2 < watch.seconds_left() <= 2 * 10 * 3 / 2
+    watch.take(started(2))
+    before = watch.seconds_left()
+    watch.clock.now += 5
+    assert watch.seconds_left() == pytest.approx(before - 5 / 2)
+
+
+def test_the_live_view_shows_jobs_and_what_they_say(watch, tmp_path):
+    from rich.console import Console
+
+    (tmp_path / "0.log").write_text("stop 1 of 2\nstop 2 of 2: A/A0 3e-2\nhalf a li")
+    watch.take(started(0, log=["0.log (check log file(s) for error details)"]))
+    watch.clock.now = 65
+    console = Console(width=100, record=True, force_terminal=True, color_system=None)
+    view = LiveView(watch, "tiny", tmp_path, console)
+    console.print(view._draw())
+    text = console.export_text()
+    assert "tiny: 0 of 4 jobs" in text and "65 s  Sweep 0" in text and "stop 2 of 2: A/A0 3e-2" in text
+    assert "half a li" not in text
+
+
+def test_reasons_are_taken_from_logs(watch, tmp_path):
+    watch.take(started(0, log=["0.log"]))
+    job = watch.take({"event": "job_error", "jobid": 0})
+    assert reason_of(job, tmp_path) == [] and last_line(job, tmp_path) == ""
+    (tmp_path / "0.log").write_text("stop 1 of 2\nError: 2 checks failed\nthis one\nthat one\n")
+    assert reason_of(job, tmp_path) == ["2 checks failed", "this one", "that one"]
+
+
+def test_times_and_curves_in_short():
+    assert [duration(s) for s in (0.04, 9.96, 119, 300, 7000, 7200, 200000)] == [
+        *("0.0 s", "10 s", "119 s", "5.0 min", "117 min", "2.0 h", "2.3 days"),
+    ]
+    assert sparkline([0, 1, 2]) == "▁▅█" and sparkline([]) == "" and sparkline([3, 3]) == "▁▁"
+    assert len(sparkline(range(1000))) == 60

@@ -1,0 +1,456 @@
+"""Datasets are whole, byte-stable, free of values that are not finite, and complete."""
+
+import cyclic_campaign as cyclic
+import netCDF4
+import numpy as np
+import pytest
+import small_campaign as small
+import xarray as xr
+
+from icha import Surface
+from icha.datasets import campaign_file
+from icha.datasets import files as records
+from icha.datasets.campaign import campaign_tree, run_labels, select_run
+from icha.datasets.campaign_file import write_campaign
+from icha.datasets.files import read_campaign, read_dataset, read_run, read_surface, write_dataset, write_surface
+
+
+def simple(values=(1.0, 2.0)):
+    return xr.Dataset({"length": ("n", np.array(values), {"units": "m", "long_name": "length"})})
+
+
+def test_a_run_comes_back_as_it_was(tmp_path):
+    run = small.run()
+    write_dataset(run, tmp_path / "deep" / "run.nc")
+    xr.testing.assert_identical(read_run(tmp_path / "deep" / "run.nc"), run)
+
+
+@pytest.mark.parametrize("what", ["run", "tree", "surface"])
+def test_the_same_values_give_the_same_bytes(tmp_path, what):
+    for name in ("one.nc", "two.nc"):
+        if what == "surface":
+            write_surface(tmp_path / name, small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+        else:
+            write_dataset(small.run() if what == "run" else small.tree(), tmp_path / name)
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+
+
+def test_a_dataset_read_and_written_keeps_its_bytes(tmp_path):
+    write_dataset(small.tree(), tmp_path / "one.nc")
+    write_dataset(read_campaign(tmp_path / "one.nc"), tmp_path / "two.nc")
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+
+
+def content(group):
+    """All that a netCDF group holds, value for value as it is kept, and how."""
+    variables = {}
+    for name, variable in group.variables.items():
+        variable.set_auto_maskandscale(False)
+        variable.set_auto_chartostring(False)
+        # What bounds inherit xarray takes from them, and has them have coordinates.
+        left_out = {"units", "long_name", "coordinates"} if name.endswith("_bounds") else set()
+        attrs = {key: np.asarray(variable.getncattr(key)).tolist() for key in {*variable.ncattrs()} - left_out}
+        kept = variable[...].tobytes()
+        variables[name] = (variable.dtype, variable.dimensions, attrs, variable.chunking(), variable.filters(), kept)
+    return (
+        {name: len(dimension) for name, dimension in group.dimensions.items()},
+        {name: group.getncattr(name) for name in group.ncattrs()},
+        variables,
+        {name: content(each) for name, each in group.groups.items()},
+    )
+
+
+def as_xarray_would(dataset):
+    """What to tell xarray for files as the project keeps them."""
+    encodings = {}
+    for name, variable in dataset.variables.items():
+        encodings[name] = {"dtype": "S1"} if variable.dtype.kind in "OU" else {"_FillValue": None}
+        if variable.dtype.kind == "f" and np.isnan(variable.values).any():
+            encodings[name] = {"_FillValue": netCDF4.default_fillvals["f8"]}
+            if variable.encoding.get("dtype") == np.dtype("int32"):
+                encodings[name] = {"dtype": "int32", "_FillValue": 1 - 2**31}
+        if variable.dtype.kind in "iuf" and variable.size >= 1024:
+            encodings[name] |= {"zlib": True, "complevel": 4, "shuffle": True}
+    return encodings
+
+
+@pytest.mark.parametrize("what", ["run", "cycle", "campaign"])
+def test_files_are_those_that_xarray_writes(tmp_path, what):
+    if what == "campaign":
+        tree = cyclic.tree()
+        write_dataset(tree, tmp_path / "ours.nc")
+        plain = {node.path: node.to_dataset().drop_encoding() for node in tree.subtree}
+        encoding = {node.path: as_xarray_would(node.to_dataset()) for node in tree.subtree}
+        xr.DataTree.from_dict(plain).to_netcdf(tmp_path / "xarrays.nc", engine="netcdf4", encoding=encoding)
+    else:
+        run = small.run() if what == "run" else cyclic.run()
+        write_dataset(run, tmp_path / "ours.nc")
+        run.to_netcdf(tmp_path / "xarrays.nc", engine="netcdf4", encoding=as_xarray_would(run))
+    with netCDF4.Dataset(tmp_path / "ours.nc") as ours, netCDF4.Dataset(tmp_path / "xarrays.nc") as theirs:
+        assert content(ours) == content(theirs)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_values_not_finite_are_refused_by_name_and_leave_no_file(tmp_path, bad):
+    with pytest.raises(ValueError, match=r"x\.nc.*'length'.*1 of 2.*n=1"):
+        write_dataset(simple((1.0, bad)), tmp_path / "x.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_variable_without_units_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="'bare' has no units"):
+        write_dataset(xr.Dataset({"bare": ("n", [1.0])}), tmp_path / "x.nc")
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    path = tmp_path / "x.nc"
+    write_dataset(simple(), path)
+    before = path.read_bytes()
+    with pytest.raises(ValueError):
+        write_dataset(simple((np.nan, 1.0)), path)
+    unwritable = simple()
+    unwritable.attrs["object"] = {"netCDF": "has no dictionaries"}
+    with pytest.raises(TypeError):
+        write_dataset(unwritable, path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"nonsense", lambda b: b""])
+def test_damaged_files_are_named(tmp_path, damage):
+    path = tmp_path / "run.nc"
+    write_dataset(small.run(), path)
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(ValueError, match=r"run\.nc"):
+        read_run(path)
+
+
+def test_files_that_are_something_else_are_named(tmp_path):
+    write_dataset(simple(), tmp_path / "x.nc")
+    with pytest.raises(ValueError, match="not a run dataset"):
+        read_run(tmp_path / "x.nc")
+    with pytest.raises(ValueError, match="not a surface file"):
+        read_surface(tmp_path / "x.nc")
+    with pytest.raises(ValueError, match="no such file"):
+        read_dataset(tmp_path / "y.nc")
+
+
+def test_surface_round_trip_keeps_heights_and_axes(tmp_path):
+    surface = small.surface()
+    write_surface(tmp_path / "s.nc", surface, name="rough", seed=1, spectrum=small.SPECTRUM)
+    again = read_surface(tmp_path / "s.nc")
+    # A surface removes its mean, which is zero but for rounding.
+    np.testing.assert_allclose(again.heights, surface.heights, rtol=0, atol=1e-14 * surface.rms_height)
+    assert again.period == surface.period
+    dataset = read_dataset(tmp_path / "s.nc")
+    assert dataset["height"].dims == ("y", "x")
+    assert float(dataset["hurst"]) == 0.8
+    np.testing.assert_allclose(float(dataset["rms_slope"]), 1.0, rtol=1e-12)
+
+
+def test_heights_of_a_large_surface_are_kept_plain_and_to_the_last_bit(tmp_path):
+    n = 2048
+    surface = Surface(np.random.default_rng(0).normal(size=(n, n)), 1.0)
+    for name in ("one.nc", "two.nc"):
+        write_surface(tmp_path / name, surface, name="rough", seed=1)
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+    with netCDF4.Dataset(tmp_path / "one.nc") as file:
+        assert not file["height"].filters()["zlib"]
+        assert file["height"].chunking() == "contiguous"
+        np.testing.assert_array_equal(file["height"][::97], surface.heights[::97])
+    write_surface(tmp_path / "small.nc", small.surface(), name="rough", seed=1)
+    with netCDF4.Dataset(tmp_path / "small.nc") as file:
+        assert file["height"].filters()["zlib"] == (small.surface().grid >= 32)
+
+
+def test_no_fill_values_and_no_coordinate_in_pascal(tmp_path):
+    write_dataset(small.tree(), tmp_path / "c.nc")
+    with netCDF4.Dataset(tmp_path / "c.nc") as file:
+        for group in file.groups.values():
+            for name, variable in group.variables.items():
+                assert "_FillValue" not in variable.ncattrs(), name
+                assert {"units", "long_name"} <= set(variable.ncattrs()), name
+                assert not (name in group.dimensions and variable.units == "Pa")
+            assert group["step"].dtype.kind == "i"
+
+
+def test_campaign_opens_labelled_and_holds_every_run(tmp_path):
+    write_dataset(small.tree(), tmp_path / "c.nc")
+    tree = xr.open_datatree(tmp_path / "c.nc")
+    study = tree["slopes"]
+    assert study["contact_area_fraction"].dims == ("surface", "seed", "rms_slope", "material", "step")
+    assert list(study["rms_slope"].values) == [0.2, 1.0]
+    assert list(study["material"].values) == ["soft", "hertz"]
+    assert study["contact_modulus"].dims == ("material",)
+    assert float(study["surface_energy"].sel(material="hertz")) == 0
+    assert list(tree["single"]["seed"].values) == [1, 2]
+    assert set(run_labels(tree)) == {labels for labels, _ in small.runs()}
+
+
+def test_every_run_can_be_taken_out_unchanged():
+    tree = small.tree()
+    for labels, run in small.runs():
+        taken = select_run(tree, labels)
+        assert set(run.variables) - set(taken.variables) == set()
+        # Slopes meet their snapshots in different orders; the campaign gives them one.
+        order = [int(np.flatnonzero(run["snapshot_target"] == t)[0]) for t in taken["snapshot_target"]]
+        for name, variable in run.data_vars.items():
+            if "spot" in variable.dims or name in ("seed", "rms_slope"):
+                continue
+            expected = variable.isel(snapshot=order) if "snapshot" in variable.dims else variable
+            np.testing.assert_array_equal(taken[name].values, expected.values, err_msg=f"{labels} {name}")
+        for own, theirs in enumerate(order):
+            for name in ("spot_x", "spot_radius", "spot_force"):
+                np.testing.assert_array_equal(
+                    taken[name].values[taken["spot_snapshot"].values == own],
+                    run[name].values[run["spot_snapshot"].values == theirs],
+                )
+
+
+def test_snapshots_met_in_another_order_are_put_together():
+    orders = {tuple(run["snapshot_kind"].values) for labels, run in small.runs() if labels.study == "slopes"}
+    assert len(orders) == 2, "the small campaign must hold both orders for the test above to mean anything"
+
+
+def test_combinations_that_nobody_asked_for_are_not_in_the_design(tmp_path):
+    """A design along its diagonal: two slopes and two materials, of which two runs are asked for and one is there."""
+    asked = {labels: run for labels, run in small.runs() if labels.study == "slopes"}
+    steep, other = (
+        labels for labels in asked if (labels.rms_slope, labels.material) in ((1.0, "soft"), (0.2, "hertz"))
+    )
+    write_dataset(campaign_tree([(steep, asked[steep])], design=[steep, other]), tmp_path / "c.nc")
+    tree = read_campaign(tmp_path / "c.nc")
+    status = tree["slopes"]["status"]
+    assert status.attrs["flag_meanings"] == "complete incomplete missing not_in_design"
+    table = np.array(status.attrs["flag_meanings"].split())[status.values]
+    assert status["rms_slope"].values.tolist() == [0.2, 1.0] and status["material"].values.tolist() == ["soft", "hertz"]
+    assert table.tolist() == [[[["not_in_design", "missing"], ["complete", "not_in_design"]]]]
+    area = tree["slopes"]["contact_area_fraction"]
+    assert int(np.isnan(area).sum()) == 3 * area.sizes["step"]
+    assert set(tree["slopes"]["failure"].values.flat) == {""}
+    assert run_labels(tree) == [steep]
+    with pytest.raises(ValueError, match=r"slopes/rough/seed1/slope0\.2/hertz: this run is missing"):
+        select_run(tree, other)
+    with pytest.raises(ValueError, match=r"slopes/rough/seed1/slope1/hertz: this run is not in the design"):
+        select_run(tree, steep._replace(material="hertz"))
+    kept = select_run(tree, steep)
+    np.testing.assert_array_equal(kept["spot_count"].values, asked[steep]["spot_count"].values)
+    np.testing.assert_array_equal(kept["spot_force"].values, asked[steep]["spot_force"].values)
+
+
+@pytest.mark.parametrize("runs", [1, 2, 3], ids=lambda n: f"{n} in a block")
+def test_blocks_of_runs_leave_no_seams(tmp_path, monkeypatch, runs):
+    """Also where a block is cut short, or holds runs that are not in the design."""
+    members = {**cyclic.runs(), **dict(small.runs())}
+    del members[next(iter(cyclic.runs()))]
+    write_campaign(members.items(), tmp_path / "whole.nc")
+    monkeypatch.setattr(campaign_file, "_RUNS_IN_BLOCK", runs)
+    monkeypatch.setattr(campaign_file, "_VALUES_IN_BLOCK", 2000)
+    write_campaign(members.items(), tmp_path / "blocks.nc")
+    xr.testing.assert_identical(read_campaign(tmp_path / "blocks.nc"), read_campaign(tmp_path / "whole.nc"))
+
+
+def test_runs_may_come_as_files_in_any_order(tmp_path):
+    pairs = []
+    for k, (labels, run) in enumerate(small.runs()):
+        write_dataset(run, tmp_path / f"{k}.nc")
+        pairs.append((labels, tmp_path / f"{k}.nc"))
+    design = [labels for labels, _ in pairs]
+    for name, given in (("one.nc", pairs), ("two.nc", reversed(pairs)), ("three.nc", iter(small.runs()))):
+        write_campaign(given, tmp_path / name, design=design)
+        xr.testing.assert_identical(read_campaign(tmp_path / name), campaign_tree(small.runs()))
+    assert len({(tmp_path / name).read_bytes() for name in ("one.nc", "two.nc", "three.nc")}) == 1
+
+
+def test_a_campaign_that_cannot_be_written_leaves_nothing(tmp_path):
+    labels, run = small.runs()[0]
+    (tmp_path / "damaged.nc").write_bytes(b"nonsense")
+    with pytest.raises(ValueError, match=r"damaged\.nc: not a readable"):
+        write_campaign([(labels, run), (labels._replace(seed=2), tmp_path / "damaged.nc")], tmp_path / "a" / "c.nc")
+    write_dataset(simple(), tmp_path / "other.nc")
+    with pytest.raises(ValueError, match=r"other\.nc: not a run dataset"):
+        write_campaign([(labels, tmp_path / "other.nc")], tmp_path / "a" / "c.nc")
+    odd = run.assign(contact_modulus=run["contact_modulus"] * 2, seed=run["seed"] + 1)
+    with pytest.raises(ValueError, match="contact_modulus differs"):
+        write_campaign([(labels, run), (labels._replace(seed=2), odd)], tmp_path / "a" / "c.nc")
+    assert list((tmp_path / "a").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["gap_bin_edges", "pressure_bin_edges"])
+def test_bins_that_differ_between_runs_that_share_them_are_refused(name):
+    # The materials share the gaps' bins, the seeds the pressures'.
+    (one, first), (two, second) = (
+        [pair for pair in small.runs() if pair[0].study == "single"]
+        if name == "pressure_bin_edges"
+        else [pair for pair in small.runs() if pair[0].study == "slopes"][:2]
+    )
+    with pytest.raises(ValueError, match=f"{name} differs between runs that share"):
+        campaign_tree([(one, first), (two, second.assign({name: second[name] * 1.001}))])
+
+
+def test_what_does_not_fit_the_design_is_refused():
+    (labels, run), *_ = small.runs()
+    with pytest.raises(ValueError, match=r"slopes/.*/soft: this run is not in the design"):
+        campaign_tree([(labels, run)], design=[labels._replace(material="hertz")])
+    with pytest.raises(ValueError, match="study single: there is no run of it"):
+        campaign_tree([(labels, run)], design=[labels, labels._replace(study="single")])
+    with pytest.raises(ValueError, match=r"slopes/.*/soft: this run is not in the design"):
+        campaign_tree([(labels, run)], design=[labels._replace(study="single")])
+
+
+def test_runs_that_end_early_keep_what_they_have(tmp_path):
+    (labels, run), *others = [(each, run) for each, run in small.runs() if each.study == "slopes"]
+    short = run.isel(step=slice(0, 3), snapshot=slice(0, 1), spot=np.flatnonzero(run["spot_snapshot"] == 0))
+    write_dataset(campaign_tree([(labels, short), *others]), tmp_path / "c.nc")
+    taken = select_run(read_campaign(tmp_path / "c.nc"), labels)
+    assert taken.attrs["incomplete"] == "1 of 2 snapshots"
+    assert taken.sizes["step"] == 3 and taken.sizes["snapshot"] == 1
+    np.testing.assert_array_equal(taken["nominal_pressure"].values, short["nominal_pressure"].values)
+
+
+def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
+    holed = runs[0][1].copy(deep=True)
+    holed["contact_area_fraction"][1] = np.nan
+    with pytest.raises(
+        ValueError, match=r"slopes/rough/seed1/slope1/soft: .*'contact_area_fraction' holds 1 of .*step=1"
+    ):
+        campaign_tree([(runs[0][0], holed), *runs[1:]])
+
+
+def same(taken, run, labels):
+    """That a run taken out of a campaign is what was put into it, and of the same kind."""
+    assert set(taken.data_vars) == {*run.data_vars, "surface", "material"}
+    assert set(taken.coords) == set(run.coords)
+    for name, variable in run.variables.items():
+        where = f"{labels} {name}"
+        assert taken[name].dims == variable.dims, where
+        assert taken[name].dtype.kind in ("iu" if variable.dtype.kind in "iu" else variable.dtype.kind + "OU"), where
+        np.testing.assert_array_equal(taken[name].values, variable.values, err_msg=where)
+
+
+@pytest.mark.parametrize("kept", ["in memory", "from its file", "left in its file"])
+def test_runs_of_different_lengths_are_taken_out_unchanged(tmp_path, monkeypatch, kept):
+    tree = cyclic.tree()
+    if kept != "in memory":
+        write_campaign(cyclic.runs().items(), tmp_path / "c.nc")
+        monkeypatch.setattr(records, "_LEFT_IN_FILE", 0 if kept == "left in its file" else 2**30)
+        tree = read_campaign(tmp_path / "c.nc")
+        assert tree["loops"].variables["work"]._in_memory == (kept == "from its file")
+    lengths = set()
+    for labels, run in cyclic.runs().items():
+        # The slope is known by its label, which the surface has but for rounding.
+        same(select_run(tree, labels).drop_vars("rms_slope"), run.drop_vars("rms_slope"), labels)
+        lengths.add((labels.study, run.sizes["step"], run.sizes.get("event")))
+    assert len(lengths) == 5, "the runs must differ for this to mean anything"
+
+
+def test_padding_is_missing_and_nothing_else_is(tmp_path):
+    for name in ("one.nc", "two.nc"):
+        write_dataset(cyclic.tree() if name == "one.nc" else read_campaign(tmp_path / "one.nc"), tmp_path / name)
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+    study = read_campaign(tmp_path / "one.nc")["loops"].to_dataset()
+    count = study["step_count"]
+    assert count.dtype.kind == "i" and count.dims == ("surface", "seed", "rms_slope", "material")
+    assert int(count.max()) == study.sizes["step"] > int(count.min())
+    beyond = (study["step"] >= count).transpose("surface", "seed", "rms_slope", "material", "step")
+    for name, variable in study.variables.items():
+        if variable.dtype.kind != "f":
+            continue
+        lacking = np.isnan(variable.values)
+        np.testing.assert_array_equal(lacking, beyond.values if "step" in variable.dims else False, err_msg=name)
+    np.testing.assert_array_equal(study["branch"] == "", beyond)
+    assert "branch" in study.coords and set(study.indexes) == {
+        "surface",
+        "seed",
+        "rms_slope",
+        "material",
+        "step",
+        "snapshot",
+    }
+    with netCDF4.Dataset(tmp_path / "one.nc") as file:
+        group = file["loops"]
+        assert group["spot_count"].dtype == group["leg"].dtype == np.int32
+        assert "_FillValue" not in group["step_count"].ncattrs() and "_FillValue" not in group["event_step"].ncattrs()
+        assert group["event_kind"].dtype == np.int8
+    assert study["control"].item() == "separation"
+
+
+def test_a_hole_before_the_padding_is_refused(tmp_path):
+    labels = next(labels for labels in cyclic.runs() if labels.material == "hertz")
+    runs = {key: run for key, run in cyclic.runs().items() if key.study == "loops"}
+    holed = runs[labels].copy(deep=True)
+    holed["work"][-1] = np.nan
+    with pytest.raises(ValueError, match="'work' holds 1 of"):
+        write_dataset(campaign_tree((runs | {labels: holed}).items()), tmp_path / "c.nc")
+    tree = cyclic.tree().copy(deep=True)
+    tree["loops"]["work"].values[..., -1] = np.inf
+    with pytest.raises(ValueError, match="'work' holds"):
+        write_dataset(tree, tmp_path / "c.nc")
+
+
+def test_events_belong_to_their_runs():
+    study = cyclic.tree()["loops"].to_dataset()
+    runs = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
+    assert study.sizes["event"] == sum(run.sizes["event"] for run in runs.values())
+    for labels, run in runs.items():
+        own = (study["event_seed"] == labels.seed - 1) & (study["event_material"] == int(labels.material == "hertz"))
+        np.testing.assert_array_equal(study["event_separation"].values[own], run["event_separation"].values)
+
+
+def test_studies_without_any_event_can_be_kept(tmp_path):
+    labels, run = next(iter(cyclic.runs().items()))
+    tree = campaign_tree([(labels, run.isel(event=slice(0, 0)))])
+    write_dataset(tree, tmp_path / "c.nc")
+    assert select_run(read_campaign(tmp_path / "c.nc"), labels).sizes["event"] == 0
+
+
+def test_a_run_that_broke_off_on_its_way_back_has_no_pull_off(tmp_path):
+    runs = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
+    broken = next(iter(runs))
+    lost = [
+        name
+        for name, variable in runs[broken].data_vars.items()
+        if name.startswith(("loss_", "hysteresis_", "pull_off_"))
+    ]
+    short = runs[broken].isel(step=slice(0, 6)).drop_vars(lost).assign_attrs(incomplete="the path ends there")
+    # Whichever comes first: what the others have is what the study has.
+    for order in (runs | {broken: short}, {broken: short} | runs):
+        order = order | {broken: short}
+        write_dataset(campaign_tree(order.items()), tmp_path / "c.nc")
+        tree = read_campaign(tmp_path / "c.nc")
+        assert [int(n) for n in np.unique(tree["loops"]["status"], return_counts=True)[1]] == [3, 1]
+        taken = select_run(tree, broken)
+        assert taken.attrs["incomplete"] == "the path ends there"
+        assert set(lost).isdisjoint(taken.variables)
+        np.testing.assert_array_equal(taken["work"].values, short["work"].values)
+        whole = list(runs)[1]
+        same(select_run(tree, whole).drop_vars("rms_slope"), runs[whole].drop_vars("rms_slope"), whole)
+    odd = {**runs, broken: runs[broken].drop_vars("loss_unattributed")}
+    with pytest.raises(ValueError, match=r"variables differ.*loss_unattributed"):
+        campaign_tree(odd.items())
+
+
+def test_labels_that_contradict_the_dataset_are_refused():
+    labels, run = small.runs()[0]
+    with pytest.raises(ValueError, match="rms_slope is 1"):
+        campaign_tree([(labels._replace(rms_slope=0.7), run)])
+    with pytest.raises(ValueError, match="seed is 1"):
+        campaign_tree([(labels._replace(seed=4), run)])
+    with pytest.raises(ValueError, match="given twice"):
+        campaign_tree([(labels, run), (labels, run)])
+
+
+def test_runs_of_other_materials_under_one_name_are_refused():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "single"]
+    (one, first), (two, second) = runs
+    second = second.assign(contact_modulus=second["contact_modulus"] * 2)
+    with pytest.raises(ValueError, match="contact_modulus differs"):
+        campaign_tree([(one, first), (two, second)])
+
+
+def test_selecting_what_is_not_there_says_what_is():
+    with pytest.raises(ValueError, match="there are slopes, single"):
+        select_run(small.tree(), ("other", "rough", 1, 1.0, "soft"))
+    with pytest.raises(ValueError, match=r"no rms_slope 0\.3; there are 0\.2, 1"):
+        select_run(small.tree(), ("slopes", "rough", 1, 0.3, "soft"))

@@ -1,0 +1,102 @@
+"""The documented format: what the program writes keeps to it, and what is changed is found."""
+
+import numpy as np
+import pytest
+import small_campaign as small
+import xarray as xr
+
+from icha.datasets.files import write_dataset, write_surface
+from icha.datasets.format import CAMPAIGN, RUN, RUN_VARIABLES, SURFACE, UnknownFile, flaws, kind_of
+from icha.simulation import CYCLE_VARIABLES, LOOP_VARIABLES, VARIABLES
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("files")
+    write_dataset(small.run(), folder / "run.nc")
+    write_dataset(small.tree(), folder / "campaign.nc")
+    write_surface(folder / "surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    return folder
+
+
+def test_what_is_written_keeps_to_the_format(files):
+    for name, kind in (("run", RUN), ("surface", SURFACE)):
+        found, data = kind_of(files / f"{name}.nc")
+        assert found == kind and flaws(kind, data) == []
+
+
+def test_a_campaign_lacks_only_what_the_workflow_adds(files):
+    kind, tree = kind_of(files / "campaign.nc")
+    assert kind == CAMPAIGN
+    assert {flaw.split(": ")[-1] for flaw in flaws(kind, tree)} <= {
+        f"attribute {name} is missing" for name in ("config_sha256", "license")
+    }
+
+
+def test_the_promise_is_the_solvers_own_dimensions_and_units():
+    written = VARIABLES | CYCLE_VARIABLES | LOOP_VARIABLES
+    for name, promised in RUN_VARIABLES.items():
+        if name != "branch":  # a coordinate
+            assert written[name][:2] == promised[:2], name
+
+
+def changed(run, name, **attrs):
+    variable = run[name].copy()
+    variable.attrs |= attrs
+    return run.assign({name: variable})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "flaw"),
+    [
+        (lambda run: run.drop_vars("residual"), "residual is missing"),
+        (lambda run: run.drop_vars("spot_force"), "spot_force is missing in a file with snapshots"),
+        (lambda run: changed(run, "nominal_pressure", units="kPa"), "nominal_pressure: has the units 'kPa'"),
+        (lambda run: run.assign(period=run["period"].expand_dims("other")), "period: has the dimensions"),
+        (lambda run: run.assign(reduced_pressure=run["reduced_pressure"] * (1 + 1e-6)), "reduced_pressure: is not"),
+        (lambda run: run.assign(contact_area_fraction=run["contact_area_fraction"] + 1), "out of range"),
+        (lambda run: run.assign(spot_snapshot=run["spot_snapshot"] + 5), "spot_snapshot: 5 is out of range"),
+        (lambda run: run.assign(gap_bin_edges=run["gap_bin_edges"][::-1]), "gap_bin_edges: do not increase"),
+        (lambda run: run.assign(pressure_bin_bounds=run["pressure_bin_bounds"] * 2), "pressure_bin_bounds: are not"),
+        (lambda run: run.assign(extra=xr.Variable((), 1.0)), "extra: has no attribute units"),
+        (lambda run: run.assign(rms_height=run["rms_height"] * np.nan), "rms_height: 1 of 1 values are not finite"),
+        (lambda run: run.assign_attrs(history="Thu May 2 10:11:12 2024: ncks"), "attribute history: 'Thu May"),
+        (lambda run: run.assign_attrs(creator_name="A. Maker"), "attribute creator_name is there"),
+        (lambda run: run.assign_attrs(config_sha256="abc"), "attribute config_sha256: 'abc'"),
+        (lambda run: run.assign_attrs(campaign="x", study=""), "attribute study is missing"),
+        (
+            lambda run: run.assign_coords(branch=run["branch"].copy(data=["up"] * run.sizes["step"])),
+            "branch: 'up'; allowed: loading",
+        ),
+    ],
+)
+def test_what_is_spoilt_is_found(spoil, flaw):
+    with xr.set_options(keep_attrs=True):
+        found = flaws(RUN, spoil(small.run()))
+    assert any(flaw in line for line in found), found
+
+
+def test_spoilt_surfaces_and_campaigns_are_found(files):
+    _, surface = kind_of(files / "surface.nc")
+    assert any("height: is (31, 32)" in flaw for flaw in flaws(SURFACE, surface.isel(y=slice(1, None))))
+    assert any("boundary: 'round'" in flaw for flaw in flaws(SURFACE, surface.assign_attrs(boundary="round")))
+    _, tree = kind_of(files / "campaign.nc")
+    tree.attrs |= {"creator_name": "A. Maker", "date_created": "today"}
+    refused = [flaw for flaw in flaws(CAMPAIGN, tree) if "nothing that tells who made" in flaw]
+    assert len(refused) == 1 and refused[0].startswith("attribute date_created is there")
+    study = tree["slopes"].to_dataset()
+    spoilt = study["nominal_pressure"].copy()
+    spoilt[0, 0, 0, 0, 0] = np.nan
+    broken = xr.DataTree.from_dict({"/": tree.to_dataset(), "/slopes": study.assign(nominal_pressure=spoilt)})
+    assert any("nominal_pressure: 1 values of complete runs" in flaw for flaw in flaws(CAMPAIGN, broken))
+
+
+def test_other_files_are_refused(tmp_path):
+    (tmp_path / "text.nc").write_text("no netCDF")
+    with pytest.raises(UnknownFile, match="not a readable netCDF file"):
+        kind_of(tmp_path / "text.nc")
+    with pytest.raises(UnknownFile, match="no such file"):
+        kind_of(tmp_path / "none.nc")
+    xr.Dataset({"a": 1}).to_netcdf(tmp_path / "other.nc")
+    with pytest.raises(UnknownFile, match="neither a run dataset"):
+        kind_of(tmp_path / "other.nc")

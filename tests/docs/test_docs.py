@@ -1,0 +1,369 @@
+"""The documentation does what it says: configurations load, Python runs, commands exist, links lead somewhere."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+import pytest
+import yaml
+
+import icha
+from icha.configuration.expansion import run_cases
+from icha.configuration.load import load_configuration
+from icha.configuration.model import Campaign
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.files import write_dataset
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+TUTORIAL = DOCS / "tutorial.md"
+# Pages that people follow; the others explain.
+GUIDES = [TUTORIAL, *sorted(DOCS.glob("howto/*.md"))]
+EVERY = pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)
+
+
+@cache
+def blocks(page, language):
+    """Blocks of code of one language, with the lines that they begin at."""
+    text = page.read_text(encoding="utf-8")
+    found = re.finditer(rf"^```{language}\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+    return [(text[: match.start()].count("\n") + 1, match[1]) for match in found]
+
+
+# Configurations.
+
+
+@cache
+def tutorial_campaign():
+    """The campaign that the tutorial begins with, which other pages add to."""
+    (first, *_) = [block for _, block in blocks(TUTORIAL, "yaml") if re.search("^name:", block, re.MULTILINE)]
+    return first
+
+
+def with_part(campaign, part):
+    """A configuration with a part in its place: sections are merged, their entries replaced."""
+    together = dict(campaign)
+    for section, entries in part.items():
+        there = together.get(section)
+        together[section] = there | entries if isinstance(there, dict) and isinstance(entries, dict) else entries
+    return together
+
+
+def campaigns(page):
+    """The page's configurations in full: a block with a name is a whole one, others are parts of the one before."""
+    current = yaml.safe_load(tutorial_campaign())
+    for line, block in blocks(page, "yaml"):
+        part = yaml.safe_load(block)
+        if part is None or not set(part) & set(Campaign.model_fields):
+            continue  # a comment, or part of another file
+        current = dict(part) if "name" in part else with_part(current, part)
+        yield line, current
+
+
+DATA = {
+    "surface.2048x2048.ASCII.dat": "matrix",
+    "surface.0512x0512.ASCII.xyz.dat": "xyz",
+    "surface.8192x8192.h5": "hdf5",
+    "surface.Fourier.ASCII.dat": "fourier",
+    "heights.npy": "npy",
+    "rubber.csv": "table",
+}
+
+
+def write_data(folder):
+    """Small files of the names that the pages use."""
+    import h5py
+
+    spectrum = icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=40e-6, short_wavelength=12e-6, hurst=0.8)
+    heights = spectrum.realise(grid=36, seed=1).scaled_to_rms_slope(0.2).heights
+    y, x = np.indices(heights.shape) / len(heights)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, kind in DATA.items():
+        # In the units that the pages give: those of the challenge are 0.1 mm.
+        z = heights / (1e-4 if name.startswith("surface") else 1e-6)
+        match kind:
+            case "matrix":
+                np.savetxt(folder / name, z)
+            case "xyz":
+                np.savetxt(folder / name, np.column_stack([x.ravel(), y.ravel(), z.ravel()]))
+            case "hdf5":
+                with h5py.File(folder / name, "w") as file:
+                    file["surface"] = z
+            case "fourier":
+                modes = np.fft.fft2(z, norm="forward")
+                numbers = np.fft.fftfreq(len(z), 1 / len(z)).astype(int)
+                qy, qx = np.meshgrid(numbers, numbers, indexing="ij")
+                kept = (np.abs(qx) < 9) & (np.abs(qy) < 9)
+                np.savetxt(folder / name, np.column_stack([qx[kept], qy[kept], modes.real[kept], modes.imag[kept]]))
+            case "npy":
+                np.save(folder / name, z)
+            case "table":
+                (folder / name).write_text("pressure,area\n0.8,0.12\n2.4,0.37\n", encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder like the project's, with the data that the pages speak of."""
+    folder = tmp_path_factory.mktemp("project")
+    write_data(folder / "config/data")
+    shutil.copytree(ROOT / "config/topographies", folder / "config/topographies")
+    (folder / "config/campaigns").mkdir()
+    return folder
+
+
+def loaded(folder, campaign):
+    for surface in campaign["surfaces"].values():
+        if surface.get("format") == "fourier":
+            surface["grid"] = 64  # for the file has few waves
+    path = folder / f"config/campaigns/{campaign['name']}.yaml"
+    path.write_text(yaml.safe_dump(campaign, sort_keys=False), encoding="utf-8")
+    return load_configuration(path).campaign
+
+
+@EVERY
+def test_every_configuration_is_a_valid_one(page, folder):
+    for line, campaign in campaigns(page):
+        try:
+            assert run_cases(loaded(folder, campaign))
+        except ValueError as error:
+            pytest.fail(f"{page.name}, block at line {line}: {error}")
+
+
+def test_settings_of_a_cluster_are_those_of_the_profile():
+    profile = (ROOT / "profiles/slurm/config.yaml").read_text(encoding="utf-8")
+    for line, block in blocks(DOCS / "howto/cluster.md", "yaml"):
+        settings = yaml.safe_load(block)
+        for key in {*settings, *settings.get("default-resources", ()), *settings.get("set-resources", ())}:
+            assert re.search(rf"^[# ]*{key}:", profile, re.MULTILINE), f"block at line {line}: {key}"
+
+
+def test_studies_have_the_runs_that_the_page_counts(folder):
+    *_, (_, campaign) = campaigns(DOCS / "howto/vary.md")
+    counts = Counter(case.study for case in run_cases(loaded(folder, campaign)))
+    counted = {"roughness": 18, "energy": 4, "along": 3, "chosen": 6, "short": 2, "light": 1}
+    assert {study: counts[study] for study in counted} == counted
+    text = (DOCS / "howto/vary.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:milled|weak)-[^`]*)`", text))
+    made = {name for case in run_cases(loaded(folder, campaign)) for name in (case.surface, case.material)}
+    assert named and named <= made
+
+
+def test_the_mistake_of_the_tutorial_is_told_as_it_says(folder):
+    campaign = yaml.safe_load(tutorial_campaign())
+    campaign["materials"]["strong"]["surface_energy"] = 50
+    with pytest.raises(ValueError, match="unit") as error:
+        loaded(folder, campaign)
+    (said,) = [block for _, block in blocks(TUTORIAL, "text") if "Error:" in block]
+    # The page breaks the line, and names the file from the project's folder.
+    assert str(error.value).replace(f"{folder}/", "").split() == said.split(":", 2)[2].split()
+
+
+# Python.
+
+
+@cache
+def small_run(case, settings):
+    """A run of a campaign, but on a surface of few summits."""
+    path, material = (dict(each) for each in settings)
+    spectrum = icha.SelfAffineSpectrum(period=1e-3, rolloff_wavelength=0.4e-3, short_wavelength=0.15e-3, hurst=0.7)
+    surface = spectrum.realise(grid=32, seed=case.seed).scaled_to_rms_slope(case.rms_slope)
+    return icha.simulate(surface, icha.Material(**material), icha.Path(**path), seed=case.seed)
+
+
+def frozen(settings):
+    return tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in settings.items())
+
+
+def write_results(folder, campaign):
+    """The dataset of a campaign, of small surfaces."""
+    runs = []
+    for case in run_cases(campaign):
+        path = campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study))
+        material = campaign.materials[case.material].model_dump()
+        runs.append((case, small_run(case, (frozen(path), frozen(material)))))
+    attributes = {"title": campaign.title, "campaign": campaign.name}
+    write_dataset(campaign_tree(runs, attrs=attributes), folder / f"results/{campaign.name}/dataset/{campaign.name}.nc")
+
+
+@pytest.fixture(scope="module")
+def with_results(folder):
+    """The folder with the datasets that the pages read: of the tutorial with seeds, pulling as well, and of others."""
+    tutorial = yaml.safe_load(tutorial_campaign())
+    ((_, pulling), *_) = campaigns(DOCS / "howto/way_back.md")
+    study = tutorial["studies"]["load"] | {"seeds": [1, 2]}
+    pull = pulling["studies"]["pull"] | {"max_step": 0.5, "turning_points": [], "materials": ["weak"]}
+    pull["targets"] = {"reduced_pressures": pull["targets"]["reduced_pressures"][:1]}
+    write_results(folder, loaded(folder, tutorial | {"studies": {"load": study, "pull": pull}}))
+    ((_, measured), *_) = campaigns(DOCS / "howto/measured_campaign.md")
+    measured["studies"]["ensemble"]["seeds"] = [1, 2]
+    write_results(folder, loaded(folder, measured))
+    return folder
+
+
+@EVERY
+def test_every_piece_of_python_runs(page, with_results, monkeypatch, tmp_path):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    code = blocks(page, "python")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results").symlink_to(with_results / "results")
+    names = {"__name__": "page"}
+    # One after the other, as they are read.
+    for line, block in code:
+        exec(compile("\n" * line + block, page.name, "exec"), names)
+    drawn = [match for _, block in code for match in re.findall(r'savefig\("(.*?)"', block)]
+    assert all((tmp_path / name).stat().st_size > 0 for name in drawn)
+
+
+# Commands.
+
+
+def commands(page):
+    for line, block in blocks(page, "sh"):
+        for command in block.replace("\\\n", " ").splitlines():
+            if command.strip() and not command.strip().startswith("#"):
+                yield line, shlex.split(command, comments=True)
+
+
+@cache
+def make_targets():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    return {name for names in re.findall(r"^([\w .-]+):", makefile, re.MULTILINE) for name in names.split()}
+
+
+@cache
+def workflow_targets():
+    rules = "".join(path.read_text(encoding="utf-8") for path in [ROOT / "Snakefile", *ROOT.glob("workflow/rules/*")])
+    return set(re.findall(r"^rule (\w+):", rules, re.MULTILINE))
+
+
+def check_icha(arguments):
+    """Parse the arguments as `icha` would, without running anything."""
+    import click
+    import typer
+
+    from icha.cli import app
+
+    group = typer.main.get_command(app)
+    options = ("--help", "--version")
+    if not arguments or arguments[0] in options:
+        return
+    command = group.get_command(click.Context(group), arguments[0])
+    assert command is not None, f"there is no command icha {arguments[0]}"
+    if arguments[-1] != "--help":
+        command.make_context(arguments[0], list(arguments[1:]))
+
+
+def check_snakemake(arguments):
+    wanted = []
+    position = 0
+    while position < len(arguments):
+        if arguments[position].startswith("-"):
+            position += 1 if arguments[position] in ("-n", "--dry-run") else 2
+        else:
+            wanted.append(arguments[position])
+            position += 1
+    assert set(wanted) <= workflow_targets()
+
+
+@EVERY
+def test_every_command_exists(page):
+    known = {"git", "cd", "source", "cp", "export", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
+    for line, (program, *arguments) in commands(page):
+        where = f"{page.name}, block at line {line}: {program} {shlex.join(arguments)}"
+        program = Path(program).name
+        if program == "icha":
+            check_icha(arguments)
+        elif program == "make":
+            assert {each for each in arguments if "=" not in each} <= make_targets(), where
+        elif program == "snakemake":
+            check_snakemake(arguments)
+        else:
+            assert program in known, where
+        for word in arguments:
+            name = word.partition("=")[2] or word
+            if name.startswith("config/campaigns/") and "mine" not in name and "scan" not in name:
+                assert (ROOT / name).exists(), where
+
+
+# The site.
+
+
+class Links(HTMLParser):
+    """What a page of the site links to, and the places in it that can be linked to."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.targets, self.anchors, self.fetched = [], set(), []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        given = dict(attributes)
+        self.anchors |= {given[key] for key in ("id", "name") if given.get(key)}
+        target = given.get("href") or given.get("src")
+        if target:
+            self.targets.append(target)
+            if tag != "a":
+                self.fetched.append(target)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The built site."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", str(folder)]
+    built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ | {"OMP_NUM_THREADS": "1"})
+    assert built.returncode == 0, built.stderr
+    pages = {path.relative_to(folder): Links(path.read_text(encoding="utf-8")) for path in folder.rglob("*.html")}
+    return pages, folder
+
+
+def test_every_page_is_in_the_site(site):
+    pages, _ = site
+    sources = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md") if "_build" not in path.parts}
+    assert sources <= set(pages)
+
+
+def test_every_link_within_the_site_leads_somewhere(site):
+    pages, folder = site
+    broken = []
+    for name, page in pages.items():
+        for target in page.targets:
+            parts = urlsplit(target)
+            if parts.scheme or parts.netloc:
+                continue
+            path = (folder / name.parent / unquote(parts.path)).resolve() if parts.path else folder / name
+            inside = path.relative_to(folder.resolve()) if path.is_relative_to(folder.resolve()) else None
+            if not path.is_file():
+                broken.append(f"{name}: {target}")
+            elif parts.fragment and inside in pages and unquote(parts.fragment) not in pages[inside].anchors:
+                broken.append(f"{name}: {target}, no such place")
+    assert not broken, "\n".join(broken)
+
+
+def test_the_site_needs_no_network(site):
+    pages, folder = site
+    remote = [f"{name}: {each}" for name, page in pages.items() for each in page.fetched if urlsplit(each).netloc]
+    assert not remote
+    for style in folder.rglob("*.css"):
+        assert not re.search(r"(url\(|@import )[\"']?(https?:)?//", style.read_text(encoding="utf-8")), style
+
+
+def test_links_of_the_sources_lead_to_files():
+    """They are read where the repository is browsed, too."""
+    broken = []
+    for page in [*DOCS.rglob("*.md"), ROOT / "README.md", ROOT / "config/README.md"]:
+        text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+        for target in re.findall(r"\]\(([^)\s]+)\)", text):
+            parts = urlsplit(target)
+            if not parts.scheme and parts.path and not (page.parent / unquote(parts.path)).exists():
+                broken.append(f"{page.relative_to(ROOT)}: {target}")
+    assert not broken, "\n".join(broken)

@@ -1,0 +1,89 @@
+"""The page on pull-off and hysteresis says what the runs say; runs of separate asperities, whose loops are exact."""
+
+import re
+
+import numpy as np
+import pytest
+import separate_asperities as separate
+from pages import hysteresis
+
+DEPTHS = {"load_1": -0.5, "slopes": 0.0, "load_2": 0.5}
+
+
+def rows(text):
+    """Cells of the rows of a Markdown table, without those below its head."""
+    found = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")
+    ]
+    return [found[0], *found[2:]]
+
+
+def described(runs):
+    """Runs with what the page wants and separate asperities do not have."""
+    attrs = {"units": "1", "long_name": "test"}
+    return [(labels, run.assign(stickiness=((), 0.5, attrs))) for labels, run in runs]
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    studies = [described(separate.study(name, depth=depth, slopes=(1.0,))) for name, depth in DEPTHS.items()]
+    tree = separate.tree(*studies, described(separate.study("other", depth=0.0, slopes=(1.0,))))
+    tree.attrs["campaign"] = "test"
+    return tree
+
+
+def of_seeds(quantity, depth, material="sticky"):
+    return np.array([float(separate.run(material, 1.0, seed, depth)[quantity]) for seed in (1, 2)])
+
+
+def written(values, form):
+    return f"{form.format(np.mean(values))} ± {form.replace('+', '').format(np.std(values, ddof=1))}"
+
+
+def test_pull_off_and_loss_are_means_over_the_seeds(campaign):
+    head, *body = rows(hysteresis.summary(campaign["slopes"].to_dataset()))
+    assert [row[:2] for row in body] == [["1", "50"]]  # without adhesion there is nothing to pull
+    assert body[0][head.index("pull-off, Pa")] == written(of_seeds("pull_off_pressure", 0.0), "{:.3g}")
+    loss = of_seeds("hysteresis_loss", 0.0) / separate.MATERIALS["sticky"].surface_energy
+    assert body[0][head.index("loss/Δγ")] == written(loss, "{:.4f}")
+
+
+def test_rules_are_side_by_side_and_nothing_is_lost_without_adhesion(campaign):
+    study = campaign["slopes"].to_dataset()
+    other = campaign["other"].to_dataset()
+    other["pull_off_pressure"] = 2 * other["pull_off_pressure"]
+    _, sticky, bare = rows(hysteresis.rules(study, other))
+    assert sticky[3] == written(2 * of_seeds("pull_off_pressure", 0.0), "{:.3g}")
+    assert sticky[2] == written(of_seeds("pull_off_pressure", 0.0), "{:.3g}")
+    assert bare[2:4] == ["–", "–"] and all(cell.endswith("% of the work") for cell in bare[4:])
+    assert abs(float(bare[4].split(" ± ")[0])) < 1e-3
+
+
+def test_dependence_on_the_largest_load_is_fitted(campaign):
+    studies = [campaign[name].to_dataset() for name in DEPTHS]
+    text = hysteresis.largest_loads(studies)
+    area, loss, pull = (row for row in rows(text)[1:])
+    assert area[1:2] + loss[1:2] + pull[1:2] == ["A/A₀", "loss/Δγ", "pull-off, Pa"]
+    x, y, z = (
+        np.array([of_seeds(name, depth).mean() for depth in DEPTHS.values()])
+        for name in ("largest_contact_area_fraction", "hysteresis_loss", "pull_off_pressure")
+    )
+    n, r2 = (float(value) for value in re.findall(r"= ([-\d.]+)", loss[-1]))
+    assert n == pytest.approx(np.polyfit(np.log(x), np.log(y), 1)[0], abs=0.006)
+    assert r2 == pytest.approx(np.corrcoef(x, y)[0, 1] ** 2, abs=6e-4)
+    assert pull[-1] == f"varies by {100 * (z.max() / z.min() - 1):.0f} %"
+
+
+def test_page_holds_all_of_it(campaign):
+    text = hysteresis.page(
+        campaign,
+        slopes="slopes",
+        detachment="other",
+        loads=list(DEPTHS),
+        load_control="other",
+        loops={},
+        figures={"images/a.png": "A figure"},
+        command="make it",
+    )
+    assert text.startswith("# Pull-off") and "`make it`" in text and "![A figure](images/a.png)" in text
+    assert "nan" not in text.lower() and "{" not in text

@@ -1,0 +1,290 @@
+"""Gap and pressure: fields and distributions against brute force, closed forms and their identities."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.optimize
+from half_space import periodic_displacement
+
+from icha import Material, SelfAffineSpectrum, Surface
+from icha.asperity.jkr import JKR
+from icha.datasets.bins import GAP_BINS, PRESSURE_BINS
+from icha.equilibrium.distributions import (
+    _gap_bin,
+    contact_cover,
+    covered_nodes,
+    displacement,
+    gap,
+    gap_distribution,
+    pressure_distribution,
+)
+from icha.equilibrium.equilibrium import Contact, Spots, area_fraction, equilibrium, mean_pressure, untouched
+from icha.half_space.grid_displacement import displacement_field, row_blocks
+from icha.surfaces.summits import find_summits
+
+PERIOD, MODULUS = 100e-6, 25e6
+
+
+def pressed(energy, levels=(2.5, 2.0, 1.5, 1.2), grid=64, seed=1):
+    surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 16, 0.8).realise(grid, seed)
+    law = JKR(Material(MODULUS, energy, 2.071e-9))
+    contact = Contact(law, find_summits(surface), surface.rms_height)
+    state = untouched(contact)
+    for level in levels:
+        state = equilibrium(contact, state, level * surface.rms_height)
+    return surface, contact, state
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.05], ids=["bare", "adhesive"])
+def case(request):
+    return pressed(request.param)
+
+
+def spots_of(position, a):
+    a = np.asarray(a, float)
+    return Spots(np.asarray(position, float), a * 0, a * 0 + 1, a, a * 0, np.ones(len(a), dtype=int))
+
+
+@pytest.mark.parametrize("grid", [16, 17])
+def test_cover_of_cells_against_counting(grid):
+    surface = Surface(np.random.default_rng(0).normal(size=(grid, grid)), 1.0)
+    # Large, smaller than a cell, on a node, and across two borders.
+    position, a = [[0.31, 0.42], [0.75, 0.125], [0.99, 0.985]], [0.2, 0.02, 0.11]
+    cover = contact_cover(surface, spots_of(position, a))
+    fine = 60
+    # Sub-cells of the cells around the nodes.
+    x = (np.arange(grid * fine) + 0.5) / (grid * fine) - 0.5 / grid
+    inside = np.zeros((grid * fine,) * 2)
+    for (cx, cy), radius in zip(position, a, strict=True):
+        dx, dy = x - cx, x - cy
+        inside += np.hypot((dx - np.rint(dx))[None, :], (dy - np.rint(dy))[:, None]) < radius
+    counted = inside.reshape(grid, fine, grid, fine).mean(axis=(1, 3))
+    np.testing.assert_allclose(cover, counted, atol=3 / fine)
+    assert cover.mean() == pytest.approx(np.sum(np.pi * np.square(a)), rel=1e-12)
+    assert np.all((cover > -1e-12) & (cover < 1 + 1e-12))
+
+
+def test_covered_nodes_by_counting():
+    surface = Surface(np.random.default_rng(0).normal(size=(20, 20)), 1.0)
+    position, a = [[0.313, 0.42], [0.985, 0.99]], [0.2, 0.11]
+    x = np.arange(20) / 20
+    expected = np.zeros((20, 20), dtype=bool)
+    for (cx, cy), radius in zip(position, a, strict=True):
+        dx, dy = x - cx, x - cy
+        expected |= np.hypot((dx - np.rint(dx))[None, :], (dy - np.rint(dy))[:, None]) < radius
+    np.testing.assert_array_equal(covered_nodes(surface, spots_of(position, a)), expected)
+
+
+def test_the_mean_of_the_gap_field_is_the_mean_separation(case):
+    surface, contact, state = case
+    w, u = displacement(contact.law, surface, state), gap(contact.law, surface, state)
+    np.testing.assert_allclose(u, state.separation + w - surface.heights, atol=1e-12 * surface.rms_height)
+    # The field's mean vanishes; that of its samples to the sampling of the spots' edges.
+    assert abs(w.mean()) < 1e-4 * np.max(np.abs(w))
+    assert u.mean() == pytest.approx(state.separation, rel=1e-4)
+
+
+def test_at_every_single_summit_in_contact_the_gap_closes(case):
+    surface, contact, state = case
+    spots = state.spots
+    single = np.flatnonzero(spots.members == 1)
+    assert len(single) > 10
+    # On a grid shifted so that its first node is the summit.
+    w = [
+        displacement_field(
+            contact.law, PERIOD, 64, spots.position - spots.position[j], spots.contact_radius, spots.radius_of_curvature
+        )[0, 0]
+        for j in single
+    ]
+    # The solver and the field split the sum over images differently.
+    np.testing.assert_allclose(w, spots.height[single] - state.separation, atol=1e-6 * surface.rms_height)
+
+
+def test_identity_of_the_gap_distribution(case):
+    surface, contact, state = case
+    gaps = gap_distribution(contact.law, surface, state)
+    area = area_fraction(contact, state.spots)
+    assert np.sum(gaps.density * np.diff(gaps.edges)) + area + gaps.overlap_fraction == pytest.approx(1, abs=1e-12)
+    assert 0 <= gaps.overlap_fraction < 0.1
+    assert np.all(gaps.density >= 0)
+    np.testing.assert_allclose(gaps.edges, GAP_BINS * surface.rms_height)
+
+
+def test_gap_distribution_by_counting_nodes(case):
+    surface, contact, state = case
+    gaps = gap_distribution(contact.law, surface, state)
+    u = gap(contact.law, surface, state)
+    # Of gaps not near zero the nodes outside the spots are counted; those whose cells a spot's edge cuts count less.
+    edge = int(np.searchsorted(gaps.edges, 0.3 * surface.rms_height))
+    content = gaps.density * np.diff(gaps.edges)
+    counted, _ = np.histogram(u[~covered_nodes(surface, state.spots)], bins=gaps.edges)
+    difference = counted[edge:] / surface.grid**2 - content[edge:]
+    assert np.all(difference > -1e-12)
+    assert np.sum(difference) < 0.01
+    np.testing.assert_allclose(content[-22:], counted[-22:] / surface.grid**2, atol=1e-12)
+    mean = np.sum(content * 0.5 * (gaps.edges[1:] + gaps.edges[:-1]))
+    # The mean gap is the mean separation up to what the spots and the overlap hide.
+    assert mean == pytest.approx(state.separation, rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def rough():
+    """A surface of several blocks of rows with disjoint spots of all sizes on it, in no particular equilibrium."""
+    grid = 800
+    surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 100, 0.8).realise(grid, 2)
+    assert len(row_blocks(grid)) > 1
+    rng = np.random.default_rng(3)
+    lattice = np.stack(np.meshgrid(np.arange(12), np.arange(12)), axis=-1).reshape(-1, 2)
+    a = 10 ** rng.uniform(-4.5, -1.45, len(lattice)) * PERIOD
+    spots = spots_of((lattice + 0.5 * rng.random(lattice.shape)) * (PERIOD / 12), a)
+    radius = a**2 / (0.3 * surface.rms_height)
+    spots = Spots(spots.position, spots.height, radius, a, spots.approach, spots.members)
+    return surface, JKR(Material(MODULUS, 0.0, 1e-9)), SimpleNamespace(spots=spots, separation=2 * surface.rms_height)
+
+
+def test_gap_distribution_of_many_spots_from_their_fields(rough):
+    surface, law, state = rough
+    gaps = gap_distribution(law, surface, state)
+    u = np.where(covered_nodes(surface, state.spots), 0.0, gap(law, surface, state))
+    outside = np.clip(1 - contact_cover(surface, state.spots), 0, 1) / surface.grid**2
+    expected, _ = np.histogram(u, bins=gaps.edges, weights=outside)
+    np.testing.assert_allclose(gaps.density * np.diff(gaps.edges), expected, rtol=1e-9, atol=1e-12)
+    assert gaps.overlap_fraction == pytest.approx(np.sum(outside[u < 0]), rel=1e-9)
+    area = np.sum(np.pi * state.spots.contact_radius**2) / PERIOD**2
+    assert np.sum(expected) + gaps.overlap_fraction + area == pytest.approx(1, abs=1e-12)
+
+
+def test_gaps_on_the_edges_of_bins_are_counted_in_the_bin_above():
+    # On every edge and at the numbers next to it.
+    edges = GAP_BINS[1:-1]
+    wanted = np.concatenate([edges, np.nextafter(edges, 0), np.nextafter(edges, np.inf), [0.0] * 3, [GAP_BINS[-1]] * 2])
+    n = 20
+    u = np.resize(wanted, n * n)
+    index = _gap_bin(u.reshape(n, n) * 0.7, GAP_BINS * 0.7).ravel()
+    expected = np.minimum(np.searchsorted(GAP_BINS * 0.7, u * 0.7, side="right") - 1, len(GAP_BINS) - 2)
+    np.testing.assert_array_equal(index, expected)
+
+
+def test_every_fourth_node_and_wider_cells(rough):
+    surface, law, state = rough
+    fine, coarse = gap(law, surface, state), gap(law, surface, state, every=4)
+    np.testing.assert_allclose(coarse, fine[::4, ::4], rtol=0, atol=1e-7 * surface.rms_height)
+    cover, wide = contact_cover(surface, state.spots), contact_cover(surface, state.spots, every=5)
+    # A wide cell around every fifth node holds five by five of the narrow ones.
+    shifted = np.roll(cover, 2, axis=(0, 1)).reshape(160, 5, 160, 5)
+    np.testing.assert_allclose(wide, shifted.mean(axis=(1, 3)), atol=1e-11)
+    for every in (3, 0, 2.0):
+        with pytest.raises(ValueError, match="every"):
+            gap(law, surface, state, every=every)
+
+
+def test_distributions_have_the_same_bits_on_any_number_of_cores(rough, monkeypatch):
+    surface, law, state = rough
+    bits = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        gaps = gap_distribution(law, surface, state)
+        cover = contact_cover(surface, state.spots)
+        bits.append(gaps.density.tobytes() + np.array(gaps.overlap_fraction).tobytes() + cover.tobytes())
+    assert bits[0] == bits[1]
+
+
+def test_spots_of_no_radius_cover_nothing():
+    surface = Surface(np.random.default_rng(0).normal(size=(16, 16)), 1.0)
+    both, one = spots_of([[0.5, 0.5], [0.3, 0.3]], [0.0, 0.1]), spots_of([[0.3, 0.3]], [0.1])
+    np.testing.assert_array_equal(contact_cover(surface, both), contact_cover(surface, one))
+
+
+def test_gap_distribution_around_one_hertz_spot():
+    # One paraboloid on a fine grid: the area with gaps up to u is a ring whose radius follows from closed forms.
+    n, R = 256, 100e-6
+    x = np.arange(n) / n - 0.503
+    r2 = ((x - np.rint(x)) ** 2)[None, :] + ((x - np.rint(x)) ** 2)[:, None]
+    heights = -r2 * PERIOD**2 / (2 * R)
+    surface = Surface(heights, PERIOD)
+    contact = Contact(JKR(Material(MODULUS, 0.0, 1e-9)), find_summits(surface), surface.rms_height)
+    top = -heights.mean()
+    state = equilibrium(contact, untouched(contact), top - 4e-7)
+    a = state.spots.contact_radius[0]
+    gaps = gap_distribution(contact.law, surface, state)
+    cumulative = np.concatenate([[0.0], np.cumsum(gaps.density * np.diff(gaps.edges))]) + gaps.overlap_fraction
+
+    def u(r):
+        w = periodic_displacement(r, 0.0, a, R, MODULUS, 0.0, PERIOD)
+        return state.separation + w - (top - r**2 / (2 * R))
+
+    for factor in (1.5, 2.5, 4.0):
+        level = u(factor * a)
+        edge = int(np.argmin(np.abs(gaps.edges - level)))
+        radius = scipy.optimize.brentq(lambda r, target=gaps.edges[edge]: u(r) - target, a, 6 * a)
+        ring = np.pi * (radius**2 - a**2) / PERIOD**2
+        assert cumulative[edge] == pytest.approx(ring, rel=0.01)
+
+
+def test_before_contact_the_gap_is_that_of_the_heights():
+    surface, contact, state = pressed(0.0, levels=())
+    gaps = gap_distribution(contact.law, surface, state)
+    counted, _ = np.histogram(state.separation - surface.heights, bins=gaps.edges)
+    # The highest node may lie on the refined summit itself.
+    np.testing.assert_allclose(
+        gaps.density * np.diff(gaps.edges), counted / surface.grid**2, atol=1.5 / surface.grid**2
+    )
+    pressures = pressure_distribution(contact.law, surface, state.spots)
+    np.testing.assert_array_equal(pressures.density, 0)
+    np.testing.assert_array_equal(pressures.mean, 0)
+
+
+def test_identities_of_the_pressure_distribution(case):
+    surface, contact, state = case
+    pressures = pressure_distribution(contact.law, surface, state.spots)
+    width = np.diff(pressures.edges)
+    assert np.sum(pressures.density * width) == pytest.approx(area_fraction(contact, state.spots), rel=1e-12)
+    assert np.sum(pressures.density * width * pressures.mean) == pytest.approx(
+        mean_pressure(contact, state.spots), rel=1e-12
+    )
+    filled = np.flatnonzero(pressures.density > 0)
+    # A bin's mean lies in it; the first also holds the tail to minus infinity.
+    inner = filled[filled > 0]
+    slack = 1e-6 * width[inner]
+    assert np.all(pressures.mean[inner] >= pressures.edges[inner] - slack)
+    assert np.all(pressures.mean[inner] <= pressures.edges[inner + 1] + slack)
+    assert np.all(pressures.mean[np.setdiff1d(np.arange(len(width)), filled)] == 0)
+    np.testing.assert_allclose(pressures.edges, PRESSURE_BINS * MODULUS * surface.rms_slope)
+
+
+def test_pressure_distribution_by_sampling_the_spots(case):
+    surface, contact, state = case
+    spots = state.spots
+    pressures = pressure_distribution(contact.law, surface, spots)
+    t = (np.arange(20_000) + 0.5) / 20_000
+    counted = np.zeros(len(pressures.density))
+    for a, R in zip(spots.contact_radius, spots.radius_of_curvature, strict=True):
+        p = contact.law.pressure(a * np.sqrt(t), a, R)
+        counted += np.histogram(p, bins=pressures.edges)[0] * np.pi * a**2 / (len(t) * PERIOD**2)
+    np.testing.assert_allclose(pressures.density * np.diff(pressures.edges), counted, atol=2e-4 * counted.sum())
+
+
+def test_tension_only_with_adhesion(case):
+    surface, contact, state = case
+    pressures = pressure_distribution(contact.law, surface, state.spots)
+    tension = pressures.density[pressures.edges[1:] <= 0].sum()
+    assert (tension > 0) == (contact.law.material.surface_energy > 0)
+
+
+def test_pressures_and_gaps_beyond_the_bins_are_refused():
+    surface, contact, state = pressed(0.0)
+    sharp = Spots(
+        state.spots.position,
+        state.spots.height,
+        1e-6 * state.spots.radius_of_curvature,
+        state.spots.contact_radius,
+        state.spots.approach,
+        state.spots.members,
+    )
+    with pytest.raises(ValueError, match="pressure"):
+        pressure_distribution(contact.law, surface, sharp)
+    from dataclasses import replace
+
+    with pytest.raises(ValueError, match="gap"):
+        gap_distribution(contact.law, surface, replace(state, separation=40 * surface.rms_height))

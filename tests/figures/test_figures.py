@@ -1,0 +1,819 @@
+"""Figures can be drawn from small and unusual campaigns, say what is wrong, and have the same bytes every time."""
+
+import itertools
+import re
+
+import compared_campaign as compared
+import cyclic_campaign as cyclic
+import matplotlib as mpl
+import numpy as np
+import pytest
+import small_campaign as small
+import xarray as xr
+from matplotlib.colors import to_hex, to_rgb
+
+import icha
+from icha.analysis.model_error import jaccard
+from icha.datasets.campaign import RunLabels, campaign_tree, find_snapshot
+from icha.datasets.files import read_dataset, write_surface
+from icha.figures import (
+    fig1_jkr,
+    fig2_area_and_gap,
+    fig3_distributions,
+    fig4_contact_map,
+    fig5_multi_slope,
+    fig6_spots_by_slope,
+    fig7_stiffness,
+    fig8_patch_sizes,
+    fig9_tabor,
+    fig10_model_error,
+    fig11_distribution_error,
+)
+from icha.figures.scale import Scale, materials_scale, places_scale
+from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
+from icha.figures.spots import circles_in_cell
+from icha.figures.style import (
+    BLACK,
+    BLUE,
+    VERMILLION,
+    logarithmic_axes,
+    material_label,
+    new_figure,
+    number,
+    quantity,
+    save,
+    slope_label,
+    unit_for,
+)
+from icha.references import reference_dataset
+from icha.support.statistics import ensemble
+from icha.surfaces.moments import spectral_moments
+
+
+@pytest.fixture(scope="module")
+def surface(tmp_path_factory):
+    path = tmp_path_factory.mktemp("surface") / "s.nc"
+    write_surface(path, small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    return read_dataset(path)
+
+
+def solution(pressure=3e-3, shift=0):
+    """Boundary elements of what figure 4 draws of the compared campaign, their contact shifted by some nodes."""
+    own = compared.own_solution(compared.runs()["one", "rough", 1, 1.0, "soft"], pressure)
+    return own.assign(contact=own["contact"].roll(x=shift))
+
+
+def draw(name, surface):
+    tree = small.tree()
+    return {
+        "fig1": lambda: fig1_jkr.figure(),
+        "fig2": lambda: fig2_area_and_gap.figure(tree, reference_dataset(small.SPECTRUM), study="slopes"),
+        "fig2_alone": lambda: fig2_area_and_gap.figure(tree, study="single"),
+        "fig3": lambda: fig3_distributions.figure(tree, study="slopes"),
+        "fig3_one": lambda: fig3_distributions.figure(tree, study="single", kind="area_fraction"),
+        "fig4": lambda: fig4_contact_map.figure(tree, surface, study="slopes", rms_slope=0.2, material="hertz"),
+        "fig5": lambda: fig5_multi_slope.figure(tree, study="slopes"),
+        "fig5_one": lambda: fig5_multi_slope.figure(tree, study="single"),
+        "fig6": lambda: fig6_spots_by_slope.figure(tree, study="slopes", material="hertz"),
+        "fig6_one": lambda: fig6_spots_by_slope.figure(tree, study="single", seed=2),
+        "fig7": lambda: fig7_stiffness.figure(tree, reference_dataset(small.SPECTRUM), study="slopes"),
+        "fig7_alone": lambda: fig7_stiffness.figure(tree, study="single"),
+        "fig8": lambda: fig8_patch_sizes.figure(tree, study="slopes"),
+        "fig8_one": lambda: fig8_patch_sizes.figure(tree, study="single", kind="area_fraction"),
+        "fig9": lambda: fig9_tabor.figure(tree, study="slopes"),
+        "fig2_truth": lambda: fig2_area_and_gap.figure(compared.tree(), None, compared.errors(), study="one"),
+        "fig3_truth": lambda: fig3_distributions.figure(compared.tree(), compared.errors(), study="one"),
+        "fig4_truth": lambda: fig4_contact_map.figure(compared.tree(), surface, solution(), study="one"),
+        "fig10": lambda: fig10_model_error.figure(compared.errors(), study="one"),
+        "fig11": lambda: fig11_distribution_error.figure(compared.errors(), study="one"),
+        "fig2_loops": lambda: fig2_area_and_gap.figure(cyclic.tree(), study="loops"),
+        "fig5_loops": lambda: fig5_multi_slope.figure(cyclic.tree(), study="loops"),
+        "fig9_one": lambda: fig9_tabor.figure(tree, study="single", kind="area_fraction"),
+    }[name]()
+
+
+NAMES = ["fig1", "fig2", "fig2_alone", "fig3", "fig3_one", "fig4", "fig5", "fig5_one", "fig6", "fig6_one"]
+NAMES += ["fig7", "fig7_alone", "fig8", "fig8_one", "fig9", "fig9_one"]
+NAMES += ["fig2_loops", "fig5_loops", "fig2_truth", "fig3_truth", "fig4_truth", "fig10", "fig11"]
+FIGURES = [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope]
+FIGURES += [fig7_stiffness, fig8_patch_sizes, fig9_tabor]
+COMPARED = [fig10_model_error, fig11_distribution_error]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, name):
+    save(draw(name, surface), tmp_path / "a.png", tmp_path / "a.pdf")
+    with mpl.rc_context({"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "savefig.dpi": 33}):
+        save(draw(name, surface), tmp_path / "b.png", tmp_path / "b.pdf")
+    for kind in ("png", "pdf"):
+        one, two = ((tmp_path / f"{each}.{kind}").read_bytes() for each in "ab")
+        assert one == two
+        assert b"CreationDate" not in one and len(one) > 5000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.pdf", "a.png", "b.pdf", "b.png"]
+
+
+def lines(axes):
+    return [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
+
+
+def test_fig1_passes_through_the_known_points():
+    axes = fig1_jkr.figure(tabor_parameter=3.0).axes[0]
+    marks = {text.get_text(): text.xy for text in axes.texts if text.get_text() in "ABC" and text.get_text()}
+    assert marks["C"] == pytest.approx((-1.608772, -5 * np.pi / 6), abs=1e-5)
+    assert marks["B"] == pytest.approx((-0.773417, -1.5 * np.pi), abs=1e-5)
+    assert marks["A"] == pytest.approx(((1 - 2.641 * 3 ** (3 / 7)) / 3, 0), abs=1e-9)
+
+
+def test_fig2_shows_every_run_and_the_references():
+    figure = fig2_area_and_gap.figure(small.tree(), reference_dataset(small.SPECTRUM), study="slopes")
+    left, right = figure.axes
+    labels = {text.get_text() for text in left.get_legend().get_texts()}
+    assert {"Persson", "Bush, Gibson & Thomas", "GFMD, no adhesion"} <= labels
+    drawn = [line for line in left.get_lines() if line.get_linestyle() == "None" and len(line.get_xdata()) == 4]
+    assert len(drawn) == 4
+    run = small.run(rms_slope=0.2, material="soft")
+    expected = path_steps(run)["contact_area_fraction"].values
+    assert any(np.array_equal(line.get_ydata(), expected) for line in drawn)
+    assert left.get_xscale() == left.get_yscale() == right.get_xscale() == right.get_yscale() == "log"
+
+
+def test_branches_begin_where_the_one_before_ends():
+    run = cyclic.run(between=2)
+    (one, way_in), (other, way_back) = branches(run)
+    assert (one, other) == ("loading", "unloading")
+    assert way_in["step"].values[-1] == way_back["step"].values[0] and set(way_back["leg"].values) == {0, 1}
+    assert way_in.sizes["step"] + way_back.sizes["step"] == run.sizes["step"] + 1
+    # A path that turns again and again has a branch for every turn.
+    again = xr.concat([run, run.assign(leg=run["leg"] + 2)], "step", data_vars="minimal")
+    assert [name for name, _ in branches(again)] == ["loading", "unloading"] * 2
+    assert [name for name, _ in branches(small.run())] == ["loading"]
+
+
+def test_stops_are_those_of_the_first_loading():
+    for material in ("soft", "hertz"):
+        xr.testing.assert_equal(
+            path_steps(cyclic.run(material=material, between=3)).drop_vars("step")["contact_area_fraction"],
+            path_steps(small.run(material=material)).drop_vars("step")["contact_area_fraction"],
+        )
+
+
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig5_multi_slope])
+def test_ways_back_are_thin_dashed_lines_in_the_colour_of_the_material(module):
+    runs = {labels: run for labels, run in cyclic.runs().items() if (labels.study, labels.seed) == ("loops", 2)}
+    figure = module.figure(campaign_tree(runs.items()), study="loops")
+    left, right = figure.axes
+    names = [text.get_text() for each in (*figure.axes, figure) for text in getattr(each, "texts", ())]
+    legends = [each for each in (left.get_legend(), right.get_legend(), *figure.legends) if each is not None]
+    names = [text.get_text() for legend in legends for text in legend.get_texts()]
+    assert names.count("unloading") == 1
+    for axes in (left, right):
+        ways = [line for line in axes.get_lines() if line.get_linewidth() == 0.7 and len(line.get_xdata())]
+        markers = [line for line in axes.get_lines() if line.get_marker() not in ("None", "") and len(line.get_xdata())]
+        assert len(ways) == len(markers) == 2
+        assert {line.get_color() for line in ways} == {line.get_markeredgecolor() for line in markers}
+        assert all(line.is_dashed() for line in ways)
+        for way in ways:
+            # From the largest load on, as long as it presses.
+            assert way.get_xdata()[0] in {line.get_xdata()[-1] for line in markers}
+            assert np.all(way.get_xdata()[np.isfinite(way.get_xdata())] > 0)
+    run = cyclic.run(seed=2, material="soft", between=4)
+    back = run.isel(step=run["leg"].values == 1)
+    pushed = back["reduced_pressure"].values > 0
+    assert 0 < np.count_nonzero(pushed) < len(pushed)
+    drawn = np.concatenate([line.get_xdata() for line in left.get_lines() if line.get_linewidth() == 0.7])
+    assert set(back["reduced_pressure"].values[pushed]) <= set(drawn)
+    alone = module.figure(small.tree(), study="slopes")
+    assert not [line for axes in alone.axes for line in axes.get_lines() if line.get_linewidth() == 0.7]
+
+
+def test_figures_of_the_first_loading_do_not_see_the_way_back():
+    study = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
+    there = campaign_tree((labels, small.run(labels.seed, 1.0, labels.material)) for labels in study)
+    for with_loops, without in zip(
+        fig7_stiffness.figure(cyclic.tree(), study="loops").axes,
+        fig7_stiffness.figure(there, study="loops").axes,
+        strict=True,
+    ):
+        for one, other in zip(with_loops.get_lines(), without.get_lines(), strict=True):
+            np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
+
+
+def test_the_state_of_pull_off_can_be_drawn(tmp_path):
+    run = cyclic.run(between=2).copy(deep=True)
+    run["snapshot_kind"].values[1] = "pull_off"
+    run["snapshot_target"].values[1] = 0.0
+    run["snapshot_step"].values[1] = run.sizes["step"] - 2
+    assert snapshot_label(run, 1) == "pull-off"
+    tree = campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)])
+    for module in (fig3_distributions, fig8_patch_sizes):
+        figure = module.figure(tree, study="one", kind="pull_off")
+        assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
+        assert not any(line.get_label() == "Persson" for axes in figure.axes for line in axes.get_lines())
+
+
+def test_fig3_points_keep_the_probability():
+    run = small.run()
+    for at in range(run.sizes["snapshot"]):
+        edges = run["gap_bin_edges"].values / float(run["rms_height"])
+        u, (density,) = fig3_distributions.gap_densities([(run, at)])
+        assert np.all(np.diff(u) > 0) and np.all(density > 0)
+        assert u[0] > edges[1] and u[-1] < edges[-1]
+        p, (density,) = fig3_distributions.pressure_densities([(run, at)])
+        width = np.diff(run["pressure_bin_edges"].values) / float(run["contact_modulus"] * run["rms_slope"])
+        held = width[run["pressure_density"].values[at] > 0]
+        area = float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at])])
+        assert np.sum(density * held) == pytest.approx(area, rel=1e-9)
+        assert p.min() < 0, "adhesion pulls at the edges"
+    hertz = small.run(material="hertz")
+    assert fig3_distributions.pressure_densities([(hertz, 0)])[0].min() > 0
+
+
+def test_fig4_refuses_the_surface_of_another_run(tmp_path, surface):
+    write_surface(tmp_path / "s.nc", small.surface(2), name="rough", seed=2)
+    with pytest.raises(ValueError, match="the surface given has seed 2"):
+        fig4_contact_map.figure(small.tree(), read_dataset(tmp_path / "s.nc"), study="slopes")
+    with pytest.raises(ValueError, match="another period or grid"):
+        fig4_contact_map.figure(small.tree(), surface.assign(period=surface["period"] * 2), study="slopes")
+
+
+def test_fig4_draws_means_of_large_topographies():
+    rng = np.random.default_rng(5)
+    for n in (3000, 2048, 1024, 7):
+        heights = rng.normal(size=(n, n)) if n < 3000 else np.add.outer(np.arange(n) ** 2.0, np.arange(n) * 10.0)
+        drawn = fig4_contact_map._means(heights)
+        assert drawn.shape == (min(n, 1024),) * 2
+        if n == 2048:
+            assert drawn[3, 5] == pytest.approx(heights[6:8, 10:12].mean())
+        if n == 3000:
+            # A block of nodes from 3000 k/1024 to the next.
+            rows, columns = np.arange(2929, 2932), np.arange(1464, 1467)
+            assert drawn[1000, 500] == pytest.approx(np.add.outer(rows**2.0, columns * 10.0).mean())
+
+
+def test_fig4_enlarges_small_spots_more_and_stays_small(tmp_path):
+    rng = np.random.default_rng(4)
+    grid, count = 1500, 5000
+    surface = icha.Surface(rng.normal(size=(grid, grid)) * 1e-8, period=100e-6)
+    write_surface(tmp_path / "s.nc", surface, name="rough", seed=1)
+    run = small.run().drop_dims("spot")
+    radius = rng.uniform(0.05e-6, 0.1e-6, count)
+    spots = {"spot_x": rng.uniform(0, 1e-4, count), "spot_y": rng.uniform(0, 1e-4, count), "spot_radius": radius}
+    spots |= {"spot_snapshot": np.zeros(count, int)}
+    run = run.assign({name: ("spot", values, small.run()[name].attrs) for name, values in spots.items()})
+    run["grid"] = run["grid"].copy(data=grid)
+    tree = campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)])
+    figure = fig4_contact_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="one")
+    whole, enlarged = (np.ptp(axes.get_xlim()) for axes in figure.axes[:2])
+    assert whole == pytest.approx(100)
+    # 40 radii are 3.2 um or so, but 64 cells are more.
+    assert enlarged == pytest.approx(100 / 16)
+    save(figure, tmp_path / "a.png", tmp_path / "a.pdf")
+    assert (tmp_path / "a.pdf").stat().st_size < 2e6
+
+
+def test_circles_continue_across_borders():
+    circles = list(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "periodic"))
+    assert sorted((round(x, 9), round(y, 9)) for x, y, _ in circles) == [
+        (0.02, -0.03),
+        (0.02, 0.97),
+        (0.5, 0.5),
+        (1.02, -0.03),
+        (1.02, 0.97),
+    ]
+    # A free square has no opposite border.
+    assert len(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "free")) == 2
+
+
+def test_fig5_lays_measurements_over_the_curves():
+    measured = fig5_multi_slope.MeasuredAreas(
+        "Someone, 2020", "A paper.", np.array([1e-3, 1e-2, 2e-2]), np.array([2e-3, 2e-2, 4e-2]), "soft", 0.2
+    )
+    without_slope = fig5_multi_slope.MeasuredAreas(
+        "Another", "A paper.", np.array([1e-3, 1e-2, 2e-2]), np.array([3e-3, 3e-2, 5e-2])
+    )
+    left, right = fig5_multi_slope.figure(small.tree(), study="slopes", measurements=[measured, without_slope]).axes
+    found = {line.get_label(): line for line in left.get_lines() if not line.get_label().startswith("_")}
+    assert set(found) == {"Someone, 2020", "Another"}
+    np.testing.assert_array_equal(found["Another"].get_ydata(), without_slope.area_fraction)
+    shifted = [line for line in right.get_lines() if len(line.get_xdata()) == 3]
+    assert len(shifted) == 1
+    np.testing.assert_allclose(shifted[0].get_xdata(), measured.reduced_pressure * 0.2)
+
+
+def test_fig5_slope_orders_the_curves_at_equal_load():
+    right = fig5_multi_slope.figure(small.tree(), study="slopes").axes[1]
+    by_marker = {}
+    for line in lines(right):
+        by_marker.setdefault(line.get_marker(), []).append((line.get_xdata(), line.get_ydata()))
+    assert set(by_marker) == {"o", "s"}
+    (steep, _), (flat, _) = by_marker["o"][0], by_marker["s"][0]
+    np.testing.assert_allclose(flat, 0.2 * steep, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "module", [m for m in FIGURES if m not in (fig1_jkr, fig4_contact_map)], ids=lambda m: m.__name__
+)
+def test_unknown_studies_are_named(module):
+    with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, single"):
+        module.figure(small.tree(), study="nothing")
+
+
+def test_fig7_is_the_slope_of_fig2_whatever_the_rms_slope():
+    # Without adhesion p* against u/h_rms is one curve for all slopes of a topography, and so is its derivative.
+    one, other = (
+        dict(zip(*np.round(fig7_stiffness.stiffness_points(small.run(rms_slope=s, material="hertz")), 12), strict=True))
+        for s in (1.0, 0.2)
+    )
+    common = sorted(set(one) & set(other))
+    assert len(common) >= len(small.PRESSURES)
+    np.testing.assert_allclose([one[p] for p in common], [other[p] for p in common], rtol=1e-6)
+    left, right = fig7_stiffness.figure(small.tree(), study="slopes").axes
+    p, stiffness = fig7_stiffness.stiffness_points(path_steps(small.run(rms_slope=0.2)))
+    for axes, values in ((left, stiffness), (right, stiffness / p)):
+        drawn = [line.get_ydata() for line in axes.get_lines() if len(line.get_xdata()) == len(p)]
+        assert any(np.allclose(each, values, rtol=1e-9) for each in drawn)
+
+
+def test_fig7_leaves_out_what_has_no_logarithm():
+    run = small.run().copy(deep=True)
+    run["contact_stiffness"].values[0] *= -1
+    run["reduced_pressure"].values[1] = -1e-4
+    p, stiffness = fig7_stiffness.stiffness_points(run)
+    assert len(p) == len(stiffness) == run.sizes["step"] - 2
+    run["contact_stiffness"].values[:] = -1.0
+    with pytest.raises(ValueError, match="study one: no stop with a positive load and a positive stiffness"):
+        fig7_stiffness.figure(campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)]), study="one")
+
+
+def test_fig8_density_and_counts_of_a_known_distribution():
+    # Quantiles of n(A) ~ A^-2 between 1 and 1000, on a nominal area of 50.
+    count, nominal = 20000, 50.0
+    area = np.sort(1 / (1 - (np.arange(count) + 0.5) / count * (1 - 1e-3)))
+    at, (density,) = fig8_patch_sizes.patch_density([area], nominal)
+    exact = count / nominal / (1 - 1e-3) / at**2
+    np.testing.assert_allclose(density[at < 100], exact[at < 100], rtol=0.03)
+    at, (above,) = fig8_patch_sizes.patches_above([area], nominal)
+    assert at[0] == area[0] and at[-1] == area[-1] and len(at) <= 300
+    np.testing.assert_allclose(above * nominal, [np.count_nonzero(area >= a) for a in at])
+
+
+@pytest.mark.parametrize("areas", [[], [2.0], [2.0, 2.0], [1.0, 2.0, 5.0]])
+def test_fig8_of_few_patches(areas):
+    at, (density,) = fig8_patch_sizes.patch_density([np.array(areas)], 10.0)
+    assert len(at) == min(len(areas), 1) and np.all(np.isfinite(density))
+    at, (above,) = fig8_patch_sizes.patches_above([np.array(areas)], 10.0)
+    assert len(at) == len(above) == len(areas)
+
+
+def test_fig8_counts_the_patches_of_every_member():
+    rng = np.random.default_rng(3)
+    areas = [np.sort(rng.pareto(1.0, count) + 1) for count in (900, 1100, 0)]
+    at, densities = fig8_patch_sizes.patch_density(areas, 10.0)
+    assert densities.shape == (3, len(at)) and not densities[2].any()
+    ratio = densities[1] / densities[0]
+    # One distribution, and eleven patches for nine.
+    assert np.median(ratio) == pytest.approx(11 / 9, rel=0.2)
+    at, above = fig8_patch_sizes.patches_above(areas, 10.0)
+    for counts, area in zip(above * 10.0, areas, strict=True):
+        np.testing.assert_allclose(counts, [np.count_nonzero(area >= a) for a in at])
+
+
+def test_fig8_counts_the_spots_of_the_snapshot():
+    run = small.run()
+    for at in range(run.sizes["snapshot"]):
+        step = int(run["snapshot_step"].values[at])
+        areas = fig8_patch_sizes.patch_areas(run, at)
+        assert len(areas) == int(run["spot_count"].values[step])
+        share = areas.sum() / float(run["period"]) ** 2
+        assert share == pytest.approx(float(run["contact_area_fraction"].values[step]), rel=1e-9)
+
+
+def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
+    ranges = {"long": 4e-9, "short": 1e-9, "bare": 2e-9}
+    runs = {}
+    for name, reach in ranges.items():
+        material = icha.Material(25e6, 0.0 if name == "bare" else 0.05, reach)
+        path = icha.Path(reduced_pressures=[1e-2], max_step=0.2)
+        runs[name] = icha.simulate(small.surface(), material, path, seed=1)
+    tree = campaign_tree([(RunLabels("tabor", "rough", 1, 1.0, name), run) for name, run in runs.items()])
+    left, right = fig9_tabor.figure(tree, study="tabor").axes
+    for axes, name in ((left, "contact_area_fraction"), (right, "reduced_separation")):
+        curve, bare = axes.get_lines()
+        own = [runs["long"], runs["short"]]
+        np.testing.assert_array_equal(curve.get_xdata(), [float(run["tabor_parameter"]) for run in own])
+        np.testing.assert_array_equal(curve.get_ydata(), [float(run[name].values[-1]) for run in own])
+        assert set(bare.get_ydata()) == {float(runs["bare"][name].values[-1])}
+    assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
+    assert len({text.get_text() for text in left.get_legend().get_texts()}) == 2
+    tree = campaign_tree([(RunLabels("tabor", "rough", 1, 1.0, "bare"), runs["bare"])])
+    with pytest.raises(ValueError, match="study tabor: no complete run with adhesion"):
+        fig9_tabor.figure(tree, study="tabor")
+
+
+def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
+    figure = fig2_area_and_gap.figure(compared.tree(), None, compared.errors(), study="one")
+    for axes, name in zip(figure.axes, ("contact_area_fraction", "reduced_separation"), strict=True):
+        crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
+        runs = [line for line in axes.get_lines() if line.get_marker() not in ("+", "None")]
+        assert len(crosses) == 2 and len(runs) == 2
+        assert {line.get_markeredgecolor() for line in crosses} == {line.get_markeredgecolor() for line in runs}
+        for line, entry in zip(crosses, ("adhesive", "bare"), strict=True):
+            truth = compared.errors()[entry][f"{name}_boundary_elements"].values
+            np.testing.assert_allclose(line.get_ydata(), truth.mean(axis=1).ravel(), rtol=1e-12)
+            assert sorted(set(line.get_xdata())) == list(compared.PRESSURES)
+        names = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert names.count("boundary elements") == 1
+    alone = fig2_area_and_gap.figure(small.tree(), None, compared.errors(), study="single")
+    assert not [line for line in alone.axes[0].get_lines() if line.get_marker() == "+"]
+
+
+def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
+    moments = spectral_moments(small.surface())
+    adhesive = {(1.0, "soft"): small.MATERIALS["soft"], (1.0, "other"): icha.Material(1e6, 0.02, 2e-9)}
+    references = reference_dataset(small.SPECTRUM, moments, adhesive)
+    figure = fig2_area_and_gap.figure(compared.tree(), references, compared.errors(), study="one")
+    # Too many names for a panel: they stand below, each once.
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"Greenwood & Williamson", "Fuller & Tabor", "Yang & Persson", "boundary elements"} <= set(names)
+    assert len(names) == len(set(names))
+    for axes, name in zip(figure.axes, ("summit_area_fraction", "reduced_separation"), strict=True):
+        assert axes.get_legend() is None
+        drawn = [line for line in axes.get_lines() if line.get_linewidth() == 0.8 and len(line.get_xdata())]
+        assert len(drawn) == 2  # Greenwood & Williamson, and Fuller & Tabor of the study's material
+        values = references[name if name in references else f"greenwood_williamson_{name}"].values
+        np.testing.assert_array_equal(drawn[0].get_ydata(), values)
+        np.testing.assert_array_equal(drawn[0].get_xdata(), references["greenwood_williamson_reduced_pressure"].values)
+        assert np.all(drawn[1].get_xdata() > 0)
+        runs = {line.get_markeredgecolor() for line in axes.get_lines() if line.get_marker() not in ("+", "x", "None")}
+        assert drawn[1].get_color() in runs
+
+
+def test_fig2_tells_further_solutions_of_the_same_states_apart():
+    bare = compared.errors()["bare"].to_dataset()
+    twice = xr.DataTree.from_dict({"/first": bare, "/finer": bare})
+    axes = fig2_area_and_gap.figure(compared.tree(), None, twice, study="one").axes[0]
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "boundary elements" in names and "boundary elements, finer" in names
+    assert {"+", "1"} <= {line.get_marker() for line in axes.get_lines()}
+
+
+def test_fig3_shows_boundary_elements_of_the_same_state_only():
+    def broad(**options):
+        figure = fig3_distributions.figure(compared.tree(), compared.errors(), study="one", **options)
+        return [[line for line in axes.get_lines() if line.get_linewidth() > 3] for axes in figure.axes]
+
+    for shown, more in zip(broad(target=3e-3), (0, 1), strict=True):
+        # Both materials, and what the legends show: boundary elements, and in one of them bands.
+        assert len(shown) == 3 + more
+    only = compared.errors().isel(reduced_pressure=[1])
+    figure = fig3_distributions.figure(compared.tree(), only, study="one", target=3e-3)
+    assert all(line.get_linewidth() < 3 for axes in figure.axes for line in axes.get_lines() if len(line.get_xdata()))
+    # These solutions are the runs' own states, so that their points lie on those of the runs.
+    truth = compared.errors()["bare"].to_dataset().isel(surface=0, seed=0, rms_slope=0, material=0, reduced_pressure=0)
+    truth["solution_grid"] = 32
+    u, (density,) = fig3_distributions.gap_densities([(compared.runs()["one", "rough", 1, 1.0, "hertz"], 0)])
+    for drawn, own in zip(fig3_distributions.solution_gap_points(truth), (u, density), strict=True):
+        np.testing.assert_allclose(drawn, own, rtol=1e-9)
+
+
+def test_fig3_joined_bins_keep_what_they_hold():
+    rng = np.random.default_rng(3)
+    edges, content = np.cumsum(rng.uniform(0.1, 1, 41)), rng.uniform(0, 1, 40) * (rng.random(40) < 0.5)
+    low, high, (density,) = fig3_distributions._joined(edges, content[None], 0.7)
+    assert low[0] == edges[0] and np.array_equal(low[1:], high[:-1])
+    held = density * (high - low)
+    assert np.all(held >= 0.7 - 1e-12)
+    assert 0 <= content.sum() - held.sum() < 0.7
+    # Of several members the bins are the same, and each keeps what it holds.
+    shares = np.array([0.2, 0.5, 0.3])
+    same = fig3_distributions._joined(edges, shares[:, None] * content, 0.7)
+    np.testing.assert_array_equal(same[0], low)
+    np.testing.assert_allclose(same[2], shares[:, None] * density)
+
+
+def test_fig4_puts_boundary_elements_beside_the_spots(surface):
+    truth = solution(shift=2)
+    run = compared.runs()["one", "rough", 1, 1.0, "soft"]
+    figure = fig4_contact_map.figure(compared.tree(), surface, truth, study="one")
+    assert len(figure.axes) == 5  # four panels and the scale of heights
+    contact = truth["contact"].values == 1
+    covered = np.roll(contact, -2, axis=1)
+    beside = figure.axes[1].get_images()[1].get_array()
+    np.testing.assert_array_equal(beside[:-1, :-1], contact)
+    states = figure.axes[3].get_images()[0].get_array()[:-1, :-1]
+    counts = {
+        name: np.count_nonzero(np.all(states == to_rgb(colour), axis=-1))
+        for name, colour in (("icha", VERMILLION), ("truth", BLUE), ("both", "0.35"))
+    }
+    assert counts["both"] + counts["icha"] == np.count_nonzero(covered)
+    assert counts["both"] + counts["truth"] == np.count_nonzero(contact)
+    assert counts["both"] / sum(counts.values()) == jaccard(covered, contact) < 1
+    assert float(run["rms_slope"]) == pytest.approx(1)
+
+
+def test_fig4_refuses_the_boundary_elements_of_another_state(surface):
+    with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/soft: boundary elements of reduced pressure 0\.01"):
+        fig4_contact_map.figure(compared.tree(), surface, solution(1e-2), study="one")
+    other = solution().assign(surface_energy=0.04)
+    with pytest.raises(ValueError, match=r"soft: the boundary elements given are of another contact: surface_energy"):
+        fig4_contact_map.figure(compared.tree(), surface, other, study="one")
+
+
+def test_fig10_shows_means_and_scatter_of_the_errors_in_per_cent():
+    left, right = fig10_model_error.figure(compared.errors(), study="one").axes
+    expected = 100 * (1 / np.array(list(compared.AREA_FACTORS.values())) - 1)
+    (adhesive, _, (bars,)), (bare, _, _) = left.containers
+    np.testing.assert_allclose(adhesive.get_ydata(), expected.mean())
+    for segment in bars.get_segments():
+        # Three seeds: 4.303 standard errors, by Student's table.
+        reach = 4.30265273 * expected.std(ddof=1) / np.sqrt(3)
+        np.testing.assert_allclose(segment[:, 1], expected.mean() + reach * np.array([-1, 1]))
+    np.testing.assert_allclose(bare.get_ydata(), -20)
+    np.testing.assert_allclose(right.containers[1][0].get_ydata(), 25)
+    np.testing.assert_allclose(adhesive.get_xdata(), compared.PRESSURES, rtol=0.03)
+    assert any(np.all(np.asarray(line.get_ydata()) == 0) for line in left.get_lines())
+    (energetic,) = [line for line in left.get_lines() if line.get_linestyle() == ":"]
+    np.testing.assert_allclose(energetic.get_ydata(), ((expected + 100) / 1.2 - 100).mean())
+    assert energetic.get_color() == adhesive.get_color()
+    assert adhesive.get_markerfacecolor() != "white" and bare.get_markerfacecolor() == "white"
+
+
+@pytest.mark.parametrize("module", COMPARED)
+def test_errors_of_runs_that_all_failed_are_nothing_to_draw(module):
+    errors = compared.errors()
+    empty = {f"/{name}": node.to_dataset() * np.nan for name, node in errors.children.items()}
+    for name, node in errors.children.items():
+        empty[f"/{name}"].attrs = node.attrs
+    with pytest.raises(NothingToDraw, match="study one: no run beside boundary elements is complete"):
+        module.figure(xr.DataTree.from_dict(empty), study="one")
+
+
+def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
+    def many(node):
+        names = [f"s{k}" for k in range(9)]
+        dataset = node.to_dataset()
+        return xr.concat([dataset.assign_coords(surface=[name]) for name in names], "surface", data_vars="minimal")
+
+    parts = {f"/{name}": many(node) for name, node in compared.errors().children.items()}
+    for name, node in compared.errors().children.items():
+        parts[f"/{name}"].attrs = node.attrs
+    figure = fig10_model_error.figure(xr.DataTree.from_dict(parts), study="one")
+    *panels, bar = figure.axes
+    assert [len(axes.containers) for axes in panels] == [9, 9, 9, 9]
+    # Too many for a legend: a scale names them.
+    assert bar.get_ylabel() == "s" and [text.get_text() for text in bar.get_yticklabels()] == list("012345678")
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert set(names) == {"means of n = 3 seeds, bars 95 %", "against the energetic area"}
+    assert len({container[0].get_color() for container in panels[0].containers}) == 9
+
+
+def test_fig11_shows_distances_and_overlap():
+    axes = fig11_distribution_error.figure(compared.errors(), study="one").axes
+    for panel, name in zip(
+        axes, ("pressure_distribution_distance", "gap_distribution_distance", "jaccard"), strict=True
+    ):
+        for container, entry in zip(panel.containers, ("adhesive", "bare"), strict=True):
+            values = compared.errors()[entry][f"{name}_mean"].values.ravel()
+            np.testing.assert_array_equal(container[0].get_ydata(), values)
+        assert panel.get_ylim()[0] == 0
+    assert axes[2].get_ylim()[1] == 1
+
+
+@pytest.mark.parametrize("module", COMPARED, ids=lambda module: module.__name__)
+def test_studies_without_boundary_elements_are_named(module):
+    with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; there are some for one"):
+        module.figure(compared.errors(), study="slopes")
+
+
+def test_materials_that_differ_in_range_alone_are_told_apart_by_it():
+    study = small.tree()["slopes"].to_dataset()
+    assert "range" not in material_label(study, "soft")
+    alike = study.sel(material=["soft", "soft"]).assign_coords(material=["soft", "longer"])
+    alike["interaction_range"] = ("material", [2e-9, 4e-9])
+    assert material_label(alike, "longer").endswith("range 4 nm")
+
+
+def test_what_is_not_there_is_named_with_what_is():
+    with pytest.raises(ValueError, match="no material 'steel' in this study; there are soft"):
+        fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
+    with pytest.raises(ValueError, match=r"no snapshot of reduced_pressure 0\.01; there are: relative_load 0\.002"):
+        find_snapshot(small.run(), "reduced_pressure", 0.01)
+
+
+def test_incomplete_campaigns_are_drawn_with_what_they_have():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    tree = campaign_tree(runs[:-1])
+    assert len(lines(fig5_multi_slope.figure(tree, study="slopes").axes[0])) == 3
+
+
+def test_only_complete_runs_are_drawn():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    ended = [(labels, run.assign_attrs(incomplete="no equilibrium at the third stop")) for labels, run in runs]
+    tree = campaign_tree([ended[0], *runs[1:]])
+    assert {labels for labels, _ in study_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
+    with pytest.raises(NothingToDraw, match="study slopes: no run is complete"):
+        fig5_multi_slope.figure(campaign_tree(ended), study="slopes")
+
+
+@pytest.mark.parametrize("module", FIGURES + COMPARED, ids=lambda module: module.__name__)
+def test_captions_are_sentences(module):
+    assert len(module.CAPTION) > 100 and module.CAPTION.endswith(".")
+
+
+def test_units_as_people_write_them():
+    assert quantity(25e6, "Pa") == "25 MPa"
+    assert quantity(0.05, "J/m²") == "50 mJ/m²"
+    assert quantity(2.071e-9, "m") == "2.071 nm"
+    assert quantity(0.0, "J/m²") == "0 J/m²"
+    assert unit_for(100e-6, "m")[1] == "µm" and unit_for(0.1, "m")[1] == "mm"
+    assert unit_for(1e-3, "m") == (pytest.approx(1e3), "mm")
+    assert number(0.01) == "0.01" and number(1e-5) == "$10^{-5}$" and number(3.2e-5) == r"$3.2\times10^{-5}$"
+
+
+# --- ensembles --------------------------------------------------------------------------------------------------
+
+
+def shaded(axes):
+    """The edges of the bands in an axes, lower and upper, by their colour."""
+    found = {}
+    for band in axes.collections:
+        x, y = band.get_paths()[0].vertices.T
+        edges = [(y[x == at].min(), y[x == at].max()) for at in np.unique(x)]
+        found[to_hex(band.get_facecolor()[0])] = np.transpose(edges)
+    return found
+
+
+def test_fig2_shows_means_with_bands_instead_of_every_seed():
+    figure = fig2_area_and_gap.figure(compared.tree(), study="one")
+    for axes, name in zip(figure.axes, ("contact_area_fraction", "reduced_separation"), strict=True):
+        means = [line for line in axes.get_lines() if len(line.get_xdata()) == len(compared.PRESSURES)]
+        bands = shaded(axes)
+        assert len(means) == len(bands) == 2
+        for line, material in zip(means, ("soft", "hertz"), strict=True):
+            runs = [run for labels, run in compared.runs().items() if labels.material == material]
+            over = ensemble([path_steps(run)[name].values for run in runs])
+            np.testing.assert_allclose(line.get_ydata(), over.mean, rtol=1e-12)
+            for edge, sign in zip(bands[to_hex(line.get_color())], (-1, 1), strict=True):
+                np.testing.assert_allclose(edge, over.mean + sign * over.confidence, rtol=1e-12)
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert names.count("mean and 95 % band, n = 3 seeds") == 1
+
+
+def test_fig9_points_are_means_over_the_seeds():
+    left, _ = fig9_tabor.figure(compared.tree(), study="one").axes
+    runs = {material: [] for material in ("soft", "hertz")}
+    for labels, run in compared.runs().items():
+        runs[labels.material].append(float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[0])]))
+    ((curve, _, (bars,)),) = left.containers
+    np.testing.assert_allclose(curve.get_ydata(), [np.mean(runs["soft"])])
+    over = ensemble(runs["soft"])
+    np.testing.assert_allclose(bars.get_segments()[0][:, 1], over.mean + over.confidence * np.array([-1, 1]))
+    bare = next(line for line in left.get_lines() if line.is_dashed())
+    np.testing.assert_allclose(bare.get_ydata(), np.mean(runs["hertz"]))
+
+
+def many(surfaces=30, materials=1):
+    """A study of many surfaces or materials, of the same run, named as variations of a parameter."""
+    names = [f"rough-hurst{0.2 + 0.02 * k:.2f}" for k in range(surfaces)]
+    kinds = ["soft"] if materials == 1 else [f"soft-surface_energy{k}mJ" for k in range(materials)]
+    runs = []
+    for name, (k, kind) in itertools.product(names, enumerate(kinds)):
+        run = small.run().assign(surface_energy=small.run()["surface_energy"] * (1 + 0.1 * k))
+        runs.append((RunLabels("many", name, 1, 1.0, kind), run))
+    return campaign_tree(runs)
+
+
+def two_surfaces(slopes=(1.0,)):
+    names = ["rough-hurst0.6", "rough-hurst0.9"]
+    runs = [
+        (RunLabels("vary", name, 1, slope, material), small.run(1 + k, slope, material).assign(seed=1))
+        for (k, name), slope, material in itertools.product(enumerate(names), slopes, ("soft", "hertz"))
+    ]
+    return names, campaign_tree(runs)
+
+
+@pytest.mark.parametrize("slopes", [(1.0,), (1.0, 0.2)])
+def test_fig5_tells_surfaces_apart(slopes):
+    names, tree = two_surfaces(slopes)
+    figure = fig5_multi_slope.figure(tree, study="vary")
+    (legend,) = figure.legends
+    words = {text.get_text(): handle for text, handle in zip(legend.get_texts(), legend.legend_handles, strict=True)}
+    places = list(itertools.product(names, slopes))
+    for name, slope in places:
+        (text,) = (text for text in words if name in text and (len(slopes) == 1 or f"{slope:g}" in text.split("=")[-1]))
+        marker = words[text].get_marker()
+        drawn = [line for line in figure.axes[0].get_lines() if line.get_marker() == marker and len(line.get_xdata())]
+        wanted = [small.run(1 + names.index(name), slope, material) for material in ("soft", "hertz")]
+        for line, run in zip(drawn, wanted, strict=True):
+            np.testing.assert_allclose(line.get_ydata(), path_steps(run)["contact_area_fraction"])
+    assert len(words) == len(places) + 2
+
+
+def test_theories_say_whose_they_are_where_there_are_several_surfaces():
+    names, tree = two_surfaces()
+    for module in (fig2_area_and_gap, fig7_stiffness):
+        for study, there in ((tree, {f"theories: {names[0]}"}), (small.tree(), set())):
+            name = next(iter(study.children))
+            figure = module.figure(study, reference_dataset(small.SPECTRUM), study=name)
+            legends = [legend for part in (figure, *figure.axes) for legend in _legends(part)]
+            words = {text.get_text() for legend in legends for text in legend.get_texts()}
+            assert {text for text in words if text.startswith("theories")} == there
+
+
+@pytest.mark.parametrize("module", [fig3_distributions, fig8_patch_sizes], ids=lambda module: module.__name__)
+def test_figures_of_one_surface_say_which(module):
+    names, tree = two_surfaces()
+    assert module.figure(tree, study="vary").axes[1].get_title(loc="right") == names[0]
+    assert module.figure(small.tree(), study="single").axes[1].get_title(loc="right") == ""
+    names, tree = two_surfaces((1.0, 0.2))
+    title = module.figure(tree, study="vary").axes[1].get_title(loc="right")
+    assert title == f"{names[0]}, {slope_label(0.2)}"
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ((1.5e-4, 9e-4), [2, 5]),
+        ((2e-4, 3e-3), [2, 5, 2]),
+        ((2e-4, 3e-2), []),
+        ((0.9e-3, 2.9e-3), [2]),
+    ],
+)
+def test_logarithmic_axes_label_no_more_than_has_room(limits, expected):
+    figure = new_figure(3.5, 3)
+    axes = figure.subplots()
+    logarithmic_axes(axes, "x")
+    axes.set_xlim(limits)
+    figure.canvas.draw()
+    labels = [text.get_text() for text in axes.get_xticklabels(minor=True) if text.get_text()]
+    assert [int(re.search(r"(\d)\\times", label)[1]) for label in labels] == expected
+    renderer = figure.canvas.get_renderer()
+    shown = [
+        text.get_window_extent(renderer)
+        for minor in (False, True)
+        for text in axes.get_xticklabels(minor=minor)
+        if text.get_text() and limits[0] <= text.get_position()[0] <= limits[1]
+    ]
+    shown.sort(key=lambda box: box.x0)
+    assert len(shown) > 1
+    assert all(one.x1 < two.x0 for one, two in itertools.pairwise(shown))
+
+
+@pytest.mark.parametrize("limits", [(6.1e-3, 8.9e-3), (1.001, 1.06), (5.5, 7.5)])
+def test_logarithmic_axes_of_small_ranges_have_some_labels(limits):
+    figure = new_figure(3.5, 3)
+    axes = figure.subplots()
+    logarithmic_axes(axes, "x")
+    axes.set_xlim(limits)
+    figure.canvas.draw()
+    assert 1 < sum(bool(text.get_text()) for text in axes.get_xticklabels(minor=True)) < 5
+
+
+MANY = [fig2_area_and_gap, fig5_multi_slope, fig7_stiffness, fig9_tabor]
+
+
+@pytest.mark.parametrize("module", MANY, ids=lambda module: module.__name__)
+def test_many_surfaces_have_a_scale_of_colours(module):
+    figure = module.figure(many(), study="many")
+    bar = figure.axes[-1]
+    labels = [text.get_text() for text in bar.get_yticklabels()]
+    assert bar.get_ylabel() == "rough-hurst" and labels[0] == "0.20" and labels[-1] == "0.78" and len(labels) == 9
+    own = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o" and len(line.get_xdata())]
+    assert len({line.get_color() for line in own}) == 30
+    legends = [legend for each in (figure, *figure.axes) for legend in _legends(each)]
+    assert sum(len(legend.get_texts()) for legend in legends) < 4
+
+
+def _legends(part):
+    if hasattr(part, "legends"):
+        return part.legends
+    return [part.get_legend()] if part.get_legend() else []
+
+
+@pytest.mark.parametrize(
+    "module", [fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig8_patch_sizes], ids=lambda m: m.__name__
+)
+def test_many_materials_have_a_scale_of_what_differs(module):
+    figure = module.figure(many(surfaces=1, materials=12), study="many")
+    bar = figure.axes[-1]
+    assert "Delta" in bar.get_ylabel() and "mJ/m²" in bar.get_ylabel()
+    labels = [text.get_text() for text in bar.get_yticklabels()]
+    assert labels[0] == "50" and labels[-1] == "105"
+    curves = [line for line in figure.axes[0].get_lines() if len(line.get_xdata())]
+    assert len({line.get_color() for line in curves} - {BLACK}) == 12
+
+
+def test_names_of_a_scale_lose_what_they_share_but_no_digits():
+    assert Scale(["s-hurst0.55", "s-hurst0.5"]).names == ["0.55", "0.5"]
+    assert Scale(["s-hurst0.55", "s-hurst0.5"]).title == "s-hurst"
+    assert Scale(["rough", "smooth"]).names == ["rough", "smooth"]
+    assert materials_scale(small.tree()["slopes"].to_dataset(), ["soft", "hertz"]).names == ["50", "0"]
+    assert places_scale([("a", 1.0), ("a", 0.5)]).names == ["1", "0.5"]
+
+
+def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
+    runs = [(RunLabels("one", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2)]
+    runs[0] = (runs[0][0], runs[0][1].assign_attrs(incomplete="no equilibrium"))
+    tree = campaign_tree(runs)
+    with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):
+        fig4_contact_map.figure(tree, surface, study="one")

@@ -1,0 +1,522 @@
+"""Figures of loading and unloading show what the runs hold, of separate asperities whose loops are known exactly."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import separate_asperities as separate
+import small_campaign as small
+import xarray as xr
+from matplotlib.colors import to_hex
+
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.files import read_dataset, write_surface
+from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
+from icha.figures.fig15_loss import PARTS, linear_fit, shares
+from icha.figures.hysteresis import averages
+from icha.figures.style import save
+
+MODULES = (fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map)
+DEPTHS = {"gentle": -0.6, "middle": -0.1, "hard": 0.5}
+
+
+@pytest.fixture(scope="module")
+def surface(tmp_path_factory):
+    path = tmp_path_factory.mktemp("surface") / "s.nc"
+    write_surface(path, small.surface(), name="rough", seed=1)
+    return read_dataset(path)
+
+
+@pytest.fixture(scope="module")
+def tree():
+    loads = [separate.study(name, slopes=(0.5,), depth=depth) for name, depth in DEPTHS.items()]
+    return separate.tree(separate.study("slopes"), *loads)
+
+
+def one(material="sticky", **changed):
+    """A study of a single run."""
+    ((labels, run),) = separate.study("one", materials=(material,), slopes=(0.5,), seeds=(1,))
+    return campaign_tree([(labels, run.assign(changed))])
+
+
+def draw(module, tree, surface, study):
+    options = {"studies": [study]} if module is fig15_loss else {"study": study}
+    return module.figure(tree, **({"surface": surface} if module is fig16_snap_map else {}), **options)
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def curves(axes):
+    """The ways of the loops in an axes: solid and dashed lines."""
+    lines = [line for line in axes.get_lines() if line.get_linestyle() != "None" and len(line.get_xdata()) > 2]
+    return [line for line in lines if line.get_linestyle() == "-"], [x for x in lines if x.get_linestyle() != "-"]
+
+
+def marks(axes):
+    return [line for line in axes.get_lines() if line.get_linestyle() == "None" and len(line.get_xdata())]
+
+
+# --- the loops of separate asperities ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("material", separate.MATERIALS)
+def test_the_exact_loops_close_and_lose_what_the_jumps_release(material):
+    run = separate.run(material, 0.5, depth=0.5)
+    p, u = run["nominal_pressure"].values, run["mean_separation"].values
+    loop = -np.sum(0.5 * (p[1:] + p[:-1]) * np.diff(u))
+    loss = float(run["hysteresis_loss"])
+    assert loop == pytest.approx(loss, rel=0.01, abs=1e-12)
+    assert loss == pytest.approx(float(run["loss_by_jump_in"] + run["loss_by_jump_off"]), rel=1e-12, abs=1e-18)
+    assert (loss > 0) == (material != "hertz")
+    # A single asperity jumps off with 5/6 pi dgamma R, there with an infinite slope: the root of rounding is seen.
+    last = -5 / 6 * np.pi * float(run["surface_energy"]) * separate.RADIUS / 0.5 / separate.PERIOD**2
+    assert float(run["detachment_pressure"]) == pytest.approx(last, rel=1e-7, abs=1e-12)
+
+
+# --- figure 13 --------------------------------------------------------------------------------------------------
+
+
+def test_fig13_draws_both_ways_and_the_pull_off():
+    run = separate.run("sticky", 0.5)
+    figure = fig13_loops.figure(one(), study="one")
+    left, right = figure.axes
+    names = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))
+    turn = int(np.flatnonzero(run["leg"].values == 0)[-1])
+    for axes, (x, y) in zip((left, right), names, strict=True):
+        (solid,), (dashed,) = curves(axes)
+        for line, part in ((solid, slice(turn + 1)), (dashed, slice(turn, None))):
+            np.testing.assert_array_equal(line.get_xdata(), run[x].values[part])
+            np.testing.assert_array_equal(line.get_ydata(), run[y].values[part])
+        assert solid.get_color() == dashed.get_color()
+        (pull_off,) = marks(axes)
+        at = int(np.argmin(run["nominal_pressure"].values))
+        assert (pull_off.get_xdata()[0], pull_off.get_ydata()[0]) == (run[x].values[at], run[y].values[at])
+    unit = float(run["contact_modulus"] * run["rms_slope"])
+    (pull_off,) = marks(left)
+    assert -unit * pull_off.get_ydata()[0] == pytest.approx(float(run["pull_off_pressure"]))
+    assert {"loading", "unloading", "pull-off"} <= set(legend(figure))
+    # The area between the drawn ways is the loss.
+    (solid,), (dashed,) = curves(left)
+    work = [-np.trapezoid(line.get_ydata(), line.get_xdata()) for line in (solid, dashed)]
+    loss = sum(work) * unit * float(run["rms_height"])
+    assert loss == pytest.approx(float(run["hysteresis_loss"]), rel=0.01)
+
+
+def test_fig13_without_adhesion_has_one_way_and_no_pull_off():
+    figure = fig13_loops.figure(one("hertz"), study="one")
+    (solid,), (dashed,) = curves(figure.axes[0])
+    on_the_way_in = np.interp(dashed.get_xdata(), solid.get_xdata()[::-1], solid.get_ydata()[::-1])
+    np.testing.assert_allclose(dashed.get_ydata(), on_the_way_in, atol=1e-12)
+    assert not marks(figure.axes[0]) and not figure.axes[0].child_axes
+    assert "pull-off" not in legend(figure)
+
+
+def test_fig13_shows_one_surface_and_seed(tree):
+    run = separate.run("sticky", 0.5, seed=2, depth=0.5)
+    figure = fig13_loops.figure(tree, study="hard", seed=2)
+    solid, dashed = curves(figure.axes[0])
+    assert len(solid) == len(dashed) == 2
+    assert any(line.get_ydata()[-1] == run["reduced_pressure"].values[line.get_ydata().size - 1] for line in solid)
+    assert len({line.get_color() for line in solid}) == 2
+    with pytest.raises(ValueError, match="no seed 7 in this study; there are 1, 2"):
+        fig13_loops.figure(tree, study="hard", seed=7)
+    with pytest.raises(ValueError, match="no surface 'smooth' in this study; there are rough"):
+        fig13_loops.figure(tree, study="hard", surface="smooth")
+
+
+def test_fig13_tells_slopes_apart_by_marks_and_many_by_panels(tree):
+    figure = fig13_loops.figure(tree, study="slopes")
+    assert len(figure.axes) == 2
+    turns = [line for line in marks(figure.axes[0]) if line.get_markeredgecolor() != "black"]
+    looks = {(line.get_marker(), line.get_markeredgecolor()) for line in turns}
+    assert len(turns) == len(looks) == 4
+    solid, _ = curves(figure.axes[0])
+    ends = {(line.get_xdata()[-1], line.get_ydata()[-1]) for line in solid}
+    assert {(line.get_xdata()[0], line.get_ydata()[0]) for line in turns} == ends
+
+    slopes, materials = (1.0, 0.5, 0.3, 0.2, 0.1), ("sticky", "weak", "hertz")
+    many = separate.tree(separate.study("one", materials, slopes, seeds=(1,)))
+    figure = fig13_loops.figure(many, study="one")
+    assert len(figure.axes) == 10
+    for k, slope in enumerate(slopes):
+        solid, dashed = curves(figure.axes[2 * k])
+        assert len(solid) == len(dashed) == len({line.get_color() for line in solid}) == 3
+        assert f"{slope:g}" in figure.axes[2 * k + 1].get_title("right")
+    assert len(legend(figure)) == 3 + 3
+
+    alone = separate.tree(separate.study("one", ("sticky",), slopes, seeds=(1,)))
+    figure = fig13_loops.figure(alone, study="one")
+    solid, _ = curves(figure.axes[0])
+    assert len(figure.axes) == 2 and len({line.get_color() for line in solid}) == 5
+    assert len(legend(figure)) == 5 + 3
+
+
+def test_fig13_enlarges_tension_that_is_small():
+    run = separate.run("weak", 1.0, depth=1.5)
+    weak = separate.tree(separate.study("one", ("weak",), (1.0,), (1,), depth=1.5))
+    tension = -run["reduced_pressure"].values.min()
+    assert 0 < tension < 0.1 * run["reduced_pressure"].values.max()
+    left, right = (axes.child_axes[0] for axes in fig13_loops.figure(weak, study="one").axes[:2])
+    for low, high in (left.get_ylim(), right.get_xlim()):
+        assert low < -tension and high < 0.25 * float(run["largest_reduced_pressure"])
+    assert len(marks(left)) == 1
+    np.testing.assert_array_equal(
+        curves(left)[0][0].get_ydata()[-1], run["reduced_pressure"].values[run["leg"] == 0][-1]
+    )
+    assert not fig13_loops.figure(one(), study="one").axes[0].child_axes
+
+
+def test_fig13_lays_boundary_elements_over_the_run_they_belong_to(tree):
+    shown, other = (
+        separate.run("sticky", 0.5, seed=seed, depth=0.5).isel(step=slice(None, None, 7)) for seed in (1, 2)
+    )
+    figure = fig13_loops.figure(tree, [shown, other], study="hard")
+    for axes, (x, y) in zip(
+        figure.axes,
+        (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction")),
+        strict=False,
+    ):
+        own = [line for line in marks(axes) if line.get_markersize() < 4]
+        assert len(own) == 2
+        colour = next(line.get_color() for line in curves(axes)[0] if line.get_color() == own[0].get_markeredgecolor())
+        for line, branch in zip(own, ("loading", "unloading"), strict=True):
+            part = shown.isel(step=shown["branch"].values == branch)
+            np.testing.assert_array_equal(line.get_xdata(), part[x].values)
+            np.testing.assert_array_equal(line.get_ydata(), part[y].values)
+            assert line.get_markeredgecolor() == colour
+        assert [line.get_markerfacecolor() for line in own] == [colour, "none"]
+    assert {"boundary elements, loading", "boundary elements, unloading"} <= set(legend(figure))
+    assert not any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard", seed=1)))
+    # Without a seed asked for it is one with boundary elements, and without any the mean over the seeds.
+    assert any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard")))
+    assert "mean and 95 % band, n = 2 seeds" in legend(fig13_loops.figure(tree, study="hard"))
+    stranger = shown.assign(surface_energy=0.06)
+    with pytest.raises(ValueError, match=r"study hard: no run is of the same contact .* surface_energy 0\.06"):
+        fig13_loops.figure(tree, [stranger], study="hard")
+
+
+# --- figure 14 --------------------------------------------------------------------------------------------------
+
+
+def bars(container, direction):
+    """Lengths of the error bars of a line, from its middle; None where it has none."""
+    segments = [path for collection in container[2] for path in collection.get_segments()]
+    lengths = [np.ptp(path[:, direction]) / 2 for path in segments if np.ptp(path[:, direction]) > 0]
+    return lengths or None
+
+
+@pytest.mark.parametrize("quantity", ["pull_off_pressure", "pull_off_over_strength", "pull_off_over_summits"])
+def test_fig14_shows_means_and_scatter_over_the_seeds(tree, quantity):
+    figure = fig14_pull_off.figure(tree, study="slopes", load_studies=list(DEPTHS), quantity=quantity)
+    left, right = figure.axes
+    factor = 1e-3 if quantity == "pull_off_pressure" else 1.0
+    (sticky, bare), slopes = left.containers, (0.5, 1.0)
+    values = factor * np.array(
+        [[float(separate.run("sticky", slope, seed, 0.5)[quantity]) for slope in slopes] for seed in (1, 2)]
+    )
+    np.testing.assert_array_equal(sticky[0].get_xdata(), slopes)
+    np.testing.assert_allclose(sticky[0].get_ydata(), values.mean(axis=0))
+    # Two seeds: 12.706 standard errors, by Student's table.
+    np.testing.assert_allclose(bars(sticky, 1), 12.7062047 * values.std(axis=0, ddof=1) / np.sqrt(2), rtol=1e-6)
+    assert np.all(bare[0].get_ydata() == 0) and bare[0].get_markerfacecolor() == "white"
+
+    sticky, bare = right.containers
+    states = np.array(
+        [
+            [
+                [float(run["largest_reduced_pressure"]), factor * float(run[quantity])]
+                for run in (separate.run("sticky", 0.5, seed, depth) for seed in (1, 2))
+            ]
+            for depth in DEPTHS.values()
+        ]
+    ).mean(axis=1)
+    np.testing.assert_allclose(np.transpose(sticky[0].get_data()), sorted(states.tolist()))
+    assert np.all(bare[0].get_ydata() == 0)
+    assert "0.5" in right.get_title("right")
+    assert sticky[0].get_color() == left.containers[0][0].get_color() != bare[0].get_color()
+    assert len(legend(figure)) == 3
+
+
+def test_fig14_has_a_place_for_zero_and_for_decades():
+    slopes = (1.0, 0.5, 0.2, 0.1)
+    many = separate.tree(separate.study("one", slopes=slopes, materials=("sticky", "weak", "hertz"), seeds=(1,)))
+    (axes,) = fig14_pull_off.figure(many, study="one").axes
+    values = np.concatenate([container[0].get_ydata() for container in axes.containers])
+    positive = values[values > 0]
+    assert positive.max() > 100 * positive.min() and axes.get_yscale() == "symlog"
+    low, high = axes.get_ylim()
+    assert low < 0 and high > positive.max()
+    # The smallest of them stands apart from zero.
+    at_zero, at_least = (
+        axes.transAxes.inverted().transform(axes.transData.transform((1, y)))[1] for y in (0, positive.min())
+    )
+    assert at_least - at_zero > 0.03
+    for container, name in zip(axes.containers, ("sticky", "weak"), strict=False):
+        assert [f"{tick:g}" for tick in axes.get_xticks()] == ["0.1", "0.2", "0.5", "1"], name
+        assert np.all(np.diff(container[0].get_ydata()) < 0), "rougher surfaces stick less"
+    (alone,) = fig14_pull_off.figure(one("hertz"), study="one").axes
+    assert alone.containers[0][0].get_ydata().tolist() == [0]
+
+
+def test_fig14_tells_slopes_of_the_loads_apart(tree):
+    figure = fig14_pull_off.figure(tree, study="slopes", load_studies=["slopes", "gentle"])
+    looks = {(each[0].get_color(), each[0].get_marker()) for each in figure.axes[1].containers}
+    assert len(figure.axes[1].containers) == len(looks) == 4
+    names = legend(figure)
+    assert names[-1] == "means of n = 2 seeds, bars 95 %" and len(names) == 5
+    assert sum("0.5" in name or "= 1$" in name or name.endswith("1") for name in names) >= 2
+
+
+def test_fig14_names_what_there_is(tree):
+    with pytest.raises(ValueError, match=r"no quantity 'force' .*there are pull_off_pressure, pull_off_over_strength"):
+        fig14_pull_off.figure(tree, study="slopes", quantity="force")
+    with pytest.raises(ValueError, match="load_studies: 'gentle' is not a list"):
+        fig14_pull_off.figure(tree, study="slopes", load_studies="gentle")
+    with pytest.raises(ValueError, match=r"no study 'harder'.*there are slopes, gentle, middle, hard"):
+        fig14_pull_off.figure(tree, study="slopes", load_studies=["hard", "harder"])
+
+
+# --- figure 15 --------------------------------------------------------------------------------------------------
+
+
+def test_a_straight_line_and_a_power_law_are_found_exactly():
+    x = np.array([0.01, 0.03, 0.04, 0.1])
+    fit = linear_fit(x, 0.7 * x - 0.002)
+    assert (fit.slope, fit.intercept, fit.r_squared) == pytest.approx((0.7, -0.002, 1.0), rel=1e-12)
+    assert linear_fit(x, 3 * x**1.3).exponent == pytest.approx(1.3, rel=1e-12)
+    assert linear_fit(x, 3 * x).exponent == pytest.approx(1.0, rel=1e-12)
+    y = np.array([0.1, 0.5, 0.2, 0.9])
+    assert linear_fit(x, y).r_squared == pytest.approx(np.corrcoef(x, y)[0, 1] ** 2, rel=1e-12)
+    assert linear_fit(x[:2], y[:2]) is None and linear_fit(x * 0 + 1, y) is None
+    assert linear_fit(x, y * 0).r_squared is None and linear_fit(x, y - 0.3).exponent is None
+
+
+def linear_campaign(slope=0.4, offset=1e-3, scale=2e-5):
+    """Studies of different loads; the loss of their runs is a straight line of the area, another one for every seed."""
+    runs = []
+    for name, depth in DEPTHS.items():
+        for labels, run in separate.study(name, slopes=(0.5,), depth=depth):
+            adhesive = float(run["surface_energy"]) > 0
+            loss = slope * float(run["largest_contact_area_fraction"]) + offset + (labels.seed - 1.5) * scale
+            runs.append((labels, run.assign(hysteresis_loss_over_surface_energy=loss if adhesive else 0.0)))
+    return campaign_tree(runs)
+
+
+def test_fig15_fits_a_straight_line_through_what_differs_in_load_only():
+    figure = fig15_loss.figure(linear_campaign(), studies=["middle", "hard", "gentle"])
+    axes = figure.axes[0]
+    (points,) = axes.containers
+    x, y = points[0].get_data()
+    own = [
+        np.mean([float(separate.run("sticky", 0.5, seed, depth)["largest_contact_area_fraction"]) for seed in (1, 2)])
+        for depth in DEPTHS.values()
+    ]
+    np.testing.assert_allclose(x, sorted(own), rtol=1e-12)
+    np.testing.assert_allclose(y, 0.4 * x + 1e-3, rtol=1e-12)
+    (line,) = [each for each in axes.get_lines() if len(each.get_xdata()) > 10]
+    np.testing.assert_allclose(line.get_ydata(), 0.4 * line.get_xdata() + 1e-3, rtol=1e-9)
+    assert line.get_xdata()[0] == pytest.approx(x[0]) and line.get_xdata()[-1] == pytest.approx(x[-1])
+    assert line.get_color() == points[0].get_color()
+    exponent = np.polyfit(np.log(x), np.log(y), 1)[0]
+    assert any(f"r^2$ = 1.0000, exponent {exponent:.2f}" in name for name in legend(figure))
+
+
+def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
+    assert not any("r^2" in name for name in legend(fig15_loss.figure(tree, studies=["gentle", "hard"])))
+    runs = [
+        each
+        for k, (name, depth) in enumerate(DEPTHS.items())
+        for each in separate.study(name, slopes=(0.5,), seeds=(k,), depth=depth)
+    ]
+    figure = fig15_loss.figure(campaign_tree(runs), studies=list(DEPTHS))
+    assert not any("r^2" in name for name in legend(figure))
+    assert len(figure.axes[0].containers[0][0].get_xdata()) == 3
+
+
+def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
+    line = averages([{1: (2.0, 10.0), 2: (4.0, 30.0), 3: (9.0, 99.0)}, {2: (1.0, 6.0), 1: (1.0, 2.0)}])
+    assert line.same_seeds
+    assert line.x.tolist() == [1, 3] and line.y.tolist() == [4, 20]
+    # Two seeds: 12.706 standard errors, half the difference of both.
+    np.testing.assert_allclose(line.y_confidence, [12.7062047 * 2, 12.7062047 * 10], rtol=1e-7)
+    assert line.counts.tolist() == [2, 2]
+    apart = averages([{1: (2.0, 10.0)}, {2: (3.0, 8.0)}])
+    assert not apart.same_seeds and apart.y.tolist() == [10, 8] and not apart.y_confidence.any()
+
+
+def test_fig15_in_joule_shows_runs_without_adhesion_too(tree):
+    figure = fig15_loss.figure(tree, studies=list(DEPTHS), over_surface_energy=False)
+    sticky, bare = figure.axes[0].containers
+    loss = [
+        np.mean([float(separate.run("sticky", 0.5, seed, depth)["hysteresis_loss"]) for seed in (1, 2)])
+        for depth in DEPTHS.values()
+    ]
+    assert "(mJ/m²)" in figure.axes[0].get_ylabel()
+    np.testing.assert_allclose(sticky[0].get_ydata(), 1e3 * np.array(sorted(loss)), rtol=1e-9)
+    np.testing.assert_allclose(bare[0].get_ydata(), 0, atol=1e-12)
+    assert len(fig15_loss.figure(tree, studies=list(DEPTHS)).axes[0].containers) == 1
+    with pytest.raises(ValueError, match="studies one: no run with adhesion"):
+        fig15_loss.figure(one("hertz"), studies=["one"])
+    (axes,) = fig15_loss.figure(one("hertz"), studies=["one"], over_surface_energy=False).axes
+    assert axes.containers[0][0].get_ydata().tolist() == [0]
+
+
+def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
+    run = separate.run("sticky", 0.5)
+    parts = {"loss_by_jump_in": 3.0, "loss_by_jump_off": 1.0, "loss_by_coalescence": -1.0, "loss_unattributed": 0.0}
+    found = shares(
+        {"hard": {1: run.assign(parts), 2: run.assign(parts)}, "soft": {1: run.assign(largest_reduced_pressure=0.0)}}
+    )
+    assert list(found.values()) == pytest.approx([0.6, 0.2, -0.2, 0, 0])
+    figure = fig15_loss.figure(one(**parts), studies=["one"])
+    heights = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[1].patches)
+    np.testing.assert_allclose(heights, [(0, -20), (0, 60), (60, 80)])
+    assert {"jump into contact", "jump off", "unions and their undoing"} <= set(legend(figure))
+    assert not {"unattributed", "jumps at controlled load"} & set(legend(figure))
+
+    # Of the exact loops everything is explained by jumps, at the largest load of every line.
+    figure = fig15_loss.figure(tree, studies=list(DEPTHS))
+    hard = [separate.run("sticky", 0.5, seed, DEPTHS["hard"]) for seed in (1, 2)]
+    jump_in, jump_off = (sum(float(run[name]) for run in hard) for name in list(PARTS)[:2])
+    tops = sorted(bar.get_y() + bar.get_height() for bar in figure.axes[1].patches)
+    np.testing.assert_allclose(tops, [100 * jump_in / (jump_in + jump_off), 100])
+
+
+def test_fig15_needs_a_list_of_studies(tree):
+    for wrong in ("hard", []):
+        with pytest.raises(ValueError, match=r"studies: .* is not a list of at least one study"):
+            fig15_loss.figure(tree, studies=wrong)
+
+
+# --- figure 16 --------------------------------------------------------------------------------------------------
+
+
+def test_fig16_marks_where_and_counts_when(tree, surface):
+    run = separate.run("sticky", 0.5, depth=0.5)
+    figure = fig16_snap_map.figure(tree, surface, study="slopes", rms_slope=0.5)
+    where, when = figure.axes[:2]
+    formed, broke = marks(where)
+    for line, kind in ((formed, 0), (broke, 1)):
+        own = run["event_kind"].values == kind
+        np.testing.assert_allclose(line.get_xdata(), 1e6 * run["event_x"].values[own])
+        np.testing.assert_allclose(line.get_ydata(), 1e6 * run["event_y"].values[own])
+    count = len(formed.get_xdata())
+    assert 0 < count <= separate.COUNT
+    assert {f"jump into contact ({count})", f"jump off ({count})", "loading", "unloading"} == set(legend(figure))
+    assert (formed.get_markerfacecolor(), broke.get_markerfacecolor()) == (formed.get_markeredgecolor(), "none")
+    solid, dashed = (lines[0] for lines in curves(when))
+    asperities = separate.Asperities(separate.MATERIALS["sticky"], 0.5)
+    for line, events in ((solid, asperities.jump_in), (dashed, asperities.jump_off)):
+        u, so_far = line.get_data()
+        assert so_far[0] == 0 and so_far[-1] == count
+        reached = np.sort(events)[::-1][:count] / asperities.rms_height
+        np.testing.assert_allclose(np.sort(u[1:])[::-1], reached)
+    assert to_hex(solid.get_color()) == to_hex(formed.get_markeredgecolor())
+    assert to_hex(dashed.get_color()) == to_hex(broke.get_markeredgecolor())
+    np.testing.assert_allclose(
+        where.get_images()[0].get_array()[:-1, :-1].std() / 1e9, separate.RMS_HEIGHT * 0.5, rtol=1e-6
+    )
+
+
+def test_fig16_does_not_speak_of_jumps_without_adhesion(tree, surface):
+    names = legend(fig16_snap_map.figure(tree, surface, study="slopes", material="hertz"))
+    assert any(name.startswith("contact formed (") for name in names) and not any("jump" in name for name in names)
+
+
+def test_fig16_shows_unions_and_their_undoing(surface):
+    run = separate.run("sticky", 0.5)
+    kinds = run["event_kind"].values.copy()
+    kinds[5:8] += 2
+    kinds[-2] += 2
+    changed = one(event_kind=("event", kinds, run["event_kind"].attrs))
+    names = legend(fig16_snap_map.figure(changed, surface, study="one"))
+    half = len(kinds) // 2
+    expected = {f"jump into contact ({half - 3})", f"jump off ({half - 1})", "union (3)", "union undone (1)"}
+    assert expected <= set(names)
+
+
+def test_fig16_refuses_another_surface_or_run(tmp_path, tree, surface):
+    write_surface(tmp_path / "s.nc", small.surface(2), name="rough", seed=2)
+    with pytest.raises(ValueError, match="the surface given has seed 2"):
+        fig16_snap_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="slopes")
+    with pytest.raises(ValueError, match="another period or grid"):
+        fig16_snap_map.figure(tree, surface.assign(period=surface["period"] * 2), study="slopes")
+    with pytest.raises(ValueError, match=r"study slopes: no run of .* rms slope 0\.7"):
+        fig16_snap_map.figure(tree, surface, study="slopes", rms_slope=0.7)
+    with pytest.raises(ValueError, match="no material 'glue' in this study; there are sticky"):
+        fig16_snap_map.figure(tree, surface, study="slopes", material="glue")
+
+
+# --- more than one cycle ----------------------------------------------------------------------------------------
+
+
+def two_cycles():
+    """A deep cycle and then a shallow one, of the same asperities."""
+    deep, shallow = (separate.run("sticky", 0.5, depth=depth) for depth in (0.5, -0.6))
+    steps, events = ([name for name in deep.variables if deep[name].dims == (dim,)] for dim in ("step", "event"))
+    later = shallow.assign(leg=shallow["leg"] + 2, event_step=shallow["event_step"] + deep.sizes["step"])
+    parts = [xr.concat([deep[names], later[names]], dim) for names, dim in ((steps, "step"), (events, "event"))]
+    whole = xr.merge(
+        [shallow.drop_dims(["step", "event"]), *(part.drop_vars("step", errors="ignore") for part in parts)]
+    )
+    whole = whole.assign_coords(step=("step", np.arange(whole.sizes["step"]), deep["step"].attrs))
+    ((labels, _),) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
+    return campaign_tree([(labels, whole)]), deep, shallow
+
+
+def test_of_more_cycles_fig13_shows_all_and_the_last_pull_off():
+    tree, deep, shallow = two_cycles()
+    axes = fig13_loops.figure(tree, study="one").axes[0]
+    assert [len(lines) for lines in curves(axes)] == [2, 2]
+    (pull_off,) = marks(axes)
+    assert pull_off.get_ydata()[0] == shallow["reduced_pressure"].values.min() > deep["reduced_pressure"].values.min()
+
+
+def test_of_more_cycles_fig16_shows_the_first_way_in_and_the_last_way_back(surface):
+    tree, deep, shallow = two_cycles()
+    formed, broke = (np.count_nonzero(run["event_kind"] == kind) for run, kind in ((deep, 0), (shallow, 1)))
+    assert formed > broke > 0
+    names = legend(fig16_snap_map.figure(tree, surface, study="one"))
+    assert {f"jump into contact ({formed})", f"jump off ({broke})"} <= set(names)
+
+
+# --- all of them ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.split(".")[-1])
+def test_wrong_studies_are_named(tree, surface, module):
+    with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, gentle, middle, hard"):
+        draw(module, tree, surface, "nothing")
+    with pytest.raises(ValueError, match="study single: no run was unloaded"):
+        draw(module, small.tree(), surface, "single")
+
+
+@pytest.mark.parametrize("module", (fig14_pull_off, fig15_loss), ids=("fig14", "fig15"))
+def test_runs_that_were_not_separated_have_no_pull_off_and_no_loss(surface, module):
+    scalars = [
+        "hysteresis_loss",
+        "pull_off_pressure",
+        "hysteresis_loss_over_surface_energy",
+        "largest_reduced_pressure",
+    ]
+    ((labels, run),) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
+    partial = campaign_tree([(labels, run.isel(step=slice(0, -9)).drop_vars(scalars))])
+    with pytest.raises(ValueError, match="study one: no run was unloaded to complete separation"):
+        draw(module, partial, surface, "one")
+    assert len(curves(fig13_loops.figure(partial, study="one").axes[0])[1]) == 1
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.split(".")[-1])
+def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, module):
+    save(draw(module, one(), surface, "one"), tmp_path / "a.png", tmp_path / "a.pdf")
+    with mpl.rc_context({"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "hatch.linewidth": 5}):
+        save(draw(module, one(), surface, "one"), tmp_path / "b.png", tmp_path / "b.pdf")
+    for kind in ("png", "pdf"):
+        first, second = ((tmp_path / f"{each}.{kind}").read_bytes() for each in "ab")
+        assert first == second and len(first) > 5000
+
+
+def test_captions_end():
+    for module in MODULES:
+        assert module.CAPTION.endswith(".") and "  " not in module.CAPTION

@@ -1,0 +1,388 @@
+"""A single square on a free half-space, against closed forms and direct sums of single spots' displacements."""
+
+import itertools
+
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.optimize
+from half_space import displacement_by_quadrature, jkr_approach, jkr_force
+
+import icha
+from icha.asperity.jkr import JKR
+from icha.equilibrium.distributions import contact_cover, covered_nodes, displacement, gap, gap_distribution
+from icha.equilibrium.equilibrium import Contact, Control, equilibrium, mean_gap, mean_pressure, untouched
+from icha.half_space.free_square import _image_potential
+from icha.half_space.grid_displacement import DisplacementField, displacement_field
+from icha.half_space.interaction import HalfSpace, Interaction, displacement_at, mean_displacement
+from icha.references.boundary_elements import boundary_elements
+from icha.references.error_sources import error_sources
+from icha.surfaces.summits import Asperities, find_summits
+
+MODULUS, RANGE = 1.0, 1e-3
+ENERGIES = [0.0, 3e-4]
+# Jump-off radii that are small beside the distances of the spots.
+WEAK = [0.0, 1e-7]
+# Sum of 1/r over the images of a unit cell less the uniform background, at the origin.
+MADELUNG = -3.900264920001956
+
+
+def law(energy):
+    return JKR(icha.Material(MODULUS, energy, RANGE))
+
+
+def spots(count, largest=0.02, seed=0):
+    """Centres in the unit square, the first in a corner and the second at the opposite edge; radii and curvatures."""
+    rng = np.random.default_rng(seed)
+    position = rng.random((count, 2))
+    position[:2] = [[0.0, 0.0], [0.9999, 0.6]][:count]
+    return position, largest * rng.uniform(0.2, 1.0, count), rng.uniform(0.5, 2.0, count)
+
+
+def direct_sum(points, position, a, R, energy, leave_out=()):
+    """The sum over spots of what every one of them does alone, ring by ring."""
+    total = np.zeros(len(points))
+    for i, point in enumerate(points):
+        for j, (centre, a_j, R_j) in enumerate(zip(position, a, R, strict=True)):
+            if (i, j) not in leave_out:
+                total[i] += displacement_by_quadrature(np.hypot(*(point - centre)), a_j, R_j, MODULUS, energy)
+    return total
+
+
+# --- the sums ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+@pytest.mark.parametrize(("count", "largest"), [(1, 0.1), (3, 0.05), (150, 0.01)])
+def test_displacement_is_the_plain_sum(energy, count, largest):
+    position, a, R = spots(count, largest)
+    points = np.vstack([np.random.default_rng(1).random((12, 2)), [[0, 0], [1, 0], [0, 1], [1, 1]]])
+    exact = direct_sum(points, position, a, R, energy)
+    w = displacement_at(law(energy), 1.0, points, position, a, R, free=True)
+    np.testing.assert_allclose(w, exact, atol=2e-7 * np.max(np.abs(exact)), rtol=0)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_interaction_leaves_out_the_own_spot_alone(energy):
+    position, a, R = spots(40)
+    half_space = HalfSpace.at(position[:25], 1.0, MODULUS, free=True).extended(position[25:])
+    interaction = Interaction.between(law(energy), half_space, R, 1.2 * a)
+    exact = direct_sum(position, position, a, R, energy, leave_out={(i, i) for i in range(40)})
+    np.testing.assert_allclose(interaction.displacement(a), exact, atol=1e-7 * np.max(np.abs(exact)), rtol=0)
+    # One spot alone feels nothing, wherever it is.
+    for place in ([0.0, 0.0], [0.5, 0.5], [0.9999, 0.2]):
+        alone = Interaction.between(law(energy), HalfSpace.at(np.array([place]), 1.0, MODULUS, free=True), R[:1], a[:1])
+        assert abs(alone.displacement(a[:1])[0]) < 1e-10 * abs(jkr_approach(a[0], R[0], MODULUS, energy))
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_tangent_is_the_derivative(energy):
+    position, a, R = spots(30)
+    half_space = HalfSpace.at(position, 1.0, MODULUS, free=True)
+    interaction = Interaction.between(law(energy), half_space, R, 1.5 * a)
+    change = 1e-5 * a * np.random.default_rng(2).normal(size=30)
+    difference = 0.5 * (interaction.displacement(a + change) - interaction.displacement(a - change))
+    tangent = interaction.tangent(a)
+    largest = np.max(np.abs(difference))
+    np.testing.assert_allclose(tangent(change), difference, atol=1e-5 * largest, rtol=0)
+    np.testing.assert_allclose(tangent.nearly(change), difference, atol=3e-3 * largest, rtol=0)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+@pytest.mark.parametrize("grid", [12, 64])
+def test_field_is_the_plain_sum_at_the_nodes(energy, grid):
+    position, a, R = spots(8, 0.06)
+    field = displacement_field(law(energy), 1.0, grid, position, a, R, free=True)
+    nodes = np.random.default_rng(3).integers(0, grid, (12, 2))
+    nodes[:3] = [[0, 0], [0, grid - 1], [grid - 1, grid - 1]]
+    exact = direct_sum(nodes[:, ::-1] / grid, position, a, R, energy)
+    np.testing.assert_allclose(field[tuple(nodes.T)], exact, atol=1e-7 * np.max(np.abs(exact)), rtol=0)
+    rows = DisplacementField(law(energy), 1.0, grid, position, a, R, free=True).rows(slice(5, 9))
+    np.testing.assert_allclose(rows, field[5:9], atol=1e-14)
+
+
+def test_images_sum_to_the_madelung_constant():
+    assert _image_potential(np.zeros(1), np.zeros(1))[0] == pytest.approx(MADELUNG, abs=1e-13)
+
+
+# --- spots in equilibrium ------------------------------------------------------------------------------------
+
+
+def contact_of(position, height, R, energy, period=1.0, free=True):
+    position, height, R = np.array(position, float), np.array(height, float), np.array(R, float)
+    return Contact(law(energy), Asperities(position, height, R, period, free), rms_height=1e-3)
+
+
+def pressed(contact, separation, steps=12):
+    state = untouched(contact)
+    for u in np.linspace(state.separation, separation, steps + 1)[1:]:
+        state = equilibrium(contact, state, u)
+    return state
+
+
+@pytest.mark.parametrize("energy", WEAK)
+@pytest.mark.parametrize("place", [[0.5, 0.5], [0.0, 0.0], [0.999, 0.3]])
+def test_a_single_spot_is_hertz_or_jkr_exactly(energy, place):
+    contact = contact_of([place], [0.0], [1.0], energy)
+    state = pressed(contact, -4e-3)
+    (a,) = state.spots.contact_radius
+    assert jkr_approach(a, 1.0, MODULUS, energy) == pytest.approx(4e-3, rel=1e-9)
+    assert mean_pressure(contact, state.spots) == pytest.approx(jkr_force(a, 1.0, MODULUS, energy), rel=1e-9)
+    if energy == 0:
+        assert mean_pressure(contact, state.spots) == pytest.approx(4 / 3 * (4e-3) ** 1.5, rel=1e-9)
+    stiffness = -Control("pressure", 0.0).slope(contact, state)
+    if energy == 0:
+        assert stiffness == pytest.approx(2 * a * MODULUS, rel=1e-6)
+
+
+@pytest.mark.parametrize("energy", WEAK)
+@pytest.mark.parametrize(("first", "second"), [([0.0, 0.0], [0.06, 0.08]), ([0.1, 0.5], [0.99, 0.5])])
+def test_two_equal_spots_at_a_distance(energy, first, second):
+    """delta(a) + w(d; a) = h - u by bracketing, with w the displacement by one spot alone."""
+    contact = contact_of([first, second], [0.0, 0.0], [1.0, 1.0], energy)
+    state = pressed(contact, -1.5e-3)
+    distance = np.hypot(*np.subtract(first, second))
+
+    def error(a):
+        w = displacement_by_quadrature(distance, a, 1.0, MODULUS, energy)
+        return jkr_approach(a, 1.0, MODULUS, energy) + w - 1.5e-3
+
+    lowest = (9 * np.pi * energy / (8 * MODULUS)) ** (1 / 3) if energy else 1e-6
+    exact = scipy.optimize.brentq(error, lowest, 0.2, xtol=1e-16)
+    np.testing.assert_allclose(state.spots.contact_radius, exact, rtol=1e-7)
+
+
+@pytest.mark.parametrize("energy", WEAK)
+def test_unlike_spots_in_equilibrium(energy):
+    position, height = [[0.0, 0.1], [0.15, 0.0], [0.7, 0.99]], np.array([0.0, -4e-4, -1e-4])
+    R, u = np.array([1.0, 0.5, 1.5]), -2e-3
+    contact = contact_of(position, height, R, energy)
+    state = pressed(contact, u)
+    ways = [[np.hypot(*np.subtract(p, q)) for q in position] for p in position]
+
+    def error(a):
+        w = [
+            sum(displacement_by_quadrature(ways[i][j], a[j], R[j], MODULUS, energy) for j in range(3) if j != i)
+            for i in range(3)
+        ]
+        return (jkr_approach(a, R, MODULUS, energy) + w - (height - u)) * 1e3
+
+    found = scipy.optimize.root(error, np.sqrt(R * (height - u)) * 0.9, tol=1e-13)
+    assert found.success
+    np.testing.assert_allclose(state.spots.contact_radius[state.owner], found.x, rtol=1e-7)
+
+
+@pytest.mark.parametrize("energy", WEAK)
+def test_a_group_of_spots_may_be_anywhere_and_the_square_of_any_size(energy):
+    """Only ways between spots count: not where the edges are."""
+    rng = np.random.default_rng(7)
+    position, height, R = 0.3 * rng.random((12, 2)), -1e-3 * rng.random(12), rng.uniform(0.5, 1.5, 12)
+    loads = []
+    for shift, period in (([0.0, 0.0], 1.0), ([0.7, 0.65], 1.0), ([0.1, 0.0], 0.45), ([1.7, 2.0], 5.0)):
+        contact = contact_of(position + shift, height, R, energy, period)
+        loads.append(mean_pressure(contact, pressed(contact, -2e-3).spots) * period**2)
+    np.testing.assert_allclose(loads, loads[0], rtol=1e-7)
+
+
+def test_united_spots_lie_between_their_parts_and_not_across_the_edges():
+    contact = contact_of([[0.01, 0.02], [0.03, 0.98]], [0.0, 0.0], [1.0, 1.0], 0.0)
+    assert len(pressed(contact, -4e-3).spots) == 2
+    across = contact_of([[0.01, 0.02], [0.03, 0.98]], [0.0, 0.0], [1.0, 1.0], 0.0, free=False)
+    assert len(pressed(across, -4e-3).spots) == 1
+    together = contact_of([[0.01, 0.02], [0.07, 0.02]], [0.0, 0.0], [1.0, 1.0], 0.0)
+    united = pressed(together, -4e-3).spots
+    np.testing.assert_allclose(united.position, [[0.04, 0.02]], atol=1e-9)
+
+
+def test_spots_far_apart_do_not_see_the_boundary():
+    """As the period grows, periodic and free half-space agree; what is left first is the counter-pressure."""
+    rng = np.random.default_rng(5)
+    place, height, R = rng.random((10, 2)), -1e-3 * rng.random(10), rng.uniform(0.5, 1.5, 10)
+    differences = []
+    for period in (4.0, 32.0):
+        free, periodic = (
+            contact_of(place + (period - 1) / 2, height, R, 0.0, period, is_free) for is_free in (True, False)
+        )
+        held = equilibrium(free, pressed(free, -1e-3), -1e-3)
+        load = mean_pressure(free, held.spots)
+        same = equilibrium(periodic, pressed(periodic, -1e-3), -1e-3, Control("pressure", load))
+        # The same spots under the same load ...
+        differences.append(np.max(np.abs(same.spots.contact_radius / held.spots.contact_radius - 1)))
+        # ... but for how far the half-space's mean plane has gone up.
+        shift = -MADELUNG * load * period / (np.pi * MODULUS)
+        assert same.separation - held.separation == pytest.approx(shift, rel=0.1 / period)
+    # Beyond that images act by the third power of the distance.
+    assert 8**2 * differences[1] < differences[0] < 0.01
+
+
+def test_mean_displacement_is_exact_for_forces():
+    """Against adaptive quadrature of 1/r; in the middle 4 asinh(1)/pi of F/(E* L), in a corner half of it."""
+    places = np.array([[0.5, 0.5], [0.0, 0.0], [0.31, 0.88], [1.0, 0.4]])
+    middle = 4 * np.arcsinh(1.0) / np.pi
+    for place, exact in zip(places, (middle, middle / 2, None, None), strict=True):
+        found = mean_displacement(2.0, MODULUS, 2.0 * place[None], np.array([3.0])) * 2.0 / 3.0
+        if exact is None:
+            x, y = place
+            exact = 0.0
+
+            # In polar coordinates around the point the integrand is the way to the edge.
+            def way(angle, x=x, y=y):
+                c, s = np.cos(angle), np.sin(angle)
+                along = (1 - x if c > 0 else x) / abs(c)
+                across = (1 - y if s > 0 else y) / abs(s)
+                return min(along, across)
+
+            corners = sorted(np.mod(np.arctan2(v - y, u - x), 2 * np.pi) for u in (0, 1) for v in (0, 1))
+            turns = sorted({0.0, *corners, np.pi / 2, np.pi, 1.5 * np.pi, 2 * np.pi})
+            for low, high in itertools.pairwise(turns):
+                exact += scipy.integrate.quad(way, low, high, epsrel=1e-11)[0] / np.pi
+        assert found == pytest.approx(exact, rel=1e-9)
+
+
+def test_a_wide_rough_square_is_nearly_periodic():
+    """The same heights: what differs are some spots at the rim, and the mean plane far away."""
+    heights = icha.SelfAffineSpectrum(1e-4, 1.5e-5, 4e-6, 0.8, rms_slope=0.2).realise(160, 3).heights
+    material = icha.Material(25e6, 0.0, 1e-8)
+    path = icha.Path(reduced_pressures=[2e-3, 1e-2, 3e-2])
+    periodic, free = (
+        icha.simulate(icha.Surface(heights, 1e-4, boundary), material, path) for boundary in ("periodic", "free")
+    )
+    area = free["contact_area_fraction"].values / periodic["contact_area_fraction"].values
+    np.testing.assert_allclose(area, 1.0, atol=0.06)
+    np.testing.assert_array_equal(periodic["mean_gap"], periodic["mean_separation"])
+    height = float(periodic["rms_height"])
+    np.testing.assert_allclose(free["mean_gap"] / height, periodic["mean_gap"] / height, atol=0.1)
+    # Sunk in by about the mean displacement under an even pressure.
+    sunk = (free["mean_gap"] - free["mean_separation"]).values
+    np.testing.assert_allclose(sunk / (0.9464 * 1e-4 * free["nominal_pressure"].values / 25e6), 1.0, atol=0.05)
+
+
+def test_the_way_back_of_a_free_square_ends_apart():
+    rng = np.random.default_rng(11)
+    n = 48
+    spectrum = icha.SelfAffineSpectrum(1e-4, 5e-5, 1.2e-5, 0.8, rms_slope=0.2)
+    heights = spectrum.realise(2 * n, 4).heights[:n, :n] + 1e-7 * rng.normal()
+    surface = icha.Surface(heights, 5e-5, boundary="free")
+    path = icha.Path(reduced_pressures=[2e-3, 8e-3], snapshots=[("reduced_pressure", 8e-3)], unload=True)
+    run = icha.simulate(surface, icha.Material(25e6, 0.02, 2e-8), path)
+    assert run["spot_count"].values[-1] == 0 and run["nominal_pressure"].values[-1] == 0
+    assert np.all(run["residual"] <= 1e-8)
+    assert str(run["boundary"].values) == "free"
+    np.testing.assert_allclose(
+        run["reduced_pressure"].values[run["step_kind"].values == "reduced_pressure"][:2], [2e-3, 8e-3], rtol=1e-8
+    )
+
+
+# --- the surface ---------------------------------------------------------------------------------------------
+
+
+def whole_and_part(n=160, low=24, high=104):
+    """A periodic surface, and a part of it as a single square."""
+    whole = icha.SelfAffineSpectrum(1.0, 0.4, 0.06, 0.8).realise(n, 5)
+    heights = whole.heights[low:high, low:high]
+    return whole, icha.Surface(heights, (high - low) / n, boundary="free"), heights.mean(), low / n
+
+
+def test_summits_of_a_part_are_those_of_the_whole():
+    whole, part, mean, origin = whole_and_part()
+    expected, found = find_summits(whole), find_summits(part)
+    inner = part.period - part.spacing
+    inside = np.all((expected.position > origin) & (expected.position < origin + inner), axis=1)
+    place = found.position + origin
+    # Away from the edges all of them, at the same place, with the same height and radius.
+    margin = 8 * part.spacing
+    for one, other in ((expected.position[inside], place), (place, expected.position)):
+        core = np.all((one > origin + margin) & (one < origin + inner - margin), axis=1)
+        nearest = np.min(np.hypot(*(one[core][:, None] - other).transpose(2, 0, 1)), axis=1)
+        assert np.max(nearest) < 1e-3 * part.spacing
+    for k, position in enumerate(place):
+        if np.all((position > origin + margin) & (position < origin + inner - margin)):
+            same = np.argmin(np.hypot(*(expected.position - position).T))
+            assert found.height[k] + mean == pytest.approx(expected.height[same], abs=1e-6 * whole.rms_height)
+            assert found.radius[k] == pytest.approx(expected.radius[same], rel=1e-3)
+    # And next to them neither many more nor many fewer.
+    assert abs(len(found) - np.count_nonzero(inside)) <= 0.05 * len(found) + 1
+    assert np.all((found.position > 0) & (found.position < inner))
+
+
+def test_edges_have_no_summits():
+    """Crests that run over an edge have their tops outside, whatever the slope there."""
+    n = 40
+    y, x = np.mgrid[:n, :n] / n
+    for heights in (
+        -((y - 0.5) ** 2) + 0.5 * x,  # a crest that rises towards x = 1
+        -((y - 0.3) ** 2) - (x - 1.2) ** 2,  # its top lies beyond
+        -((y + 0.1) ** 2) - (x + 0.1) ** 2,  # beyond a corner
+        -((y - 0.5) ** 2) - (x - 0.99) ** 2,  # between the last node and the end of the period
+    ):
+        with pytest.raises(ValueError, match="no summit"):
+            find_summits(icha.Surface(heights, 1.0, boundary="free"))
+    found = find_summits(icha.Surface(-2 * (y - 0.312) ** 2 - 3 * (x - 0.613) ** 2, 1.0, boundary="free"))
+    np.testing.assert_allclose(found.position, [[0.613, 0.312]], atol=1e-6)
+    np.testing.assert_allclose(found.radius, 1 / np.sqrt(4 * 6), rtol=1e-4)
+
+
+def test_moments_of_a_free_square_are_means_over_it():
+    whole, part, mean, _ = whole_and_part()
+    k = 2 * np.pi * np.fft.fftfreq(whole.grid, 1 / whole.grid)
+    spectrum = np.fft.fft2(whole.heights)
+    cut = (slice(24, 104), slice(24, 104))
+    gy, gx, laplacian = (
+        np.fft.ifft2(factor * spectrum).real[cut] for factor in (1j * k[:, None], 1j * k, -(k[:, None] ** 2 + k**2))
+    )
+    exact = np.mean((whole.heights[cut] - mean) ** 2), np.mean(gx**2 + gy**2), np.mean(laplacian**2)
+    np.testing.assert_allclose(part.spectral_moments, exact, rtol=0.01)
+    # A quintic spline knows polynomials, right up to the edges.
+    y, x = np.mgrid[:20, :20] * 0.1
+    surface = icha.Surface(0.3 * x**2 - 0.2 * x * y + 0.5 * y, 2.0, boundary="free")
+    slope = np.mean((0.6 * x - 0.2 * y) ** 2 + (0.5 - 0.2 * x) ** 2)
+    assert surface.spectral_moments[1:] == pytest.approx((slope, 0.36), rel=1e-10)
+    scaled = surface.scaled_to_rms_slope(0.7)
+    assert scaled.free and scaled.rms_slope == pytest.approx(0.7, rel=1e-12)
+    for periodic_only in (lambda: surface.refined(2), lambda: boundary_elements(surface, law(0.0).material, 1e-3)):
+        with pytest.raises(ValueError, match="boundary: 'free'"):
+            periodic_only()
+    with pytest.raises(ValueError, match="boundary: 'free'"):
+        error_sources(surface, law(0.0).material, [1e-3])
+    with pytest.raises(ValueError, match="boundary: 'open' must be one of periodic, free"):
+        icha.Surface(surface.heights, 1.0, boundary="open")
+
+
+# --- what a state shows --------------------------------------------------------------------------------------
+
+
+def test_distributions_and_fields_of_a_free_square():
+    """Spots over the edges: no part of them comes in on the other side, and what lies outside is counted."""
+    energy, grid = 0.0, 60
+    contact = contact_of([[0.003, 0.5], [0.6, 0.985], [0.4, 0.4]], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], energy)
+    state = pressed(contact, -1e-3)
+    surface = icha.Surface(1e-4 * np.random.default_rng(1).normal(size=(grid, grid)), 1.0, boundary="free")
+    spots = state.spots
+    cover = contact_cover(surface, spots)
+    # Discs by counting points of a fine grid within the square of all cells.
+    fine = (np.arange(20 * grid) + 0.5) / (20 * grid) - 0.5 / grid
+    within = np.zeros((20 * grid, 20 * grid), bool)
+    for (x, y), a in zip(spots.position, spots.contact_radius, strict=True):
+        within |= (fine - x) ** 2 + (fine[:, None] - y) ** 2 < a**2
+    counted = within.reshape(grid, 20, grid, 20).mean(axis=(1, 3))
+    np.testing.assert_allclose(cover, counted, atol=0.02)
+    assert cover.mean() == pytest.approx(within.mean(), rel=2e-3)
+    assert not covered_nodes(surface, spots)[:, -5:].any() and not covered_nodes(surface, spots)[:5].any()
+
+    found = gap_distribution(contact.law, surface, state)
+    area = np.pi * np.sum(spots.contact_radius**2)
+    assert found.beyond_edges == pytest.approx(area - within.mean(), rel=0.01) and found.beyond_edges > 0
+    total = np.sum(found.density * np.diff(found.edges)) + area + found.overlap_fraction - found.beyond_edges
+    assert total == pytest.approx(1.0, abs=1e-12)
+
+    w = displacement(contact.law, surface, state)
+    nodes = np.array([[3, 59], [0, 0], [31, 2]])
+    exact = direct_sum(nodes[:, ::-1] / grid, spots.position, spots.contact_radius, spots.radius_of_curvature, energy)
+    np.testing.assert_allclose(w[tuple(nodes.T)], exact, rtol=1e-6)
+    fine = displacement_field(
+        contact.law, 1.0, 600, spots.position, spots.contact_radius, spots.radius_of_curvature, free=True
+    )
+    # Nodes stand for the cells that follow them, too: the mean over the square by the trapezoidal rule.
+    mean = 0.25 * sum(np.mean(fine[y, x]) for y in (slice(-1), slice(1, None)) for x in (slice(-1), slice(1, None)))
+    assert mean_gap(contact, state) - state.separation == pytest.approx(mean, rel=0.01)
+    np.testing.assert_allclose(gap(contact.law, surface, state), w + state.separation - surface.heights, atol=1e-15)

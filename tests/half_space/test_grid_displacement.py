@@ -1,0 +1,149 @@
+"""Fields of displacement against Fourier series of the pressures, image sums, and evaluation at single points."""
+
+import numpy as np
+import pytest
+import scipy.special
+from half_space import periodic_displacement, spectral_displacement
+
+from icha import Material
+from icha.asperity.jkr import JKR
+from icha.half_space.grid_displacement import DisplacementField, displacement_field, row_blocks, smooth_half, windows
+
+MODULUS, RANGE = 2.0, 1e-3
+CENTRES = np.array([[0.2, 0.3], [0.6, 0.55], [0.9, 0.85]])
+RADIUS = np.array([0.02, 0.03, 0.015])
+CURVATURE = np.array([0.5, 0.8, 0.3])
+# Without adhesion, and with so much that the spots are in tension on the whole.
+ENERGIES = [0.0, 3e-4]
+
+
+def law(energy):
+    return JKR(Material(MODULUS, energy, RANGE))
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_smooth_half_against_its_hankel_transform(k):
+    # erf(x)/x = int erfc(q/2) J0(q x) dq, and the Laplacian multiplies by -q^2.
+    q, weight = np.polynomial.legendre.leggauss(300)
+    q, weight = 9 * (q + 1), 9 * weight
+    x = np.linspace(0, 4.6, 500)
+    expected = ((-(q**2)) ** k * scipy.special.erfc(q / 2) * weight) @ scipy.special.j0(q[:, None] * x)
+    value = smooth_half((x**2)[None], np.eye(4)[[k]])[0]
+    np.testing.assert_allclose(value, expected, rtol=0, atol=1e-12 * np.max(np.abs(expected)))
+    both = smooth_half(np.array([x**2, x**2]), np.array([[1.0, -2.0, 0.5, 0.0], [0.0, 0.0, 0.0, 3.0]]))
+    apart = [smooth_half((x**2)[None], np.eye(4)[[j]])[0] for j in range(4)]
+    np.testing.assert_allclose(both, [apart[0] - 2 * apart[1] + 0.5 * apart[2], 3 * apart[3]], rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+@pytest.mark.parametrize("spots", [[0, 1, 2], [1]])
+def test_field_against_the_fourier_series_of_the_pressures(energy, spots):
+    n = 1024
+    centres, a, R = CENTRES[spots], RADIUS[spots] + 0.01, CURVATURE[spots]
+    series = spectral_displacement(centres, a, R, MODULUS, energy, 1.0, n)
+    field = displacement_field(law(energy), 1.0, n, centres, a, R)
+    node = np.arange(n) / n
+    smooth = np.ones((n, n), dtype=bool)
+    for centre, radius in zip(centres, a, strict=True):
+        dx, dy = node - centre[0], node - centre[1]
+        r = np.hypot((dx - np.rint(dx))[None, :], (dy - np.rint(dy))[:, None])
+        # Near an edge the series is cut off too early to be exact.
+        smooth &= np.abs(r - radius) > 20 / n
+    assert smooth.mean() > 0.9
+    # Both under the contact and outside.
+    assert np.max(np.abs(field - series)[smooth]) < 1e-7 * np.max(np.abs(field))
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+@pytest.mark.parametrize("n", [8, 16, 23, 64, 97, 200])
+def test_nodes_of_coarse_and_fine_grids_against_the_direct_image_sum(energy, n):
+    # The coarsest cannot hold the Fourier series themselves.
+    field = displacement_field(law(energy), 1.0, n, CENTRES, RADIUS, CURVATURE)
+    # Far from all spots, inside the first one, and at the border.
+    for row, column in [(0, 0), (round(0.31 * n), round(0.19 * n)), (n // 3, n // 5), (n - 1, n // 2)]:
+        x, y = column / n, row / n
+        expected = sum(
+            periodic_displacement(x - cx, y - cy, a, R, MODULUS, energy, 1.0)
+            for (cx, cy), a, R in zip(CENTRES, RADIUS, CURVATURE, strict=True)
+        )
+        assert field[row, column] == pytest.approx(expected, abs=1e-6 * np.max(np.abs(field)))
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_the_mean_displacement_is_zero(energy):
+    # Of a field sampled far finer than the smallest spot; the kink at its edge limits the sampling.
+    field = displacement_field(law(energy), 1.0, 1024, CENTRES, RADIUS, CURVATURE)
+    assert abs(field.mean()) < 1e-6 * np.max(np.abs(field))
+
+
+def many_spots():
+    """Spots of very different sizes, many of them: several groups, in a field of several blocks of rows."""
+    rng = np.random.default_rng(6)
+    a = 10 ** rng.uniform(-3.5, -1.6, 400)
+    return rng.random((400, 2)), a, rng.uniform(0.5, 2, 400) * a / 0.2
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_large_and_small_spots_together_are_the_sum_of_each_alone(energy):
+    # Alone, a spot's Fourier series and window are others than among four hundred.
+    centres, a, R = many_spots()
+    n = 96
+    together = displacement_field(law(energy), 1.0, n, centres, a, R)
+    alone = sum(displacement_field(law(energy), 1.0, n, centres[[j]], a[[j]], R[[j]]) for j in range(len(a)))
+    np.testing.assert_allclose(together, alone, rtol=0, atol=3e-8 * np.max(np.abs(alone)))
+
+
+def test_every_eighth_node_has_the_value_that_it_has_on_the_fine_grid():
+    centres, a, R = many_spots()
+    fine = displacement_field(law(3e-4), 1.0, 768, centres, a, R)
+    coarse = displacement_field(law(3e-4), 1.0, 96, centres, a, R)
+    np.testing.assert_allclose(fine[::8, ::8], coarse, rtol=0, atol=3e-8 * np.max(np.abs(fine)))
+
+
+def test_rows_by_themselves_are_those_of_the_whole_field():
+    centres, a, R = many_spots()
+    whole = displacement_field(law(0.0), 1.0, 200, centres, a, R)
+    field = DisplacementField(law(0.0), 1.0, 200, centres, a, R)
+    for rows in (slice(0, 1), slice(77, 130), slice(199, 200)):
+        np.testing.assert_allclose(field.rows(rows), whole[rows], rtol=0, atol=1e-14 * np.max(np.abs(whole)))
+
+
+def test_the_field_has_the_same_bits_on_any_number_of_cores(monkeypatch):
+    centres, a, R = many_spots()
+    n = 1000
+    assert len(row_blocks(n)) > 1
+    bits = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        bits.append(displacement_field(law(3e-4), 1.0, n, centres, a, R).tobytes())
+    assert bits[0] == bits[1]
+
+
+def test_spots_of_no_radius_and_no_spots_displace_nothing():
+    empty = np.empty(0)
+    np.testing.assert_array_equal(displacement_field(law(0.0), 1.0, 16, np.empty((0, 2)), empty, empty), 0)
+    a = np.array([0.02, 0.0, 0.015])
+    three = displacement_field(law(0.0), 1.0, 64, CENTRES, a, CURVATURE)
+    two = displacement_field(law(0.0), 1.0, 64, CENTRES[[0, 2]], a[[0, 2]], CURVATURE[[0, 2]])
+    np.testing.assert_allclose(three, two, rtol=0, atol=1e-9 * np.max(np.abs(two)))
+
+
+@pytest.mark.parametrize(("grid", "reach"), [(20, 0.23), (21, 0.07), (20, 0.7), (21, 0.5)])
+def test_windows_hold_every_node_within_reach_once(grid, reach):
+    centres = np.array([[0.31, 0.97], [1.02, -0.013], [0.5, 0.5]])
+    found = np.zeros((3, grid, grid), dtype=int)
+    for rows in (slice(0, 6), slice(6, 7), slice(7, grid)):
+        for window in windows(centres, reach, grid, 1.0, rows):
+            for spot, dy, dx, node in zip(window.spot, window.dy, window.dx, window.node, strict=True):
+                row, column = node // grid + rows.start, node % grid
+                assert np.all(row == row[0])
+                np.testing.assert_allclose(np.mod(centres[spot, 1] + dy - row[0] / grid + 0.5, 1), 0.5, atol=1e-12)
+                np.testing.assert_allclose(np.mod(centres[spot, 0] + dx - column / grid + 0.5, 1), 0.5, atol=1e-12)
+                assert np.max(np.abs(dx)) <= 0.5 + 1 / grid and abs(dy) <= 0.5 + 1 / grid
+                found[spot, row[0], column] += 1
+    assert found.max() == 1
+    node = np.arange(grid) / grid
+    for count, (x, y) in zip(found, centres, strict=True):
+        dx, dy = node - x, node - y
+        near = np.hypot((dx - np.rint(dx))[None, :], (dy - np.rint(dy))[:, None]) <= reach
+        assert np.all(count[near] == 1)

@@ -1,0 +1,220 @@
+"""The periodic interaction against direct image sums, Fourier series, and finite differences."""
+
+import numpy as np
+import pytest
+from half_space import periodic_displacement, periodic_point_load, spectral_displacement
+
+from icha import Material
+from icha.asperity.jkr import JKR
+from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
+
+MODULUS, RANGE = 2.0, 1e-3
+CENTRES = np.array([[0.2, 0.3], [0.6, 0.55], [0.9, 0.85]])
+RADIUS = np.array([0.02, 0.03, 0.015])
+CURVATURE = np.array([0.5, 0.8, 0.3])
+# Without adhesion, and with so much that the spots are in tension on the whole.
+ENERGIES = [0.0, 3e-4]
+
+
+def law(energy):
+    return JKR(Material(MODULUS, energy, RANGE))
+
+
+def between(law, centres, largest, R, period=1.0):
+    return Interaction.between(law, HalfSpace.at(centres, period, MODULUS), R, largest)
+
+
+def at_spots(energy, centres=CENTRES, a=RADIUS, R=CURVATURE):
+    return between(law(energy), centres, a, R).displacement(a)
+
+
+def test_the_direct_image_sum_has_the_known_constants():
+    # 1/r - 3.900265/L + 2.2584 r^2/L^3 (and a fourth-order term).
+    assert periodic_point_load(0, 0) == pytest.approx(-3.900265, abs=5e-7)
+    for r in (0.02, 0.04):
+        assert periodic_point_load(r, 0) - 1 / r == pytest.approx(-3.900265 + 2.2584 * r**2, abs=3 * r**4 + 1e-6)
+
+
+def test_a_lone_small_spot_feels_the_constant_of_its_own_images():
+    a, R = np.array([1e-3]), np.array([1.0])
+    w = between(law(0.0), np.array([[0.37, 0.81]]), a, R).displacement(a)
+    assert w[0] == pytest.approx(-3.900265 * law(0.0).force(a, R)[0] / (np.pi * MODULUS), rel=1e-6)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_spots_against_the_direct_image_sum(energy):
+    expected = [
+        sum(
+            periodic_displacement(*(CENTRES[i] - CENTRES[j]), RADIUS[j], CURVATURE[j], MODULUS, energy, 1.0, own=i != j)
+            for j in range(3)
+        )
+        for i in range(3)
+    ]
+    np.testing.assert_allclose(at_spots(energy), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_points_against_the_direct_image_sum(energy):
+    # Far away, inside a spot, at its edge, at a corner of the cell, and across its border from a spot.
+    points = np.array([[0.5, 0.1], [0.205, 0.31], [0.2 + 0.0201, 0.3], [0.0, 0.0], [0.02, 0.97], [1.2, -0.6]])
+    w = displacement_at(law(energy), 1.0, points, CENTRES, RADIUS, CURVATURE)
+    expected = [
+        sum(periodic_displacement(*(p - CENTRES[j]), RADIUS[j], CURVATURE[j], MODULUS, energy, 1.0) for j in range(3))
+        for p in points
+    ]
+    np.testing.assert_allclose(w, expected, atol=1e-6 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_point_loads_against_the_direct_image_sum_for_many_spots(energy):
+    # Many spots so small that they are points: here the near field covers a part of the cell only.
+    rng = np.random.default_rng(4)
+    count = 600
+    cells = rng.permutation(40 * 40)[:count]
+    centres = (np.stack([cells % 40, cells // 40], axis=1) + rng.random((count, 2)) * 0.5) / 40
+    a = rng.uniform(0.5, 1.0, count) * 2e-4
+    R = rng.uniform(0.5, 1.0, count)
+    w = at_spots(energy, centres, a, R)
+    table = {}
+    force = law(energy).force(a, R)
+    moment = law(energy).second_moment(a, R)
+    for i in (0, 17, 599):
+        total = force[i] * periodic_point_load(0, 0, 6)
+        for j in range(count):
+            if j == i:
+                continue
+            d = centres[i] - centres[j]
+            d -= np.rint(d)
+            psi = table.setdefault((i, j), periodic_point_load(*d, 6))
+            total += force[j] * psi + moment[j] / np.hypot(*d) ** 3
+        assert w[i] == pytest.approx(total / (np.pi * MODULUS), abs=1e-6 * np.max(np.abs(w)))
+
+
+def test_one_large_spot():
+    # The window is half the cell and not many radii: force and second moment must carry the images.
+    centre, a, R = np.array([[0.4, 0.7]]), np.array([0.1]), np.array([1.0])
+    w = between(law(0.0), centre, a, R).displacement(a)
+    series = spectral_displacement(centre, a, R, MODULUS, 0.0, 1.0, 1000)
+    own = law(0.0).displacement(0.0, a, R)
+    assert w[0] == pytest.approx(series[700, 400] - own[0], abs=2e-5 * own[0])
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_tangent_against_differences(energy):
+    operator = between(law(energy), CENTRES, 1.2 * RADIUS, CURVATURE)
+    tangent = operator.tangent(RADIUS)
+    for j in range(3):
+        direction = np.eye(3)[j]
+        step = 1e-4 * RADIUS[j]
+        difference = (
+            operator.displacement(RADIUS + step * direction) - operator.displacement(RADIUS - step * direction)
+        ) / (2 * step)
+        np.testing.assert_allclose(tangent(direction), difference, rtol=1e-6, atol=1e-8 * np.abs(difference).max())
+
+
+def test_tangent_against_differences_for_many_spots():
+    rng = np.random.default_rng(5)
+    count = 400
+    centres, a, R = rng.random((count, 2)), rng.uniform(0.2, 1, count) * 3e-3, rng.uniform(0.5, 1, count)
+    interaction = between(law(1e-6), centres, a, R)
+    direction = rng.normal(size=count) * a
+    difference = (
+        interaction.displacement(a + 1e-5 * direction) - interaction.displacement(a - 1e-5 * direction)
+    ) / 2e-5
+    tangent = interaction.tangent(a)
+    value = tangent(direction)
+    # A few pairs overlap or nearly touch: there the neck's part is singular at the edge.
+    good = np.abs(value - difference) < 1e-5 * np.max(np.abs(difference))
+    assert np.mean(good) > 0.97
+    # The operator of the linear solves only has to be close.
+    assert np.max(np.abs(tangent.nearly(direction) - value)) < 5e-3 * np.max(np.abs(value))
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_displacement_is_linear_in_the_spots(energy):
+    # A spot's displacement does not depend on the others: three spots are the sum of single ones.
+    points = np.random.default_rng(0).random((40, 2))
+    together = displacement_at(law(energy), 1.0, points, CENTRES, RADIUS, CURVATURE)
+    apart = sum(displacement_at(law(energy), 1.0, points, CENTRES[[j]], RADIUS[[j]], CURVATURE[[j]]) for j in range(3))
+    np.testing.assert_allclose(together, apart, atol=1e-9 * np.max(np.abs(apart)))
+
+
+def test_reciprocity_of_small_spots():
+    # Betti: F_i w_i(j) = F_j w_j(i), for spots small against their distance.
+    centres = np.array([[0.1, 0.2], [0.35, 0.9]])
+    a, R = np.array([1e-3, 2e-3]), np.array([1.0, 1.0])
+    force = law(0.0).force(a, R)
+    both = at_spots(0.0, centres, a, R)
+    own = [at_spots(0.0, centres[[j]], a[[j]], R[[j]])[0] for j in range(2)]
+    assert force[0] * (both[0] - own[0]) == pytest.approx(force[1] * (both[1] - own[1]), rel=1e-4)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_shifts_and_quarter_turns(energy):
+    reference = at_spots(energy)
+    shift = np.array([0.731, 2.118])
+    np.testing.assert_allclose(at_spots(energy, np.mod(CENTRES + shift, 1.0)), reference, rtol=1e-9)
+    turned = np.stack([1 - CENTRES[:, 1], CENTRES[:, 0]], axis=1)
+    np.testing.assert_allclose(at_spots(energy, turned), reference, rtol=1e-9)
+    order = [2, 0, 1]
+    np.testing.assert_allclose(
+        at_spots(energy, CENTRES[order], RADIUS[order], CURVATURE[order]), reference[order], rtol=1e-10
+    )
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_units(energy):
+    # Lengths times 1000, surface energy with them: displacements times 1000.
+    big = between(JKR(Material(MODULUS, 1e3 * energy, 1.0)), 1e3 * CENTRES, 1e3 * RADIUS, 1e3 * CURVATURE, 1e3)
+    np.testing.assert_allclose(big.displacement(1e3 * RADIUS), 1e3 * at_spots(energy), rtol=1e-9)
+
+
+def test_a_spot_of_no_radius_adds_nothing():
+    a = np.array([0.02, 0.0, 0.015])
+    points = np.array([[0.6, 0.55], [0.6005, 0.55], [0.1, 0.1]])
+    three = displacement_at(law(0.0), 1.0, points, CENTRES, a, CURVATURE)
+    two = displacement_at(law(0.0), 1.0, points, CENTRES[[0, 2]], a[[0, 2]], CURVATURE[[0, 2]])
+    np.testing.assert_allclose(three, two, rtol=1e-9)
+
+
+def test_nothing_in_contact_displaces_nothing():
+    empty = np.empty(0)
+    nowhere = np.empty((0, 2))
+    np.testing.assert_array_equal(displacement_at(law(0.0), 1.0, CENTRES, nowhere, empty, empty), np.zeros(3))
+    assert len(between(law(0.0), nowhere, empty, empty).displacement(empty)) == 0
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_spots_may_outgrow_their_windows_a_little(energy):
+    narrow = between(law(energy), CENTRES, RADIUS / 1.5, CURVATURE).displacement(RADIUS)
+    np.testing.assert_allclose(narrow, at_spots(energy), rtol=1e-6)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_points_may_be_added_later(energy):
+    rng = np.random.default_rng(6)
+    centres, a = rng.random((300, 2)), rng.uniform(0.2, 1, 300) * 4e-3
+    R = np.ones(300)
+    grown = HalfSpace.at(centres[:170], 1.0, MODULUS).extended(centres[170:210]).extended(centres[210:])
+    value = Interaction.between(law(energy), grown, R, a).displacement(a)
+    np.testing.assert_allclose(value, at_spots(energy, centres, a, R), atol=1e-7 * np.max(np.abs(value)))
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_spots_and_points_agree_at_all_distances(energy):
+    # Inside spots, across their edges, at the end of the windows and of the near field, and on the centre itself.
+    rng = np.random.default_rng(7)
+    count = 200
+    centres, a, R = rng.random((count, 2)), rng.uniform(0.1, 1, count) * 1e-2, np.ones(count)
+    a[::3] = 0.0
+    a[1] = 0.06
+    w = displacement_at(law(energy), 1.0, centres, centres, a, R)
+    own = law(energy).displacement(np.zeros(count), a, R)
+    np.testing.assert_allclose(at_spots(energy, centres, a, R), w - own, atol=3e-7 * np.max(np.abs(w)))
+
+
+def test_the_same_bytes_every_time():
+    rng = np.random.default_rng(8)
+    centres, a, R = rng.random((3000, 2)), rng.uniform(0.1, 1, 3000) * 1e-3, np.ones(3000)
+    one, other = (at_spots(1e-6, centres, a, R) for _ in range(2))
+    assert one.tobytes() == other.tobytes()

@@ -1,0 +1,287 @@
+"""The loading path: stops hit exactly, refused when they cannot be meant, and independence of the step."""
+
+import numpy as np
+import pytest
+
+from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.analysis.checks import check_run
+from icha.asperity.jkr import JKR
+from icha.equilibrium.equilibrium import (
+    RESIDUAL_TOLERANCE,
+    Contact,
+    NotConverged,
+    area_fraction,
+    equilibrium,
+    mean_pressure,
+    untouched,
+)
+from icha.path.path import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, follow
+from icha.surfaces.summits import find_summits
+
+PERIOD, MODULUS = 100e-6, 25e6
+ADHESIVE = Material(MODULUS, 0.05, 2.071e-9)
+BARE = Material(MODULUS, 0.0, 2.071e-9)
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 16, 0.8).realise(64, 1)
+
+
+@pytest.fixture(scope="module")
+def large():
+    """Enough summits that one event is not a per cent of the area."""
+    return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
+
+
+def contact_of(surface, material):
+    return Contact(JKR(material), find_summits(surface), surface.rms_height)
+
+
+@pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
+def test_stops_of_every_kind_are_hit_exactly(surface, material):
+    snapshots = [("relative_load", 7e-3), ("mean_separation", 1.7 * surface.rms_height), ("area_fraction", 0.013)]
+    for stops in (
+        {"reduced_pressures": [1e-4, 2e-3, 1.1e-2, 3e-2]},
+        {"area_fractions": [1e-3, 9e-3, 5e-2]},
+        {"mean_separations": [2.2 * surface.rms_height, 1.1 * surface.rms_height]},
+    ):
+        run = simulate(surface, material, Path(**stops, snapshots=snapshots))
+        assert run.sizes["step"] == len(next(iter(stops.values()))) + 3
+        reached = {
+            "reduced_pressure": run.nominal_pressure / (MODULUS * surface.rms_slope),
+            "relative_load": run.nominal_pressure / MODULUS,
+            "area_fraction": run.contact_area_fraction,
+            "mean_separation": run.mean_separation,
+        }
+        for step in run.step.values:
+            kind, target = str(run.step_kind[step].item()), float(run.step_target[step])
+            assert float(reached[kind][step]) == pytest.approx(target, rel=1e-9), (kind, target)
+        assert np.all(np.diff(run.mean_separation) < 0)
+        assert np.all(run.residual <= RESIDUAL_TOLERANCE)
+        assert sorted(run.snapshot_kind.values) == ["area_fraction", "mean_separation", "relative_load"]
+        kinds = run.step_kind.values[run.snapshot_step.values]
+        np.testing.assert_array_equal(kinds, run.snapshot_kind.values)
+        np.testing.assert_array_equal(run.step_target.values[run.snapshot_step.values], run.snapshot_target.values)
+
+
+def test_a_stop_that_is_also_a_snapshot_is_one_step(surface):
+    path = Path(reduced_pressures=[1e-3, 1e-2], snapshots=[("reduced_pressure", 1e-2)])
+    assert len(path.targets) == 2
+    run = simulate(surface, BARE, path)
+    assert run.sizes["step"] == 2
+    assert run.snapshot_step.values.tolist() == [1]
+    # None: the last stop; an empty list: none.
+    assert [t.snapshot for t in Path(area_fractions=[0.01, 0.02]).targets] == [False, True]
+    assert [t.snapshot for t in Path(area_fractions=[0.01, 0.02], snapshots=[]).targets] == [False, False]
+
+
+@pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
+def test_a_stop_does_not_depend_on_the_kind_by_which_it_is_reached(surface, material):
+    one = simulate(surface, material, Path(reduced_pressures=[2e-2]))
+    others = [
+        simulate(surface, material, Path(area_fractions=[float(one.contact_area_fraction[0])])),
+        simulate(surface, material, Path(mean_separations=[float(one.mean_separation[0])])),
+        simulate(
+            surface,
+            material,
+            Path(reduced_pressures=[0.1], snapshots=[("relative_load", 2e-2 * surface.rms_slope)]),
+        ),
+    ]
+    for other in others:
+        for name in ("contact_area_fraction", "nominal_pressure", "mean_separation", "contact_stiffness"):
+            assert float(other[name][0]) == pytest.approx(float(one[name][0]), rel=1e-7), name
+
+
+@pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
+def test_halving_the_step_changes_the_area_by_less_than_a_per_cent(large, material):
+    pressures = [3e-4, 1e-3, 3e-3, 1e-2, 3e-2]
+    runs = [simulate(large, material, Path(reduced_pressures=pressures, max_step=step)) for step in (0.1, 0.05)]
+    coarse, fine = (run.contact_area_fraction.values for run in runs)
+    np.testing.assert_allclose(coarse, fine, rtol=0.01)
+    # The mean separation likewise.
+    np.testing.assert_allclose(runs[0].mean_separation, runs[1].mean_separation, rtol=0.01)
+
+
+@pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
+def test_more_stops_change_the_area_by_less_than_a_per_cent(large, material):
+    few = simulate(large, material, Path(reduced_pressures=[1e-3, 1e-2]))
+    many = simulate(large, material, Path(reduced_pressures=[1e-3, 2e-3, 3e-3, 5e-3, 7e-3, 1e-2]))
+    np.testing.assert_allclose(many.contact_area_fraction[[0, -1]], few.contact_area_fraction, rtol=0.01)
+
+
+def test_stops_are_met_in_the_order_of_the_path(surface):
+    # Snapshots of other kinds fall between the stops wherever the path meets them.
+    path = Path(
+        reduced_pressures=[1e-3, 1e-2, 5e-2],
+        snapshots=[("area_fraction", 0.15), ("mean_separation", 2.4 * surface.rms_height), ("area_fraction", 4e-3)],
+    )
+    run = simulate(surface, BARE, path)
+    assert np.all(np.diff(run.mean_separation) < 0)
+    assert np.all(np.diff(run.contact_area_fraction) > 0)
+    assert np.all(np.diff(run.nominal_pressure) > 0)
+    assert run.snapshot_target.values.tolist() == [2.4 * surface.rms_height, 4e-3, 0.15]
+
+
+def test_a_stop_inside_a_jump_is_met_exactly_all_the_same(surface):
+    # The first contact with adhesion jumps to a finite area; a smaller area is asked for.
+    contact = contact_of(surface, ADHESIVE)
+    first = equilibrium(contact, untouched(contact), untouched(contact).separation * (1 - 1e-9))
+    jumped = area_fraction(contact, first.spots)
+    assert mean_pressure(contact, first.spots) < 0
+    try:
+        run = simulate(surface, ADHESIVE, Path(area_fractions=[0.9 * jumped]))
+    except ConvergenceError as error:
+        assert error.dataset.sizes["step"] == 0
+    else:
+        assert float(run.contact_area_fraction[0]) == pytest.approx(0.9 * jumped, rel=1e-9)
+
+
+def test_the_path_starts_where_the_first_asperity_makes_contact(surface):
+    contact = contact_of(surface, ADHESIVE)
+    first = np.max(contact.asperities.height - contact.law.jump_in_approach(contact.asperities.radius))
+    assert untouched(contact).separation == pytest.approx(first, rel=1e-14)
+    run = simulate(surface, ADHESIVE, Path(mean_separations=[first * (1 + 1e-6), first * (1 - 1e-6)]))
+    assert run.spot_count.values.tolist() == [0, 1]
+
+
+def test_no_step_is_longer_than_asked(surface, monkeypatch):
+    import icha.path.path
+
+    seen = []
+    original = icha.path.path.equilibrium
+
+    def spy(contact, state, *arguments):
+        reached = original(contact, state, *arguments)
+        seen.append((state.separation - reached.separation) / contact.rms_height)
+        return reached
+
+    monkeypatch.setattr(icha.path.path, "equilibrium", spy)
+    contact = contact_of(surface, BARE)
+    for _ in follow(contact, Path(reduced_pressures=[1e-2], max_step=0.07), MODULUS):
+        pass
+    assert 0.069 < max(seen) <= 0.07 * (1 + 1e-9)
+
+
+def test_steps_that_fail_are_halved_and_then_given_up(surface, monkeypatch):
+    import icha.path.path
+
+    contact = contact_of(surface, BARE)
+    limit = 1.5 * contact.rms_height
+    widths = []
+    original = icha.path.path.equilibrium
+
+    def failing(contact, state, separation, control=None):
+        if separation < limit:
+            if control is None:
+                widths.append(state.separation - separation)
+            raise NotConverged("on purpose")
+        return original(contact, state, separation, control)
+
+    monkeypatch.setattr(icha.path.path, "equilibrium", failing)
+    stops = follow(contact, Path(reduced_pressures=[1e-3, 1e-1]), MODULUS * surface.rms_slope)
+    assert next(stops).target.value == 1e-3
+    with pytest.raises(NotConverged, match=r"after 1 of 2 stops: on purpose"):
+        next(stops)
+    assert min(widths) < 1e-4 * max(widths)
+
+
+def test_progress_tells_every_stop(surface):
+    lines = []
+    simulate(surface, BARE, Path(reduced_pressures=[1e-3, 1e-2]), progress=lines.append)
+    assert [line.split(":")[0] for line in lines] == ["stop 1 of 2", "stop 2 of 2"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "exactly one"),
+        ({"reduced_pressures": [0.1], "area_fractions": [0.1]}, "reduced_pressures, area_fractions"),
+        ({"reduced_pressures": []}, "reduced_pressures: the list is empty"),
+        ({"area_fractions": []}, "area_fractions"),
+        ({"reduced_pressures": 0.1}, "reduced_pressures"),
+        ({"reduced_pressures": [1e-2, 1e-3]}, r"reduced_pressures\[1\].*increasing"),
+        ({"reduced_pressures": [1e-3, 1e-3]}, r"reduced_pressures\[1\]"),
+        ({"mean_separations": [1e-6, 2e-6]}, r"mean_separations\[1\].*decreasing"),
+        ({"mean_separations": [-1e-6]}, r"mean_separations\[0\]"),
+        ({"reduced_pressures": [0.0]}, r"reduced_pressures\[0\]"),
+        ({"reduced_pressures": [-0.1]}, r"reduced_pressures\[0\]"),
+        ({"reduced_pressures": [float("nan")]}, r"reduced_pressures\[0\]"),
+        ({"reduced_pressures": ["0.1"]}, r"reduced_pressures\[0\]"),
+        ({"reduced_pressures": [MAX_REDUCED_PRESSURE * 1.001]}, r"reduced_pressures\[0\].*beyond"),
+        ({"area_fractions": [0.1, MAX_AREA_FRACTION * 1.001]}, r"area_fractions\[1\].*beyond"),
+        ({"reduced_pressures": [0.1], "unload": 1}, "unload: 1 is neither True nor False"),
+        ({"reduced_pressures": [0.1], "unload": "yes"}, "unload: 'yes' is neither"),
+        ({"reduced_pressures": [0.1], "max_step": 0.0}, "max_step"),
+        ({"reduced_pressures": [0.1], "max_step": 0.51}, "max_step"),
+        ({"reduced_pressures": [0.1], "max_step": None}, "max_step"),
+        ({"reduced_pressures": [0.1], "snapshots": [("pressure", 0.1)]}, r"snapshots\[0\].*kind"),
+        ({"reduced_pressures": [0.1], "snapshots": 0.1}, "snapshots: 0.1 is not a list"),
+        ({"reduced_pressures": [0.1], "snapshots": [0.1]}, r"snapshots\[0\]"),
+        ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", -0.1)]}, r"snapshots\[0\]"),
+        ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.9)]}, r"snapshots\[0\].*beyond"),
+        ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.1)] * 2}, r"snapshots\[1\].*twice"),
+    ],
+)
+def test_bad_paths_are_refused_by_name(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Path(**arguments)
+
+
+def test_the_way_to_first_contact_costs_nothing(surface):
+    """A stop a metre up is met, without a step for every tenth of h_rms on the way down."""
+    path = Path(mean_separations=[1.0, 1.5 * surface.rms_height], snapshots=[])
+    stops = [(w.target, w.state) for w in follow(contact_of(surface, BARE), path, MODULUS)]
+    assert [len(state.spots) > 0 for _, state in stops] == [False, True]
+    reached = [state.separation for _, state in stops]
+    assert reached == pytest.approx([1.0, 1.5 * surface.rms_height], rel=1e-12)
+
+
+def test_a_snapshot_before_first_contact_is_all_gap(surface):
+    high = 8 * surface.rms_height
+    path = Path(reduced_pressures=[1e-3], snapshots=[("mean_separation", high)])
+    run = simulate(surface, ADHESIVE, path)
+    assert float(run.contact_area_fraction[0]) == 0 and run.sizes["spot"] == 0
+    assert float((run.gap_density * np.diff(run.gap_bin_edges)).sum()) == pytest.approx(1, abs=1e-12)
+    assert all(check.passed for check in check_run(run))
+    with pytest.raises(ValueError, match=r"path: a snapshot at a mean separation of 1\.0 m"):
+        simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-3], snapshots=[("mean_separation", 1.0)]))
+
+
+def egg_box(waves=4, grid=64):
+    """Equal summits, all of which jump into contact at once."""
+    x = 2 * np.pi * waves * np.arange(grid) / grid
+    return Surface(heights=1e-6 * (np.cos(x)[None, :] + np.cos(x)[:, None]), period=PERIOD)
+
+
+def test_stops_inside_a_jump_are_left_out_and_the_others_kept():
+    surface = egg_box()
+    first_contact = untouched(contact_of(surface, ADHESIVE)).separation
+    jumped = simulate(surface, ADHESIVE, Path(mean_separations=[first_contact * (1 - 1e-9)]))
+    first = float(jumped.contact_area_fraction[0])
+    assert first > 5e-3
+    with pytest.raises(ConvergenceError, match="after 2 of 4 stops") as caught:
+        simulate(surface, ADHESIVE, Path(area_fractions=[0.2 * first, 0.4 * first, 0.05, 0.1]))
+    message, run = str(caught.value), caught.value.dataset
+    assert message.count("lies inside a jump") == 2 and f"jumps from 0 to {first:.3g}"[:24] in message
+    assert "sticky" not in message
+    np.testing.assert_allclose(run.contact_area_fraction, [0.05, 0.1], rtol=1e-9)
+    kept = simulate(surface, ADHESIVE, Path(area_fractions=[0.05, 0.1]))
+    np.testing.assert_allclose(run.mean_separation, kept.mean_separation, rtol=1e-6)
+
+
+def test_no_stop_beyond_the_covered_area_is_handed_out(surface):
+    with pytest.raises(
+        ConvergenceError, match=r"runs to 0\.\d\d of the nominal one, beyond what the model covers"
+    ) as caught:
+        simulate(surface, Material(MODULUS, 0.3, 2.071e-9), Path(mean_separations=[surface.rms_height, 1e-12]))
+    assert caught.value.dataset.sizes["step"] == 1
+
+
+def test_hardly_any_load_is_met_beside_a_large_attraction(surface):
+    # The attraction is a million times the load that is asked for.
+    run = simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-12, 1e-10]))
+    gross = ADHESIVE.surface_energy / float(surface.rms_height) * 1e-3
+    pressure = run.nominal_pressure.values
+    unit = MODULUS * surface.rms_slope
+    assert np.all(np.abs(pressure - np.array([1e-12, 1e-10]) * unit) < 1e-9 * gross)

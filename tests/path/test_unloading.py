@@ -1,0 +1,442 @@
+"""The way back from contact: the stable JKR branch of every spot, its jumps, turning points, and what is refused.
+
+Asperities of radius 1 in units in which modulus and surface energy are 1 as well; in a cell so large that its images
+do not matter, unless the test says so.
+"""
+
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from half_space import displacement_by_quadrature, jkr_approach, jkr_force, periodic_point_load
+from scipy.integrate import quad
+from scipy.optimize import brentq, minimize_scalar
+
+import icha
+from icha import Material, Path
+from icha.asperity.jkr import JKR
+from icha.equilibrium.equilibrium import (
+    COALESCENCE,
+    JUMP_IN,
+    JUMP_OFF,
+    SPLIT,
+    Contact,
+    Events,
+    NotConverged,
+    area_fraction,
+    mean_pressure,
+)
+from icha.path.path import LOAD_CONTROL, MAX_REDUCED_PRESSURE, follow
+from icha.references.one_asperity import paraboloid
+from icha.surfaces.summits import Asperities, find_summits
+
+FAR = 1e8
+TABOR = 2.5
+STICKY, BARE = Material(1.0, 1.0, 1 / TABOR), Material(1.0, 0.0, 1 / TABOR)
+HEIGHT, RMS_HEIGHT = 100.0, 10.0
+# The law of one asperity in these units; its jump-off radius, pull-off force and their approaches.
+JUMP_OFF_RADIUS, PULL_OFF_RADIUS, NO_LOAD_RADIUS = (np.cbrt(part * np.pi) for part in (1 / 8, 9 / 8, 9 / 2))
+
+
+def force(a, R=1.0):
+    return jkr_force(a, R, 1.0, 1.0)
+
+
+def approach(a, R=1.0):
+    return jkr_approach(a, R, 1.0, 1.0)
+
+
+JUMP_OFF_APPROACH, PULL_OFF_APPROACH = approach(JUMP_OFF_RADIUS), approach(PULL_OFF_RADIUS)
+WU = (1 - 2.641 * TABOR ** (3 / 7)) / TABOR
+
+
+def energy(a, R=1.0):
+    """Work that makes a spot: the integral of F d(delta) along its curve, from a = 0."""
+    return quad(lambda s: force(s, R) * (2 * s / R - np.sqrt(np.pi / (2 * s))), 0, a, epsabs=0, epsrel=1e-12)[0]
+
+
+def stable_radius(d):
+    return brentq(lambda a: approach(a) - d, JUMP_OFF_RADIUS, 50)
+
+
+def contact_of(heights, positions=((0.5, 0.5),), radii=None, *, period=FAR, material=STICKY, until="detachment"):
+    """Asperities of given heights and places, measured from the middle of the cell if it is not one alone."""
+    heights = np.array(heights, float)
+    positions = np.array(positions, float) + period / 2
+    radii = np.ones(len(heights)) if radii is None else np.array(radii, float)
+    return Contact(JKR(material), Asperities(positions, heights, radii, period), RMS_HEIGHT, until)
+
+
+def travelled(contact, stops, **settings):
+    """All waypoints of a path; reduced pressures are loads over 1000."""
+    return list(follow(contact, Path(stops, **settings), 1e3 / contact.area))
+
+
+def load(contact, waypoint):
+    return mean_pressure(contact, waypoint.state.spots) * contact.area
+
+
+def history(waypoints):
+    return Events.joined(waypoints[-1].state.history)
+
+
+def closed_again(waypoints):
+    """The last waypoint: nothing touches any more."""
+    assert not len(waypoints[-1].state.spots)
+    return waypoints[-1].state
+
+
+@cache
+def alone(control="separation"):
+    contact = contact_of([HEIGHT])
+    return contact, travelled(contact, [0.01], unload=True, control=control)
+
+
+# --- one asperity -------------------------------------------------------------------------------------------
+
+
+def test_one_asperity_is_on_its_stable_branch_from_jump_in_to_jump_off():
+    assert pytest.approx([JUMP_OFF_APPROACH, PULL_OFF_APPROACH], abs=1e-6) == [-1.608772, -0.773417]
+    contact, waypoints = alone()
+    for leg, first, last in ((0, WU, None), (1, None, JUMP_OFF_APPROACH)):
+        touching = [w.state for w in waypoints if w.leg == leg and len(w.state.spots)]
+        d = HEIGHT - np.array([state.separation for state in touching])
+        a = np.array([state.spots.contact_radius[0] for state in touching])
+        assert np.all(a >= JUMP_OFF_RADIUS)
+        np.testing.assert_allclose(approach(a), d, atol=1e-6)
+        forces = [mean_pressure(contact, state.spots) * contact.area for state in touching]
+        np.testing.assert_allclose(forces, force(a), rtol=1e-10, atol=1e-10)
+        assert np.all(np.diff(d) * (1 if leg == 0 else -1) > 0)
+        if first:
+            assert d[0] == pytest.approx(first, abs=1e-9)
+        if last:
+            assert d[-1] == pytest.approx(last, abs=1e-6)
+            assert forces[-1] == pytest.approx(-5 / 6 * np.pi, rel=1e-4)
+
+
+def test_before_jump_in_and_after_jump_off_there_is_nothing():
+    _, waypoints = alone()
+    for w in waypoints:
+        d = HEIGHT - w.state.separation
+        assert len(w.state.spots) == (d > (WU if w.leg == 0 else JUMP_OFF_APPROACH) + 1e-6) or (
+            abs(d - (WU if w.leg == 0 else JUMP_OFF_APPROACH)) < 2e-6
+        )
+    assert closed_again(waypoints).jump_offs == waypoints[-1].state.jump_ins == 1
+
+
+def test_the_largest_tension_of_one_asperity_is_found():
+    contact, waypoints = alone()
+    weakest = min((w for w in waypoints if w.leg == 1), key=lambda w: load(contact, w))
+    assert load(contact, weakest) == pytest.approx(-1.5 * np.pi, rel=1e-7)
+    assert HEIGHT - weakest.state.separation == pytest.approx(PULL_OFF_APPROACH, abs=1e-3)
+
+
+def test_a_load_falls_on_no_load_and_breaks_contact_at_the_largest_tension():
+    contact, waypoints = alone(LOAD_CONTROL)
+    touching = [w for w in waypoints if len(w.state.spots)]
+    assert load(contact, touching[0]) == pytest.approx(0.0, abs=1e-8)
+    assert touching[0].state.spots.contact_radius[0] == pytest.approx(NO_LOAD_RADIUS, rel=1e-8)
+    assert load(contact, touching[-1]) == pytest.approx(-1.5 * np.pi, rel=1e-7)
+    assert touching[-1].state.spots.contact_radius[0] == pytest.approx(PULL_OFF_RADIUS, rel=1e-3)
+    closed_again(waypoints)
+    for leg in (0, 1):
+        assert np.all(
+            np.diff([load(contact, w) for w in waypoints if w.leg == leg][: -1 if leg else None])
+            * (1 if leg == 0 else -1)
+            >= -1e-12
+        )
+
+
+def test_a_bump_in_a_cell_has_the_law_and_its_images():
+    """The images, and the counter-pressure, lower the surface under the spot by -3.9003 F/(pi E* L)."""
+    period = 24.0
+    surface = paraboloid(48, period)
+    top = float(surface.heights.max())
+    run = icha.simulate(surface, STICKY, Path([1e-3], unload=True))
+    raised = periodic_point_load(0.0, 0.0) / (np.pi * period)
+    assert raised * np.pi * period == pytest.approx(-3.9003, abs=1e-4)
+    lowest, most = JUMP_OFF_APPROACH + raised * force(JUMP_OFF_RADIUS), -1.5 * np.pi
+    assert top - float(run.detachment_separation) == pytest.approx(lowest, abs=1e-3)
+    assert lowest - JUMP_OFF_APPROACH > 0.1  # the images are seen
+    assert float(run.detachment_pressure) * period**2 == pytest.approx(-5 / 6 * np.pi, rel=1e-4)
+    assert float(run.pull_off_pressure) * period**2 == pytest.approx(-most, rel=1e-6)
+    assert float(run.pull_off_over_summits) == pytest.approx(1.0, rel=1e-5)
+    there = approach(PULL_OFF_RADIUS) + raised * most
+    assert top - float(run.pull_off_separation) == pytest.approx(there, abs=2e-3)
+    start = brentq(lambda a: approach(a) + raised * force(a) - WU, JUMP_OFF_RADIUS, 4)
+    stored = [energy(a) + 0.5 * raised * force(a) ** 2 for a in (JUMP_OFF_RADIUS, start)]
+    assert float(run.hysteresis_loss) * period**2 == pytest.approx(stored[0] - stored[1], rel=1e-3)
+    # Two snapshots: the last stop, and the largest tension.
+    assert run.snapshot_kind.values.tolist() == ["reduced_pressure", "pull_off"]
+    assert int(run.snapshot_step[1]) == int(np.argmin(run.nominal_pressure.values))
+
+
+# --- several that lose their equilibrium together -----------------------------------------------------------
+
+
+def limit_point(displacement):
+    """Largest radius-dependent separation above the summit of equal asperities, and the radius there."""
+    found = minimize_scalar(lambda a: approach(a) + displacement(a), bounds=(0.4, 2), method="bounded")
+    return -found.fun, found.x
+
+
+def beside(distance, a):
+    return displacement_by_quadrature(distance, a, 1.0, 1.0, 1.0)
+
+
+@cache
+def equal_pair():
+    contact = contact_of([HEIGHT, HEIGHT], [[-4, 0], [4, 0]])
+    return contact, travelled(contact, [0.005], unload=True)
+
+
+def test_two_equal_asperities_let_go_at_their_common_limit_point():
+    """It comes before the jump-off of either: every spot pulls the surface away from the other."""
+    _, waypoints = equal_pair()
+    above, radius = limit_point(lambda a: beside(8.0, a))
+    touching = [w.state for w in waypoints if len(w.state.spots)]
+    assert touching[-1].separation - HEIGHT == pytest.approx(above, abs=2e-5)
+    assert touching[-1].separation - HEIGHT < above + 1e-9
+    np.testing.assert_allclose(touching[-1].spots.contact_radius, radius, rtol=1e-3)
+    assert radius > 1.05 * JUMP_OFF_RADIUS
+    end = closed_again(waypoints)
+    assert (end.jump_ins, end.jump_offs, end.coalescences, end.splits) == (2, 2, 0, 0)
+    events = history(waypoints)
+    np.testing.assert_allclose(np.sort(events.position[events.kind == JUMP_OFF, 0]), FAR / 2 + np.array([-4, 4]))
+
+
+def test_four_equal_asperities_let_go_at_their_common_limit_point():
+    side = 12.0
+    contact = contact_of([HEIGHT] * 4, [[0, 0], [side, 0], [0, side], [side, side]])
+    waypoints = travelled(contact, [0.005], unload=True)
+    above, _ = limit_point(lambda a: 2 * beside(side, a) + beside(np.sqrt(2) * side, a))
+    last = [w.state for w in waypoints if len(w.state.spots)][-1]
+    assert len(last.spots) == 4
+    assert last.separation - HEIGHT == pytest.approx(above, abs=2e-5)
+    assert closed_again(waypoints).jump_offs == 4
+
+
+# --- turning points -----------------------------------------------------------------------------------------
+
+
+def some(until="detachment"):
+    """Three asperities that feel each other and their images."""
+    return contact_of([HEIGHT, HEIGHT - 1.5, HEIGHT - 3.1], [[-9, 0], [8, 3], [1, -11]], period=60.0, until=until)
+
+
+def value_of(kind, contact, waypoint):
+    if kind == "mean_separation":
+        return waypoint.state.separation
+    if kind == "area_fraction":
+        return area_fraction(contact, waypoint.state.spots)
+    return mean_pressure(contact, waypoint.state.spots) * (contact.area / 1e3 if kind == "reduced_pressure" else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "back", "forth", "control"),
+    [
+        ("reduced_pressure", 0.0, 0.012, "separation"),
+        ("reduced_pressure", -0.002, 0.004, "load"),
+        ("relative_load", -0.003 * 1e3 / 3600, 5.0 / 3600, "separation"),
+        ("area_fraction", 0.002, 0.006, "separation"),
+        ("mean_separation", HEIGHT - 0.5, HEIGHT - 3.0, "separation"),
+    ],
+)
+def test_turning_points_are_hit_exactly(kind, back, forth, control):
+    contact = some()
+    turns = [(kind, back), (kind, forth)]
+    waypoints = travelled(contact, [0.01], unload=True, turning_points=turns, control=control)
+    legs = np.array([w.leg for w in waypoints])
+    assert np.all(np.diff(legs) >= 0) and set(legs) == {0, 1, 2, 3}
+    for leg, value in ((1, back), (2, forth)):
+        turn = waypoints[np.flatnonzero(legs == leg)[-1]]
+        assert (turn.target.kind, turn.target.value) == (kind, value)
+        scale = max(abs(value), 1e-3)
+        assert value_of(kind, contact, turn) == pytest.approx(value, abs=1e-8 * scale)
+    assert [w.loading for w in waypoints] == [leg in (0, 2) for leg in legs]
+    u = np.array([w.state.separation for w in waypoints])
+    for leg in range(4):
+        assert np.all(np.diff(u[legs == leg]) * (-1 if leg in (0, 2) else 1) > 0)
+    closed_again(waypoints)
+
+
+def test_inside_a_loop_without_events_the_way_is_the_same_and_costs_nothing():
+    contact = some()
+    waypoints = travelled(contact, [0.01], turning_points=[("reduced_pressure", -0.002), ("reduced_pressure", 0.01)])
+    there, back, again = ([w for w in waypoints if w.leg == leg] for leg in range(3))
+    assert there[-1].state.jump_offs == again[-1].state.jump_offs == 0
+    assert there[-1].state.jump_ins == again[-1].state.jump_ins == 3
+    assert again[-1].state.separation == pytest.approx(there[-1].state.separation, rel=1e-9)
+    assert abs(again[-1].balance.work - there[-1].balance.work) < 1e-6 * abs(there[-1].balance.work)
+    # All separations of the way back but that of its end, which is the turning point, are met again.
+    met = {round(w.state.separation, 7): load(contact, w) for w in again}
+    common = [w for w in back if round(w.state.separation, 7) in met]
+    assert len(common) >= 5
+    for w in common:
+        assert met[round(w.state.separation, 7)] == pytest.approx(load(contact, w), abs=1e-6)
+
+
+def test_loading_again_goes_on_beyond_the_old_maximum():
+    contact = contact_of([HEIGHT])
+    turns = [("reduced_pressure", -0.003), ("reduced_pressure", 0.03)]
+    waypoints = travelled(contact, [0.01], turning_points=turns)
+    a = waypoints[-1].state.spots.contact_radius[0]
+    assert waypoints[-1].leg == 2 and not any(w.leg > 2 for w in waypoints)
+    assert force(a) == pytest.approx(30.0, rel=1e-8)
+    assert approach(a) == pytest.approx(HEIGHT - waypoints[-1].state.separation, abs=1e-6)
+    once = travelled(contact, [0.03], unload=True)
+    last = [w for w in once if w.leg == 0][-1]
+    assert last.state.separation == pytest.approx(waypoints[-1].state.separation, abs=1e-7)
+    assert last.balance.work == pytest.approx(waypoints[-1].balance.work, rel=1e-4)
+
+
+# --- united spots -------------------------------------------------------------------------------------------
+
+
+def pair(lower, distance, until, material=STICKY):
+    return contact_of([HEIGHT, HEIGHT - lower], [[-distance / 2, 0], [distance / 2, 0]], until=until, material=material)
+
+
+def test_when_a_united_spot_lets_go_the_taller_asperity_stays_on_its_branch():
+    contact = pair(3.0, 4.0, "detachment")
+    waypoints = travelled(contact, [0.03], unload=True)
+    members = [w.state.spots.members.tolist() for w in waypoints if w.leg == 1]
+    assert members[0] == [2] and [1] in members and [1, 1] not in members
+    after = [w.state for w in waypoints if w.leg == 1 and w.state.spots.members.tolist() == [1]]
+    for state in after:
+        d = HEIGHT - state.separation
+        assert d > JUMP_OFF_APPROACH - 1e-7
+        d = max(d, JUMP_OFF_APPROACH)
+        np.testing.assert_allclose(state.spots.contact_radius, stable_radius(d), rtol=1e-3)
+        np.testing.assert_allclose(state.spots.position, [[FAR / 2 - 2, FAR / 2]])
+    assert HEIGHT - after[-1].separation == pytest.approx(JUMP_OFF_APPROACH, abs=1e-5)
+    end = closed_again(waypoints)
+    assert (end.coalescences, end.splits, end.jump_ins, end.jump_offs) == (1, 1, 2, 2)
+    events = history(waypoints)
+    assert events.kind[-3:].tolist() == [JUMP_OFF, SPLIT, JUMP_OFF]
+    assert events.members[-3:].tolist() == [2, 2, 1]
+
+
+def test_an_overlap_parts_where_it_began():
+    """The two spots that a union was made of come apart about where they met, and break one after the other."""
+    waypoints = travelled(pair(3.0, 6.0, "overlap"), [0.04], unload=True)
+    end = closed_again(waypoints)
+    assert (end.coalescences, end.splits, end.jump_offs) == (1, 1, 2)
+
+    def change(leg, before, after):
+        way = [w.state for w in waypoints if w.leg == leg]
+        return next(
+            two.separation
+            for one, two in pairwise(way)
+            if one.spots.members.tolist() == before and two.spots.members.tolist() == after
+        )
+
+    united, parted = change(0, [1, 1], [2]), change(1, [2], [1, 1])
+    assert parted == pytest.approx(united, abs=0.02)
+    assert HEIGHT - [w.state for w in waypoints if len(w.state.spots)][-1].separation == pytest.approx(
+        JUMP_OFF_APPROACH, abs=1e-5
+    )
+
+
+# --- dataset and arguments ----------------------------------------------------------------------------------
+
+
+@cache
+def united_run():
+    """A small sticky surface on which two spots unite, pressed and pulled off."""
+    return icha.simulate(*small(), Path([5e-2], unload=True))
+
+
+def small():
+    spectrum = icha.SelfAffineSpectrum(100e-6, 50e-6, 20e-6, 0.8, rms_slope=0.2)
+    return spectrum.realise(32, 1), Material(0.24e6, 2e-3, 2e-9)
+
+
+def test_the_log_of_events_agrees_with_the_counts():
+    run = united_run()
+    assert int(run.coalescence_count[-1]) > 0 and int(run.split_count[-1]) > 0
+    assert run.event_kind.attrs["flag_meanings"].split() == ["jump_in", "jump_off", "coalescence", "split"]
+    counts = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
+    for kind, name in zip((JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT), counts, strict=True):
+        logged = np.bincount(run.event_step[run.event_kind == kind], minlength=run.sizes["step"])
+        np.testing.assert_array_equal(np.cumsum(logged), run[name])
+    assert np.all(np.diff(run.event_step) >= 0)
+    np.testing.assert_array_equal(run.event_separation, run.mean_separation[run.event_step.values])
+
+
+def test_single_asperities_jump_in_where_they_are():
+    run, (surface, _) = united_run(), small()
+    summits = find_summits(surface).position
+    inward = run.event_kind.values == JUMP_IN
+    where = np.stack([run.event_x.values, run.event_y.values], axis=1)[inward]
+    assert np.all(run.event_members.values[inward] == 1)
+    nearest = np.min(np.linalg.norm(where[:, None] - summits, axis=2), axis=1)
+    assert len(where) and np.all(nearest < 1e-12)
+    assert len(np.unique(where, axis=0)) == len(where)  # nobody twice, on one way in
+
+
+def test_a_run_is_the_same_to_the_last_bit():
+    surface, material = paraboloid(32, 16.0), STICKY
+    path = Path([1e-3], unload=True, turning_points=[("reduced_pressure", 0.0), ("reduced_pressure", 2e-3)])
+    one, other = (icha.simulate(surface, material, path) for _ in range(2))
+    assert one.identical(other)
+    for name in one.variables:
+        if one[name].dtype.kind in "fi":
+            assert one[name].values.tobytes() == other[name].values.tobytes(), name
+
+
+def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
+    surface = paraboloid(32, 16.0)
+    beyond = 1.01 * MAX_REDUCED_PRESSURE * float(surface.rms_slope)
+    path = Path([1e-3], turning_points=[("reduced_pressure", 0.0), ("relative_load", beyond)])
+    with pytest.raises(ValueError, match=r"^path: relative_load = .*beyond what the model covers"):
+        icha.simulate(surface, STICKY, path)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"control": "force", "unload": True}, "^control: 'force' must be one of separation, load"),
+        ({"control": None}, "^control: None"),
+        ({"control": "load"}, "^control: 'load'"),
+        ({"united_until": "x"}, "^united_until: 'x' must be one of detachment, overlap"),
+        ({"turning_points": 0.1}, "^turning_points: 0.1 is not a list"),
+        ({"turning_points": [0.1]}, r"^turning_points\[0\]: 0.1 is not a pair"),
+        ({"turning_points": [("pressure", 0.01)]}, r"^turning_points\[0\]: kind 'pressure' must be one of"),
+        ({"turning_points": [("reduced_pressure", 0.11)]}, r"^turning_points\[0\]: 0.11 .*0\.1"),
+        ({"turning_points": [("reduced_pressure", 0.1)]}, r"^turning_points\[0\]: 0.1 .*0\.1"),
+        ({"turning_points": [("reduced_pressure", 0.05), ("reduced_pressure", 0.04)]}, r"^turning_points\[1\]: 0.04"),
+        ({"turning_points": [("reduced_pressure", float("nan"))]}, r"^turning_points\[0\]: nan is not finite"),
+        ({"turning_points": [("reduced_pressure", -0.01), ("reduced_pressure", -0.001)]}, r"^turning_points\[1\]"),
+        ({"turning_points": [("area_fraction", 0.0)]}, r"^turning_points\[0\]: 0.0"),
+        ({"turning_points": [("mean_separation", -1e-6)]}, r"^turning_points\[0\]: -1e-06"),
+        ({"turning_points": [("area_fraction", 0.05)], "control": "load"}, "^control: 'load'.*area_fraction = 0.05"),
+        ({"snapshots": [("area_fraction", 0.05)], "control": "load", "unload": True}, "^control: 'load'"),
+    ],
+)
+def test_wrong_ways_back_are_refused_by_name(settings, message):
+    with pytest.raises(ValueError, match=message):
+        Path([0.1], **settings)
+
+
+def test_an_edge_of_contact_within_the_accuracy_of_the_solver_is_passed():
+    """A sticky bump, as wide as a quarter of the cell, is drawn off; near the end no step is too short to go on."""
+    n, period = 64, 100e-6
+    x = (np.arange(n) + 0.5) * period / n - period / 2
+    heights = 1e-6 * np.exp(-(x[:, None] ** 2 + x**2) / (2 * (10e-6) ** 2))
+    surface = icha.Surface(heights=heights, period=period)
+    sticky = icha.Material(contact_modulus=0.24e6, surface_energy=0.05, interaction_range=2e-9)
+    run = icha.simulate(surface, sticky, icha.Path(mean_separations=[5e-7, 2e-7], unload=True))
+    assert run.sizes["step"] < 400
+    (radius,) = find_summits(surface).radius
+    most = 1.5 * np.pi * 0.05 * radius / period**2
+    assert float(run.pull_off_pressure) == pytest.approx(most, rel=1e-6)
+    assert float(run.detachment_pressure) == pytest.approx(-5 / 9 * most, rel=1e-3)
+
+
+def test_a_tension_that_is_never_reached_is_said_to_be_so():
+    contact = contact_of([HEIGHT], [(0, 0)])
+    path = Path(reduced_pressures=[0.005], turning_points=[("reduced_pressure", -0.1)])
+    with pytest.raises(NotConverged, match=r"apart before the turning point reduced_pressure = -0.1; the largest"):
+        list(follow(contact, path, 1e3 / FAR**2))

@@ -1,0 +1,342 @@
+"""Boundary elements against exact solutions; ICHA against boundary elements where the two must agree: on one bump."""
+
+import hashlib
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import icha
+from icha.asperity.cohesive_zone import longest_spacing, strength_number
+from icha.asperity.material import Material
+from icha.references.boundary_elements import (
+    LOAD_TOLERANCE,
+    NotSolved,
+    boundary_elements,
+    contact_state,
+    perimeter_correction,
+    states_at_mean_separations,
+)
+from icha.references.one_asperity import hertz_asperity, one_asperity, paraboloid
+from icha.surfaces.summits import find_summits
+from icha.surfaces.surface import Surface
+
+ROUGH = icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=40e-6, short_wavelength=100e-6 / 7, hurst=0.8)
+MATERIALS = {"hertz": Material(25e6, 0.0, 1e-9), "adhesive": Material(25e6, 0.05, 0.2e-6)}
+HERTZ = MATERIALS["hertz"]
+PRESSURE = 1e-2
+
+
+def displacement(state, contact_modulus):
+    """Displacement (m), of zero mean, by a state's traction: 2/(E* q) mode by mode."""
+    n = len(state.traction)
+    k = 2 * np.pi / state.surface.period
+    q = k * np.hypot(np.fft.fftfreq(n, 1 / n)[:, None], np.fft.rfftfreq(n, 1 / n))
+    q[0, 0] = np.inf
+    return np.fft.irfft2(2 / (contact_modulus * q) * np.fft.rfft2(state.traction), s=(n, n))
+
+
+# --- one bump: the model and the boundary elements have to agree -------------------------------------------------
+
+
+def test_the_bump_is_one_asperity_of_radius_one():
+    summits = find_summits(paraboloid(128, 10.0))
+    assert len(summits) == 1
+    assert summits.radius == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def hertzian():
+    return hertz_asperity(contact_radii=[1.0, 0.5], period=16.0, grid=512)
+
+
+@pytest.mark.parametrize("name", ["zero_gap_area_error", "force_error"])
+def test_hertzian_bump_agrees_within_one_percent_at_a_given_approach(hertzian, name):
+    np.testing.assert_allclose(hertzian[name], 0, atol=0.01)
+
+
+@pytest.mark.parametrize("name", ["zero_gap_area_error_at_load", "approach_error_at_load"])
+def test_hertzian_bump_agrees_within_one_percent_at_a_given_load(hertzian, name):
+    np.testing.assert_allclose(hertzian[name], 0, atol=0.01)
+    assert hertzian.sizes["given_load"] == 2
+
+
+@pytest.fixture(scope="module")
+def adhesive():
+    """A bump with adhesion in compression, in tension and where it is pulled off, on as few nodes as resolve it.
+
+    The area is compared with the energetic one, which JKR's is the limit of: the cohesive zone, a few per cent of the
+    radius, is no part of the area of zero gap. Approach and load change sign on the way: their errors are those of
+    JKR's own length, and of the load or the pull-off force, whichever is larger.
+    """
+    return one_asperity(3.5, approaches=[3.0, 1.5], period=10.0)
+
+
+@pytest.mark.parametrize("name", ["energetic_area_error", "force_error"])
+def test_jkr_bump_agrees_within_three_percent_at_a_given_approach(adhesive, name):
+    np.testing.assert_allclose(adhesive[name], 0, atol=0.03)
+
+
+@pytest.mark.parametrize("name", ["energetic_area_error_at_load", "approach_error_at_load"])
+def test_jkr_bump_agrees_within_three_percent_at_a_given_load(adhesive, name):
+    np.testing.assert_allclose(adhesive[name], 0, atol=0.03)
+    assert adhesive.given_load[0] > 0 > adhesive.given_load[1]
+
+
+def test_jkr_pull_off_force_agrees_within_three_percent(adhesive):
+    """The largest tension on the way up, against JKR's 3/2 pi dgamma R."""
+    assert max(-adhesive.force_boundary_elements) == pytest.approx(1.5 * np.pi, rel=0.03)
+
+
+def test_area_of_zero_gap_agrees_within_three_percent_where_the_cohesive_zone_is_narrow():
+    """It needs a larger Tabor parameter than all else, and a grid to resolve it; this state bears next to no load."""
+    narrow = one_asperity(5.0, approaches=(2.0,), pull_off=False)
+    for name in ("zero_gap_area_error", "zero_gap_area_error_at_load", "energetic_area_error", "force_error"):
+        np.testing.assert_allclose(narrow[name], 0, atol=0.03)
+
+
+def test_jkr_contact_lies_between_the_zero_gap_and_the_energetic_area(adhesive):
+    """In tension, where next to nothing comes from the neighbouring cells."""
+    tension = adhesive.isel(approach=slice(1, None))
+    assert np.all(tension.force_boundary_elements < 0) and tension.sizes["approach"] == 2
+    assert np.all(tension.zero_gap_area < tension.area_icha)
+    assert np.all(tension.area_icha < tension.energetic_area)
+
+
+# --- exact solutions ---------------------------------------------------------------------------------------------
+
+
+def wavy(grid, dimensions):
+    """cos(x) on a cell of 2 pi, in one direction or in both, of amplitude 1/100 m."""
+    wave = np.cos(np.arange(grid) * 2 * np.pi / grid)
+    return Surface(0.01 * (wave[:, None] + wave if dimensions == 2 else np.tile(wave, (grid, 1))), 2 * np.pi)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_wavy_surface_is_westergaards(share):
+    """Strips of half-width a: p/p* = sin^2(pi a/lambda), p* = pi E* amplitude/lambda; peak 2 p/sin(pi a/lambda).
+
+    H. M. Westergaard, J. Appl. Mech. 6 (1939) A49.
+    """
+    surface = wavy(512, 1)
+    full = HERTZ.contact_modulus * 0.01 / 2
+    state = contact_state(surface, HERTZ, share * full / (HERTZ.contact_modulus * surface.rms_slope))
+    # Strips along the grid have no corners: their nodes are counted as they are, to one on each side.
+    assert state.contact.mean() == pytest.approx(2 / np.pi * np.arcsin(np.sqrt(share)), abs=2 / 512)
+    assert state.traction.max() == pytest.approx(2 * share * full / np.sqrt(share), rel=2e-3)
+
+
+def test_full_contact_is_johnsons():
+    """Full contact of cos(x) + cos(y) from sqrt(2)... on: pressure p - E* q/2 times the modes of the surface.
+
+    K. L. Johnson, J. A. Greenwood and J. G. Higginson, Int. J. Mech. Sci. 27 (1985) 383.
+    """
+    surface = wavy(64, 2)
+    flattening = HERTZ.contact_modulus / 2 * surface.heights
+    pressure = 1.1 * np.abs(flattening).max()
+    solution = boundary_elements(surface, HERTZ, pressure / (HERTZ.contact_modulus * surface.rms_slope))
+    state = contact_state(surface, HERTZ, pressure / (HERTZ.contact_modulus * surface.rms_slope))
+    assert solution.contact_area_fraction == solution.contact_area_fraction_raw == 1
+    np.testing.assert_allclose(state.traction, pressure + flattening, rtol=0, atol=1e-6 * pressure)
+
+
+def test_perimeter_correction_takes_the_excess_of_hertzian_areas_away():
+    """Of circles of 16 nodes in radius the nodes count 2 % too much, the corrected areas on average nothing."""
+    surface, hertz = paraboloid(256, 12.0, offset=0.37), Material(1.0, 0.0, 1.0)
+    raw, corrected = [], []
+    for radius in np.linspace(0.7, 0.8, 9):
+        reduced = 4 / 3 * radius**3 / surface.period**2 / surface.rms_slope
+        solution = boundary_elements(surface, hertz, reduced)
+        exact = np.pi * radius**2 / surface.period**2
+        raw.append(float(solution.contact_area_fraction_raw) / exact - 1)
+        corrected.append(float(solution.contact_area_fraction) / exact - 1)
+        edges = float(solution.contact_perimeter) / float(solution.spacing)
+        assert edges == pytest.approx(8 * radius / float(solution.spacing), rel=0.06)
+    assert np.mean(raw) > 0.01
+    assert abs(np.mean(corrected)) < 0.005
+
+
+def test_perimeter_of_a_square():
+    contact = np.zeros((16, 16), dtype=bool)
+    contact[14:, 3:7] = contact[:2, 3:7] = True  # across the border of the cell
+    assert perimeter_correction(contact)[1] == 16
+
+
+# --- the equations, checked by other means -----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module", params=["hertz", "adhesive"])
+def rough(request):
+    """A small rough surface with and without adhesion, one of its states, and the dataset of the same."""
+    surface, material = ROUGH.realise(grid=48, seed=3), MATERIALS[request.param]
+    state = contact_state(surface, material, PRESSURE, refinement=2)
+    return surface, material, state, boundary_elements(surface, material, PRESSURE, refinement=2, seed=3)
+
+
+def test_state_is_in_equilibrium(rough):
+    """Gap and traction belong together, and to the law of the interface, by Fourier transforms written down here."""
+    surface, material, state, _ = rough
+    unit = material.contact_modulus * surface.rms_slope
+    gap = displacement(state, material.contact_modulus) - state.surface.heights + state.mean_separation
+    np.testing.assert_allclose(gap, state.gap, rtol=0, atol=1e-5 * surface.rms_height)
+    assert np.all(state.gap > -1e-5 * surface.rms_height)
+    pull = material.surface_energy / material.interaction_range
+    outside = ~state.contact
+    attraction = -pull * np.exp(-state.gap[outside] / material.interaction_range)
+    np.testing.assert_allclose(state.traction[outside], attraction, rtol=0, atol=1e-5 * unit)
+    assert np.all(state.traction[state.contact] >= -pull - 1e-5 * unit)
+    assert np.all(state.gap[state.contact] < 1e-5 * surface.rms_height)
+
+
+def test_load_asked_for_is_reached_and_its_error_stored(rough):
+    surface, material, state, solution = rough
+    asked = PRESSURE * material.contact_modulus * surface.rms_slope
+    assert state.traction.mean() == pytest.approx(asked, rel=LOAD_TOLERANCE)
+    assert solution.load_error == pytest.approx(state.traction.mean() / asked - 1, abs=1e-12)
+    assert solution.target_reduced_pressure == PRESSURE
+    assert 0 < solution.residual <= solution.tolerance
+
+
+def test_identities_of_the_dataset(rough):
+    surface, material, state, solution = rough
+    raw = float(solution.contact_area_fraction_raw)
+    gaps = solution.gap_density.values * np.diff(solution.gap_bin_edges)
+    areas = solution.pressure_density.values * np.diff(solution.pressure_bin_edges)
+    assert gaps.sum() + raw == pytest.approx(1, rel=1e-12)
+    assert areas.sum() == pytest.approx(raw, rel=1e-12)
+    load = np.sum(areas * solution.pressure_bin_mean.values) + float(solution.outside_pressure)
+    assert load == pytest.approx(float(solution.nominal_pressure), rel=1e-9)
+    assert solution.contact.mean() == pytest.approx(raw, rel=1e-12)
+    assert solution.contact.shape == (96, 96)
+    assert solution.spacing == pytest.approx(surface.period / 96)
+    assert solution.mean_separation == pytest.approx(state.gap.mean())
+    attraction = np.exp(-state.gap / material.interaction_range) if material.surface_energy else state.contact
+    assert solution.energetic_area_fraction == pytest.approx(attraction.mean(), rel=1e-6)
+    assert (solution.outside_pressure < 0) == (material.surface_energy > 0)
+    assert all(np.all(np.isfinite(variable)) for variable in solution.data_vars.values())
+    assert all({"units", "long_name"} <= set(variable.attrs) for variable in solution.variables.values())
+    np.testing.assert_array_equal(solution.contact, state.contact)
+
+
+def test_refined_surface_keeps_its_nodes(rough):
+    surface, _, state, _ = rough
+    np.testing.assert_allclose(state.surface.heights[::2, ::2], surface.heights, atol=1e-12 * surface.rms_height)
+    assert state.surface.rms_slope == pytest.approx(surface.rms_slope, rel=1e-9)
+
+
+def test_energetic_area_is_the_derivative_of_the_energy():
+    """The work of approach from afar is the energy, whose derivative to dgamma is minus the energetic area.
+
+    Between two ranges of dgamma, at one mean gap: E = elastic energy - dgamma A0 mean(exp(-u/rho)).
+    """
+    surface, material = ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"]
+    separation = 1.5 * surface.rms_height
+
+    def energy(change):
+        softer = Material(material.contact_modulus, material.surface_energy * (1 + change), material.interaction_range)
+        (state,) = states_at_mean_separations(surface, softer, [separation])
+        elastic = 0.5 * np.mean(state.traction * displacement(state, softer.contact_modulus))
+        return elastic - softer.surface_energy * state.energetic_area_fraction(softer)
+
+    step = 0.02
+    slope = (energy(step) - energy(-step)) / (2 * step * material.surface_energy)
+    (state,) = states_at_mean_separations(surface, material, [separation])
+    assert slope == pytest.approx(-state.energetic_area_fraction(material), rel=1e-3)
+
+
+def test_up_and_down_are_the_same_at_a_range_that_the_grid_resolves():
+    surface, material = ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"]
+    gaps = np.array([2.2, 1.6, 1.2, 1.6, 2.2]) * surface.rms_height
+    pressure = [state.nominal_pressure for state in states_at_mean_separations(surface, material, gaps)]
+    unit = material.contact_modulus * surface.rms_slope
+    np.testing.assert_allclose(pressure[3:], pressure[1::-1], atol=1e-6 * unit)
+
+
+# --- what is refused, and what stays the same --------------------------------------------------------------------
+
+
+def test_range_that_the_grid_does_not_resolve_is_refused_with_the_numbers():
+    surface = ROUGH.realise(grid=48, seed=3)
+    short = Material(25e6, 0.05, 2.071e-9)
+    lines = []
+    with pytest.raises(ValueError, match=r"^interaction_range: a range of 2\.071e-09 m is not resolved") as refused:
+        boundary_elements(surface, short, PRESSURE, progress=lines.append)
+    numbers = (
+        f"{longest_spacing(short):.3g}",
+        f"{strength_number(short, surface.spacing):.3g}",
+        f"{surface.spacing:.4g}",
+    )
+    assert all(number in str(refused.value) for number in numbers)
+    assert len(lines) == 1  # printed before anything is solved
+    assert f"{strength_number(short, surface.spacing):.3g}" in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        ({"reduced_pressure": 0.0}, "reduced_pressure"),
+        ({"reduced_pressure": float("nan")}, "reduced_pressure"),
+        ({"refinement": 0}, "refinement"),
+        ({"refinement": 1.5}, "refinement"),
+        ({"tolerance": -1.0}, "tolerance"),
+    ],
+)
+def test_wrong_arguments_are_named(wrong, name):
+    arguments = {"reduced_pressure": PRESSURE} | wrong
+    with pytest.raises(ValueError, match=f"^{name}: "):
+        boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["hertz"], **arguments)
+
+
+def test_mean_separations_need_adhesion_and_are_positive():
+    surface = ROUGH.realise(grid=48, seed=3)
+    with pytest.raises(ValueError, match=r"^surface_energy: "):
+        states_at_mean_separations(surface, MATERIALS["hertz"], [1e-6])
+    with pytest.raises(ValueError, match=r"^mean_separations: "):
+        states_at_mean_separations(surface, MATERIALS["adhesive"], [1e-6, 0.0])
+
+
+def test_solver_that_does_not_converge_is_an_error(monkeypatch):
+    monkeypatch.setattr("icha.references.boundary_elements._MAX_ITERATIONS", 3)
+    with pytest.raises(NotSolved, match=r"did not converge: error .*, tolerance 1e-08"):
+        boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["hertz"], PRESSURE)
+
+
+def test_load_that_no_mean_gap_carries_is_an_error(monkeypatch):
+    monkeypatch.setattr("icha.references.boundary_elements._MAX_SOLVES", 1)
+    with pytest.raises(NotSolved, match=r"no mean gap was found that carries the load: 1 tries"):
+        boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"], PRESSURE)
+
+
+def digest(solution):
+    """SHA-256 of all values of a dataset."""
+    return hashlib.sha256(b"".join(solution[name].values.tobytes() for name in sorted(solution.variables))).hexdigest()
+
+
+def test_same_bytes_in_another_process_with_more_threads():
+    script = f"""
+import sys
+sys.path.insert(0, {os.path.dirname(__file__)!r})
+from test_boundary_elements import MATERIALS, PRESSURE, ROUGH, boundary_elements, digest
+print(digest(boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"], PRESSURE)))
+"""
+    other = subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | {"OMP_NUM_THREADS": "2"},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    here = boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"], PRESSURE)
+    assert other.stdout.strip() == digest(here)
+
+
+def test_area_without_adhesion_does_not_depend_on_the_slope():
+    """One topography, scaled: the same area and reduced separation at the same reduced pressure."""
+    steep, flat = (
+        boundary_elements(ROUGH.realise(grid=48, seed=3).scaled_to_rms_slope(slope), HERTZ, PRESSURE)
+        for slope in (1.0, 0.2)
+    )
+    assert flat.contact_area_fraction == pytest.approx(float(steep.contact_area_fraction), rel=1e-6)
+    assert flat.reduced_separation == pytest.approx(float(steep.reduced_separation), rel=1e-6)

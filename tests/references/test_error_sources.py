@@ -1,0 +1,353 @@
+"""Variants between the model and boundary elements, against Hertz, closed sums and each other."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from pages.error_sources import page, ratios, split
+
+import icha
+from icha.asperity.jkr import JKR
+from icha.equilibrium.equilibrium import Contact, area_fraction
+from icha.figures import fig12_error_sources
+from icha.path.path import follow
+from icha.references.boundary_elements import NodalState, contact_state, perimeter_correction
+from icha.references.error_sources import (
+    ADHESIVE_CHAIN,
+    CATEGORIES,
+    Discs,
+    chain,
+    contact_patches,
+    discs_apart,
+    effects,
+    error_sources,
+    fourth_order_terms,
+    independent_discs,
+    match,
+    paraboloids,
+    shape_ratio,
+    shape_ratio_of_fourth_order,
+    summit_curvatures,
+    union_area_fraction,
+)
+from icha.surfaces.summits import Asperities, find_summits
+
+HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)
+LAW = JKR(HARD)
+PRESSURES = [2e-3, 1e-2, 3e-2]
+
+
+def summits_at(position, height, radius, period):
+    return Asperities(np.array(position, float), np.array(height, float), np.array(radius, float), period)
+
+
+@pytest.fixture(scope="module")
+def surface():
+    spectrum = icha.SelfAffineSpectrum(
+        period=1.0, rolloff_wavelength=0.4, short_wavelength=0.12, hurst=0.8, rms_slope=0.5
+    )
+    return spectrum.realise(grid=64, seed=3)
+
+
+@pytest.fixture(scope="module")
+def sources(surface):
+    return error_sources(surface, HARD, PRESSURES, seed=3)
+
+
+# --- surfaces ---------------------------------------------------------------------------------------------------
+
+
+def test_curvatures_and_fourth_order_of_crossed_waves():
+    x = np.arange(48) * (2.0 / 48)
+    q, along_x, along_y = np.pi, 0.3, 0.1
+    surface = icha.Surface(along_x * np.cos(q * x) + along_y * np.cos(q * x)[:, None], 2.0)
+    summits = find_summits(surface)
+    assert summit_curvatures(surface, summits) == pytest.approx(
+        np.array([[-along_x * q**2, 0.0, -along_y * q**2]]), abs=1e-9
+    )
+    assert fourth_order_terms(surface, summits) == pytest.approx([(along_x + along_y) * q**4 / 64], rel=1e-9)
+
+
+def test_curvatures_have_the_summits_geometric_mean(surface):
+    summits = find_summits(surface)
+    xx, xy, yy = summit_curvatures(surface, summits).T
+    # The model takes a spline's curvatures, these are the spectrum's.
+    assert np.sqrt(xx * yy - xy**2) * summits.radius == pytest.approx(np.ones(len(summits)), rel=2e-2)
+
+
+def test_envelope_has_the_summits_with_their_heights_and_curvatures():
+    summits = summits_at([[0.25, 0.5], [0.96875, 0.5]], [0.1, 0.08], [0.5, 0.4], 1.0)
+    curvatures = np.array([[-3.0, 1.0, -2.0], [-2.5, 0.0, -2.5]])
+    grid = 64
+    heights = paraboloids(summits, curvatures, grid)
+    for (x, y), height, (xx, xy, yy) in zip(summits.position, summits.height, curvatures, strict=True):
+        i, j = round(y * grid), round(x * grid)
+        near = np.take(np.take(heights, np.arange(i - 1, i + 2), axis=0), np.arange(j - 1, j + 2), axis=1, mode="wrap")
+        assert near[1, 1] == pytest.approx(height, rel=1e-12)
+        assert near[1, 0] + near[1, 2] - 2 * near[1, 1] == pytest.approx(xx / grid**2)
+        assert near[0, 1] + near[2, 1] - 2 * near[1, 1] == pytest.approx(yy / grid**2)
+        assert near[2, 2] + near[0, 0] - near[0, 2] - near[2, 0] == pytest.approx(4 * xy / grid**2)
+
+
+def test_envelope_of_a_rough_surface_lies_above_every_paraboloid_and_touches_the_highest(surface):
+    summits = find_summits(surface)
+    curvatures = summit_curvatures(surface, summits)
+    grid = 128
+    heights = paraboloids(summits, curvatures, grid)
+    nodes = np.rint(summits.position * grid).astype(int)
+    offset = nodes / grid - summits.position
+    xx, xy, yy = curvatures.T
+    dx, dy = offset.T
+    own = summits.height + 0.5 * (xx * dx**2 + 2 * xy * dx * dy + yy * dy**2)
+    above = heights[nodes[:, 1] % grid, nodes[:, 0] % grid] - own
+    assert np.min(above) > -1e-12
+    assert above[np.argmax(summits.height)] == pytest.approx(0, abs=1e-12)
+    assert np.max(heights) <= np.max(summits.height)
+
+
+# --- contact without unions -------------------------------------------------------------------------------------
+
+
+def test_equal_summits_without_interaction_have_the_closed_sum():
+    count, radius, pressure = 7, 0.3, 1e-4
+    position = np.random.default_rng(1).random((count, 2)) * 5
+    discs = independent_discs(summits_at(position, [0.2] * count, [radius] * count, 5.0), LAW, pressure)
+    approach = (0.75 * pressure * 25 / (count * 2.0 * np.sqrt(radius))) ** (2 / 3)
+    assert discs.separation == pytest.approx(0.2 - approach, rel=1e-12)
+    assert discs.contact_radius == pytest.approx(np.full(count, np.sqrt(radius * approach)), rel=1e-9)
+
+
+def test_unequal_summits_without_interaction_carry_the_load(surface):
+    summits = find_summits(surface)
+    discs = independent_discs(summits, LAW, 0.01)
+    approach = np.maximum(summits.height - discs.separation, 0)
+    assert np.sum(8 / 3 * np.sqrt(summits.radius) * approach**1.5) == pytest.approx(0.01, rel=1e-9)
+
+
+@pytest.mark.parametrize("switch", [{}, {"point_forces": True}, {"field_shape": True}])
+def test_a_lone_summit_is_hertz_and_its_images(switch):
+    radius, period, pressure = 1.0, 40.0, 1e-6
+    summits = summits_at([[3.0, 4.0]], [0.5], [radius], period)
+    discs = discs_apart(summits, LAW, pressure, 0.1, **switch)
+    force = pressure * period**2
+    a = np.cbrt(0.75 * force * radius / 2.0)
+    assert discs.contact_radius == pytest.approx([a], rel=1e-5)
+    # Images and counter-pressure of a point load on a square cell.
+    images = -3.900265 * force / (np.pi * 2.0 * period)
+    assert discs.separation == pytest.approx(0.5 - a**2 / radius - images, abs=1e-4 * a**2)
+
+
+def test_without_overlaps_it_is_the_model(surface):
+    contact = Contact(LAW, find_summits(surface), surface.rms_height)
+    unit = 2.0 * surface.rms_slope
+    (waypoint,) = follow(contact, icha.Path(reduced_pressures=[5e-4]), unit)
+    state = waypoint.state
+    assert np.all(state.spots.members == 1)
+    discs = discs_apart(contact.asperities, LAW, 5e-4 * unit, surface.rms_height)
+    assert discs.separation == pytest.approx(state.separation, rel=1e-7)
+    assert np.sort(discs.contact_radius) == pytest.approx(np.sort(state.spots.contact_radius), rel=1e-6)
+    area = np.pi * np.sum(discs.contact_radius**2) / surface.period**2
+    assert area == pytest.approx(area_fraction(contact, state.spots), rel=1e-6)
+
+
+def test_the_field_of_a_distant_spot_raises_and_sharpens():
+    r, period, pressure = 2.0, 300.0, 9e-7
+    summits = summits_at([[10.0, 10.0], [10.0 + r, 10.0]], [0.0, 0.0], [1.0, 1.0], period)
+    plain = discs_apart(summits, LAW, pressure, 0.1)
+    shaped = discs_apart(summits, LAW, pressure, 0.1, field_shape=True)
+    force = 0.5 * pressure * period**2
+    sharpness = force / (np.pi * 2.0 * r**3)
+    assert 1 / shaped.radius_of_curvature - 1 == pytest.approx([0.5 * sharpness] * 2, rel=0.05)
+    raised = 0.5 * (force / (np.pi * 2.0 * r**2)) ** 2
+    approach = [np.mean(discs.contact_radius**2 / discs.radius_of_curvature) for discs in (plain, shaped)]
+    assert shaped.separation - plain.separation == pytest.approx(raised - (approach[1] - approach[0]), rel=0.1)
+
+
+def test_area_of_overlapping_discs_is_that_of_their_union(surface):
+    a, distance = 0.1, 0.12
+    angle = np.arccos(distance / (2 * a))
+    union = 2 * a**2 * (np.pi - angle + np.sin(angle) * np.cos(angle))
+    discs = Discs(np.array([[0.3, 0.98], [0.3, 0.98 + distance - 1]]), np.full(2, a), np.ones(2), 0.0)
+    assert union_area_fraction(discs, surface) == pytest.approx(union, rel=2e-3)
+    apart = Discs(np.array([[0.3, 0.3], [0.7, 0.7]]), np.array([0.1, 0.01]), np.ones(2), 0.0)
+    assert union_area_fraction(apart, surface) == pytest.approx(np.pi * 0.0101, rel=1e-12)
+
+
+def test_a_summit_under_a_larger_contact_takes_no_part():
+    summits = summits_at([[5.0, 5.0], [5.05, 5.0]], [0.1, 0.0995], [2.0, 0.1], 10.0)
+    discs = discs_apart(summits, LAW, 1e-3, 0.1)
+    assert len(discs.contact_radius) == 1
+    assert discs.contact_radius == pytest.approx([np.cbrt(0.75 * 0.1 * 2.0 / 2.0)], rel=1e-3)
+
+
+# --- patches ----------------------------------------------------------------------------------------------------
+
+
+def state_of(traction, period=1.0):
+    traction = np.array(traction, float)
+    some_surface = icha.Surface(np.random.default_rng(0).random(traction.shape), period)
+    return NodalState(some_surface, np.where(traction > 0, 0.0, 1.0), traction, traction > 0, 0.0)
+
+
+def test_patches_go_on_across_the_cell_and_add_up():
+    traction = np.zeros((16, 16))
+    traction[6:9, 14:] = traction[6:9, :2] = 1.0
+    traction[14:, 6:8] = traction[:1, 6:8] = 2.0
+    traction[12, 12] = 4.0
+    state = state_of(traction)
+    patches = contact_patches(state)
+    assert sorted(patches.nodes) == [1, 6, 12]
+    assert sorted(patches.force * 256) == pytest.approx([4.0, 12.0, 12.0])
+    assert np.sum(patches.area) == pytest.approx(perimeter_correction(state.contact)[0], rel=1e-12)
+    assert np.all((patches.area > 0) & (patches.area * 256 < patches.nodes))
+    assert patches.label[6, 15] == patches.label[6, 0] != 0
+
+
+def test_spots_and_patches_are_matched():
+    traction = np.zeros((64, 64))
+    for rows, columns in ((8, 8), (8, 24), (8, 26), (40, 8), (40, 40), (24, 50)):
+        traction[rows - 2 : rows + 3, columns - 2 : columns + 3] = 1.0
+    patches = contact_patches(state_of(traction, 64.0))
+    #          single     several     several    united     extra        missed: (24, 50) and (40, 40)
+    centres = [(8.2, 8.1), (23.5, 8.0), (27.0, 8.0), (8.0, 40.0), (55.0, 55.0)]
+    found = match(np.array(centres), np.full(5, 1.8), np.array([0, 0, 0, 1, 0], bool), patches, 64.0)
+    assert list(found.category[found.spot_group]) == ["single", "several", "several", "united", "extra"]
+    assert sorted(found.category[found.patch_group]) == ["missed", "missed", "several", "single", "united"]
+
+
+def test_a_spot_smaller_than_a_cell_is_matched_where_it_is():
+    traction = np.zeros((16, 16))
+    traction[4, 5] = 1.0
+    found = match(
+        np.array([[5.3, 3.8]]), np.array([0.01]), np.array([False]), contact_patches(state_of(traction, 16)), 16
+    )
+    assert list(found.category) == ["single"]
+
+
+def test_area_on_a_rotational_profile_of_fourth_order():
+    """Boundary elements against Sneddon's closed form; a lone summit, on which the load is not shared."""
+    grid, period, radius, fourth = 256, 4.0, 1.0, 0.35
+    x = (np.arange(grid) - grid // 2) * (period / grid)
+    r2 = np.minimum(x**2 + x[:, None] ** 2, 1.0)
+    surface = icha.Surface(-r2 / (2 * radius) + fourth * r2**2, period)
+    force = 8 / 3 * 0.35**3 * (1 - 3.2 * fourth * 0.35**2)
+    state = contact_state(surface, HARD, force / period**2 / (2.0 * surface.rms_slope))
+    patches = contact_patches(state)
+    pair = xr.Dataset(
+        {
+            "pair_patch_area": ("pair", patches.area),
+            "pair_patch_force": ("pair", patches.force),
+            "pair_curvature_radius": ("pair", [radius]),
+            "pair_fourth_order": ("pair", [fourth]),
+            "contact_modulus": 2.0,
+        }
+    )
+    assert float(shape_ratio(pair)[0]) == pytest.approx((1 - 3.2 * fourth * 0.35**2) ** (-2 / 3), rel=0.015)
+    assert float(shape_ratio_of_fourth_order(pair)[0]) == pytest.approx(float(shape_ratio(pair)[0]), rel=0.015)
+
+
+# --- the whole --------------------------------------------------------------------------------------------------
+
+
+def test_split_adds_up_to_the_totals(sources):
+    area = sources["contact_area_fraction"]
+    for name, variant in (("spot_area_fraction", "icha"), ("patch_area_fraction", "boundary_elements")):
+        assert sources[name].sum("category").values == pytest.approx(area.sel(variant=variant).values, rel=1e-9)
+    for name in ("spot_load_share", "patch_load_share"):
+        assert sources[name].sum("category").values == pytest.approx(np.ones(len(PRESSURES)), rel=1e-9)
+    assert list(sources["category"].values) == list(CATEGORIES)
+    singles = sources["spot_count"].sel(category="single")
+    assert int(singles.sum()) == sources.sizes["pair"]
+    assert np.array_equal(singles, sources["patch_count"].sel(category="single"))
+    for name, part in (("pair_spot_area", "spot_area_fraction"), ("pair_patch_area", "patch_area_fraction")):
+        per_state = [float(sources[name][sources["pair_reduced_pressure"] == p].sum()) for p in PRESSURES]
+        nominal = float(sources["period"]) ** 2
+        assert per_state == pytest.approx(sources[part].sel(category="single").values * nominal, rel=1e-9)
+
+
+def test_effects_add_up_to_the_error(sources):
+    area = sources["contact_area_fraction"]
+    error = np.log(area.sel(variant="icha") / area.sel(variant="boundary_elements"))
+    assert effects(sources).sum("source").values == pytest.approx(error.values, rel=1e-9)
+    assert effects(sources).sizes["source"] == len(chain(sources)) - 1
+
+
+def test_the_model_is_the_one_that_is_published(surface, sources):
+    run = icha.simulate(surface, HARD, icha.Path(reduced_pressures=PRESSURES))
+    own = sources.sel(variant="icha")
+    assert own["contact_area_fraction"].values == pytest.approx(run["contact_area_fraction"].values, rel=1e-9)
+    assert own["mean_separation"].values == pytest.approx(run["mean_separation"].values, rel=1e-9)
+
+
+def test_variants_are_near_each_other_where_only_a_few_summits_touch(sources):
+    first = sources.isel(reduced_pressure=0)
+    areas = first["contact_area_fraction"]
+    assert np.all(np.abs(areas / areas.sel(variant="boundary_elements") - 1) < 0.4)
+    heights = first["reduced_separation"]
+    assert np.all(np.abs(heights - heights.sel(variant="boundary_elements")) < 0.2)
+
+
+def test_with_adhesion_the_chain_is_shorter(surface):
+    sticky = icha.Material(contact_modulus=2.0, surface_energy=1e-4, interaction_range=5e-3)
+    sources = error_sources(surface, sticky, [2e-2], tolerance=1e-6)
+    names = set(sources["variant"].values)
+    assert names == {*chain(sources), "icha_fine_grid", "boundary_elements_coarse"}
+    assert "spot_count" not in sources
+    error = np.log(sources["contact_area_fraction"].sel(variant="icha"))
+    error = error - np.log(sources["contact_area_fraction"].sel(variant="boundary_elements"))
+    assert effects(sources).sum("source").values == pytest.approx(error.values, rel=1e-9)
+
+
+def test_odd_refinements_are_refused(surface):
+    with pytest.raises(ValueError, match="refinement: 3"):
+        error_sources(surface, HARD, PRESSURES, refinement=3)
+
+
+# --- figure and page --------------------------------------------------------------------------------------------
+
+
+def test_figure_shows_the_ratios(sources):
+    drawn = fig12_error_sources.figure([sources.assign(seed=4), sources])
+    areas = drawn.axes[0]
+    black = next(line for line in areas.get_lines() if line.get_color() == "#000000" and len(line.get_xdata()) == 3)
+    area = sources["contact_area_fraction"]
+    expected = area.sel(variant="icha") / area.sel(variant="boundary_elements")
+    assert black.get_ydata() == pytest.approx(expected.values, rel=1e-12)
+    assert drawn.axes[2].get_lines()[0].get_ydata() == pytest.approx(np.log(expected.values), rel=1e-9)
+
+
+def test_figure_refuses_what_cannot_be_averaged(sources):
+    with pytest.raises(ValueError, match="no dataset"):
+        fig12_error_sources.figure([])
+    with pytest.raises(ValueError, match="reduced pressures"):
+        fig12_error_sources.figure([sources, sources.isel(reduced_pressure=[0, 1])])
+    with pytest.raises(ValueError, match="adhesion"):
+        fig12_error_sources.figure([sources.assign(surface_energy=1.0)])
+
+
+def test_medians_of_equally_filled_bins():
+    x = np.arange(80.0)
+    at, middle = fig12_error_sources.medians(x[::-1], np.where(x < 50, np.nan, 3.0)[::-1])
+    assert at == pytest.approx(np.arange(8) * 10 + 4.5)
+    assert middle == pytest.approx([np.nan] * 5 + [3.0] * 3, nan_ok=True)
+
+
+def test_page_has_means_and_deviations_of_the_datasets(sources):
+    other = sources.copy(deep=True).assign(seed=4)
+    factor = xr.where(other["variant"] == "icha", 1.1, 1.0)
+    other["contact_area_fraction"] = other["contact_area_fraction"] * factor
+    area = sources["contact_area_fraction"].isel(reduced_pressure=0)
+    ratio = float(area.sel(variant="icha") / area.sel(variant="boundary_elements"))
+    row = ratios([sources, other], "contact_area_fraction").splitlines()[2]
+    assert row.startswith(f"| ICHA | {1.05 * ratio:.3f} ± {0.1 * ratio / np.sqrt(2):.3f} |")
+    text = page([sources, other], figure="images/some.png", command="some command")
+    assert "`some command`" in text and "(images/some.png)" in text and "seed 3, 4" in text
+    assert "nan" not in text
+    adhesive = sources.sel(variant=["icha", *list(ADHESIVE_CHAIN)[1:]]).assign(surface_energy=1.0)
+    with_adhesion = page([sources], [adhesive], figure="a.png", command="b")
+    assert "## With adhesion" in with_adhesion
+
+
+def test_table_of_the_split_has_the_whole_load(sources):
+    rows = [line.split("|")[1:-1] for line in split([sources]).splitlines()[2:]]
+    loads = np.array([[cell.split("/") for cell in row[1:]] for row in rows if "load" in row[0]], dtype=float)
+    assert loads.sum(axis=0) == pytest.approx(np.full((len(PRESSURES), 2), 100), abs=0.3)

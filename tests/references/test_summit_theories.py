@@ -1,0 +1,223 @@
+"""Theories of separate summits against sums over random summits, closed forms, limits, and summits of surfaces."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import erfc
+
+from icha import Material, SelfAffineSpectrum
+from icha.asperity.jkr import JKR
+from icha.references import summits
+from icha.surfaces.moments import SpectralMoments, spectral_moments
+from icha.surfaces.summits import find_summits
+
+MODULUS, ENERGY = 25e6, 0.05
+SOFT, BARE = Material(MODULUS, ENERGY, 2e-9), Material(MODULUS, 0.0, 2e-9)
+MOMENTS = SpectralMoments(2.4e-12, 0.5, 1.5e12)
+SEPARATIONS = np.array([0.5, 1.5, 3.0])
+PULLED = pytest.mark.parametrize("pulled", [False, True], ids=["pressed", "pulled"])
+
+
+# --- summits of Gaussian surfaces -----------------------------------------------------------------------------
+
+
+def test_summit_statistics_are_those_of_the_random_field():
+    # At a point of zero slope, curvatures are drawn from the field's own covariances (units m0 = m2 = 1, m4 = alpha);
+    # such a point counts by the Jacobian |det H| where the Hessian is negative definite.
+    alpha, rng = 4.0, np.random.default_rng(3)
+    mean, deviator, twist = rng.standard_normal((3, 4_000_000)) * np.sqrt(
+        np.array([[2 * alpha / 3], [alpha / 3], [alpha / 3]])
+    )  # -(hxx + hyy)/2, (hxx - hyy)/2, hxy
+    weight = np.where(mean > np.hypot(deviator, twist), mean**2 - deviator**2 - twist**2, 0.0)
+    slope_at_zero = 1 / (2 * np.pi)  # probability density of a zero gradient
+    density = slope_at_zero * weight.mean()
+    # The height given the curvatures: mean 3/(2 alpha) times theirs, variance 1 - 3/(2 alpha).
+    share = weight / weight.sum()
+    curvature = share @ mean
+    height = 1.5 / alpha * curvature
+    variance = 1 - 1.5 / alpha + (1.5 / alpha) ** 2 * (share @ mean**2 - curvature**2)
+    found = summits.gaussian_summits(SpectralMoments(1.0, 1.0, alpha))
+    assert found.density == pytest.approx(density, rel=3e-3)
+    assert found.mean_height == pytest.approx(height, rel=3e-3)
+    assert found.deviation**2 == pytest.approx(variance, rel=3e-3)
+    assert 1 / found.radius == pytest.approx(curvature, rel=3e-3)
+
+
+def test_mccools_rounded_constant():
+    found = summits.gaussian_summits(SpectralMoments(1.0, 1.0, 4.0))
+    assert found.deviation**2 == pytest.approx(1 - 0.8968 / 4, abs=5e-5)
+
+
+def test_summits_found_on_surfaces_are_those_of_the_theory():
+    # Twelve surfaces, the spread among which is the statistical error of their mean.
+    spectrum = SelfAffineSpectrum(100e-6, 10e-6, 100e-6 / 32, 0.8)
+    surfaces = [spectrum.realise(grid=256, seed=seed) for seed in range(12)]
+    theory = summits.gaussian_summits(spectral_moments(surfaces[0]))
+    found = [find_summits(surface) for surface in surfaces]
+
+    def compare(values, expected):
+        # Every realisation has the whole spectrum, but so few waves are not quite a Gaussian field: 1 % is allowed.
+        error = np.std(values, ddof=1) / math.sqrt(len(values))
+        assert abs(np.mean(values) - expected) < 3 * error + 0.01 * expected
+        assert error < 0.02 * expected
+
+    compare([len(each) / 100e-6**2 for each in found], theory.density)
+    compare([each.height.mean() for each in found], theory.mean_height)
+    compare([each.height.var() for each in found], theory.deviation**2)
+
+
+def test_moments_that_no_isotropic_surface_has_are_refused():
+    with pytest.raises(ValueError, match=r"Nayak's parameter is 1\.2.*at least 1\.5"):
+        summits.gaussian_summits(SpectralMoments(1.0, 1.0, 1.2))
+
+
+# --- Greenwood & Williamson -----------------------------------------------------------------------------------
+
+
+def random_heights(count=2_000_000):
+    theory = summits.gaussian_summits(MOMENTS)
+    return theory, theory.mean_height + theory.deviation * np.random.default_rng(1).standard_normal(count)
+
+
+def test_greenwood_williamson_is_the_sum_over_random_summits():
+    theory, heights = random_heights()
+    for u in SEPARATIONS:
+        depth = heights - u * MOMENTS.rms_height
+        depth = depth[depth > 0]
+        per_area = theory.density / len(heights)
+        area = np.pi * theory.radius * depth.sum() * per_area
+        force = 4 / 3 * math.sqrt(theory.radius) * np.sum(depth**1.5) * per_area / MOMENTS.rms_slope
+        noise = 5 / math.sqrt(len(depth))
+        assert float(summits.greenwood_williamson_area(u, MOMENTS)) == pytest.approx(area, rel=noise)
+        assert float(summits.greenwood_williamson_pressure(u, MOMENTS)) == pytest.approx(force, rel=noise)
+
+
+def test_greenwood_williamson_area_in_closed_form():
+    theory = summits.gaussian_summits(MOMENTS)
+    t = (SEPARATIONS * MOMENTS.rms_height - theory.mean_height) / theory.deviation
+    first = np.exp(-(t**2) / 2) / math.sqrt(2 * np.pi) - t * erfc(t / math.sqrt(2)) / 2
+    expected = np.pi * theory.density * theory.radius * theory.deviation * first
+    np.testing.assert_allclose(summits.greenwood_williamson_area(SEPARATIONS, MOMENTS), expected, rtol=1e-12)
+
+
+def test_high_planes_see_an_exponential_of_heights():
+    # Far up the tail of the Gaussian is nearly the exponential exp(-t z/sigma), for which area over load is constant,
+    # A E*/F = pi R l/(4/3 R^(1/2) Gamma(5/2) l^(3/2)) = sqrt(pi R/l) with l = sigma/t.
+    theory = summits.gaussian_summits(MOMENTS)
+    t = 9.0
+    u = (theory.mean_height + t * theory.deviation) / MOMENTS.rms_height
+    area, p = summits.greenwood_williamson_area(u, MOMENTS), summits.greenwood_williamson_pressure(u, MOMENTS)
+    expected = math.sqrt(math.pi * theory.radius * t / theory.deviation) * MOMENTS.rms_slope
+    assert float(area / p) == pytest.approx(expected, rel=0.02)
+
+
+def test_area_over_load_varies_slowly_and_lies_below_bush_gibson_and_thomas():
+    p = np.geomspace(1e-5, 1e-2, 4)
+    ratio = summits.greenwood_williamson_area(summits.greenwood_williamson_separation(p, MOMENTS), MOMENTS) / p
+    assert np.all(np.diff(ratio) < 0) and np.all(np.diff(ratio) > -0.25)
+    assert np.all(ratio < summits.BUSH_GIBSON_THOMAS_SLOPE) and np.all(ratio > 1.5)
+
+
+def test_without_adhesion_neither_slope_nor_length_matters():
+    scaled = MOMENTS.scaled_to_rms_slope(0.2)
+    longer = SpectralMoments(MOMENTS.m0 * 1e6, MOMENTS.m2, MOMENTS.m4 / 1e6)
+    for law in (summits.greenwood_williamson_area, summits.greenwood_williamson_pressure):
+        for other in (scaled, longer):
+            np.testing.assert_allclose(law(SEPARATIONS, other), law(SEPARATIONS, MOMENTS), rtol=1e-12)
+
+
+def test_separation_at_pressure_is_the_inverse():
+    p = np.array([[1e-6, 1e-4], [1e-2, 0.1]])
+    u = summits.greenwood_williamson_separation(p, MOMENTS)
+    assert u.shape == p.shape
+    np.testing.assert_allclose(summits.greenwood_williamson_pressure(u, MOMENTS), p, rtol=1e-9)
+    with pytest.raises(ValueError, match="greater than 0"):
+        summits.greenwood_williamson_separation(0.0, MOMENTS)
+    with pytest.raises(ValueError, match="outside what summits reach"):
+        summits.greenwood_williamson_separation(1e-40, MOMENTS)
+
+
+# --- Fuller & Tabor -------------------------------------------------------------------------------------------
+
+
+@PULLED
+def test_without_adhesion_it_is_greenwood_and_williamsons(pulled):
+    area = summits.fuller_tabor_area(SEPARATIONS, MOMENTS, BARE, pulled=pulled)
+    pressure = summits.fuller_tabor_pressure(SEPARATIONS, MOMENTS, BARE, pulled=pulled)
+    np.testing.assert_allclose(area, summits.greenwood_williamson_area(SEPARATIONS, MOMENTS), rtol=1e-10)
+    np.testing.assert_allclose(pressure, summits.greenwood_williamson_pressure(SEPARATIONS, MOMENTS), rtol=1e-10)
+
+
+@PULLED
+def test_weak_adhesion_changes_little(pulled):
+    bare = summits.greenwood_williamson_pressure(SEPARATIONS, MOMENTS)
+    errors = []
+    for energy in (1e-4, 1e-6, 1e-8):
+        pressure = summits.fuller_tabor_pressure(SEPARATIONS, MOMENTS, Material(MODULUS, energy, 2e-9), pulled=pulled)
+        errors.append(np.max(np.abs(pressure / bare - 1)))
+    assert errors[0] > errors[1] > errors[2] and errors[2] < 1e-3
+
+
+@PULLED
+def test_it_is_the_sum_over_random_summits(pulled):
+    theory, heights = random_heights()
+    law, R = JKR(SOFT), theory.radius
+    first = float(law.jump_off_approach(R)) if pulled else 0.0
+    per_area = theory.density / len(heights)
+    for u in SEPARATIONS:
+        approach = heights - u * MOMENTS.rms_height
+        a = law.contact_radius(approach[approach > first], R)
+        noise = 5 / math.sqrt(len(a))
+        area, force = np.sum(np.pi * a**2) * per_area, law.force(a, R)
+        own = float(summits.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled)) * MODULUS * MOMENTS.rms_slope
+        assert float(summits.fuller_tabor_area(u, MOMENTS, SOFT, pulled=pulled)) == pytest.approx(area, rel=noise)
+        assert own == pytest.approx(force.sum() * per_area, abs=5 * math.sqrt(np.sum(force**2)) * per_area)
+
+
+@PULLED
+def test_it_is_the_integral_over_the_heights(pulled):
+    theory = summits.gaussian_summits(MOMENTS)
+    law, R = JKR(SOFT), theory.radius
+    first = float(law.jump_off_approach(R)) if pulled else 0.0
+
+    def integrand(approach, u):
+        t = (u * MOMENTS.rms_height + approach - theory.mean_height) / theory.deviation
+        force = float(law.force(law.contact_radius(approach, R), R))
+        return theory.density * force * math.exp(-t * t / 2) / (math.sqrt(2 * np.pi) * theory.deviation)
+
+    for u in SEPARATIONS:
+        middle = first + 0.02 * theory.deviation
+        parts = [
+            quad(integrand, low, high, args=(u,), limit=400, epsrel=1e-8)[0]
+            for low, high in ((first, middle), (middle, first + 12 * theory.deviation))
+        ]
+        expected = sum(parts) / (MODULUS * MOMENTS.rms_slope)
+        own = float(summits.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled))
+        assert own == pytest.approx(expected, rel=1e-6)
+
+
+def test_adhesion_enlarges_the_area_and_pulling_more_so():
+    bare = summits.greenwood_williamson_area(SEPARATIONS, MOMENTS)
+    pressed = summits.fuller_tabor_area(SEPARATIONS, MOMENTS, SOFT)
+    pulled = summits.fuller_tabor_area(SEPARATIONS, MOMENTS, SOFT, pulled=True)
+    assert np.all(bare < pressed) and np.all(pressed < pulled)
+    forces = [summits.fuller_tabor_pressure(SEPARATIONS, MOMENTS, SOFT, pulled=way) for way in (False, True)]
+    assert np.all(forces[1] < forces[0]) and np.all(
+        forces[0] < summits.greenwood_williamson_pressure(SEPARATIONS, MOMENTS)
+    )
+
+
+def test_summits_of_one_height_are_pulled_off_at_jkrs_force():
+    # With hardly any spread of heights all summits let go together: at most 3/2 pi dgamma R each.
+    energy = 1.0
+    moments = SpectralMoments(1e-12, 0.5, 0.5**2 * 1.5 / 1e-12)
+    theory = summits.gaussian_summits(moments)
+    material = Material(1.0, energy, 1e-9)  # so soft that jump-off lies far beyond the spread
+    law = JKR(material)
+    assert -law.jump_off_approach(theory.radius) > 1e3 * theory.deviation
+    approach = float(law.approach(np.cbrt(9 * np.pi * energy * theory.radius**2 / 8), theory.radius))
+    u = (theory.mean_height - approach) / moments.rms_height
+    tension = float(summits.fuller_tabor_pressure(u, moments, material, pulled=True)) * moments.rms_slope
+    assert tension == pytest.approx(-theory.density * 1.5 * np.pi * energy * theory.radius, rel=1e-3)

@@ -1,0 +1,200 @@
+"""Theories against their own limits, against quadrature of the published formula, and against measured truth."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import icha
+from icha.datasets.files import read_dataset, write_dataset
+from icha.references import persson, reference_dataset, summits
+from icha.references.literature import literature
+from icha.surfaces.moments import spectral_moments
+
+P = np.array([1e-6, 1e-4, 1e-2, 0.1, 0.5])
+
+
+def spectrum(rolloff=20e-6, short=1.5625e-6, hurst=0.8):
+    return icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=rolloff, short_wavelength=short, hurst=hurst)
+
+
+def test_small_pressures_give_the_linear_laws():
+    tiny = 1e-8
+    assert persson.persson_area(tiny) / tiny == pytest.approx(math.sqrt(8 / math.pi), rel=1e-9)
+    assert persson.PERSSON_SLOPE == pytest.approx(1.596, abs=5e-4)
+    assert summits.BUSH_GIBSON_THOMAS_SLOPE == pytest.approx(2.507, abs=5e-4)
+    np.testing.assert_allclose(summits.bush_gibson_thomas_area(P) / P, math.sqrt(2 * math.pi))
+
+
+def test_persson_area_grows_to_full_contact():
+    area = persson.persson_area(np.linspace(0, 4, 50))
+    assert area[0] == 0 and area[-1] == pytest.approx(1, abs=1e-12)
+    assert np.all(np.diff(area[:30]) > 0)
+
+
+@pytest.mark.parametrize("p", [0.01, 0.1, 0.5])
+def test_persson_pressures_carry_the_area_and_the_load(p):
+    area, _ = quad(lambda s: float(persson.persson_pressure_density(s, p)), 0, 10)
+    load, _ = quad(lambda s: s * float(persson.persson_pressure_density(s, p)), 0, 10)
+    assert area == pytest.approx(float(persson.persson_area(p)), rel=1e-9)
+    assert load == pytest.approx(p, rel=1e-9)
+    assert persson.persson_pressure_density(-0.1, p) == 0
+
+
+@pytest.mark.parametrize(("hurst", "p"), [(0.8, 1e-2), (0.5, 5e-2)])
+def test_mean_separation_is_the_published_double_integral(hurst, p):
+    q0, q1, gamma = 5.0, 40.0, persson.YANG_PERSSON_GAMMA
+
+    def psd(q):
+        return min(1.0, (q / q0) ** (-2 * (1 + hurst)))
+
+    def moment(n, q):
+        return quad(lambda k: k**n * psd(k), 1, q, points=[q0] if q > q0 else None)[0]
+
+    pressure = p * math.sqrt(2 * math.pi * moment(3, q1))
+
+    def inner(q):
+        w = (math.pi * moment(3, q)) ** -0.5
+        if w * pressure > 8:
+            return 0.0
+
+        def integrand(s):
+            t = w * math.exp(s)
+            return (gamma + 3 * (1 - gamma) * math.erf(t) ** 2) * math.exp(-(t**2))
+
+        return w * quad(integrand, math.log(pressure), math.log(8 / w), limit=200)[0]
+
+    def outer(x):  # q = 1 + x^2 takes out the singularity at q_L
+        return (1 + x * x) ** 2 * psd(1 + x * x) * inner(1 + x * x) * 2 * x
+
+    total = quad(outer, 1e-6, 2, epsrel=1e-6)[0] + quad(outer, 2, math.sqrt(q1 - 1), epsrel=1e-6)[0]
+    expected = math.sqrt(math.pi) * total / math.sqrt(2 * math.pi * moment(1, q1))
+    own = persson.persson_mean_separation(p, spectrum(short=100e-6 / q1, hurst=hurst))
+    assert float(own) == pytest.approx(expected, rel=1e-4)
+
+
+def test_mean_separation_is_near_boundary_elements():
+    # FFT boundary elements on one surface of this spectrum, contact resolved on 2048 x 2048 points.
+    p = np.array([1e-3, 3.16e-3, 1e-2, 3.16e-2, 0.1])
+    measured = np.array([2.51, 2.11, 1.62, 1.07, 0.52])
+    theory = persson.persson_mean_separation(p, spectrum())
+    # A finite surface has a highest summit, so the theory of the infinite one lies above at small loads.
+    assert np.all(theory > measured)
+    np.testing.assert_allclose(theory[2:], measured[2:], rtol=0.1)
+    np.testing.assert_allclose(theory[:2], measured[:2], rtol=0.2)
+
+
+def test_mean_separation_falls_logarithmically_at_small_loads():
+    p = np.geomspace(1e-7, 1e-5, 5)
+    steps = np.diff(persson.persson_mean_separation(p, spectrum()))
+    np.testing.assert_allclose(steps, steps[0], rtol=2e-2)
+    # p ~ exp(-u/u0) with u0 near 0.4-0.5 h_rms (Persson, Phys. Rev. Lett. 99 (2007) 125502).
+    assert -steps[0] / np.log(p[1] / p[0]) == pytest.approx(0.45, abs=0.1)
+
+
+def test_mean_separation_is_continuous_where_the_plateau_ends():
+    without = persson.persson_mean_separation(P, spectrum(rolloff=100e-6, hurst=1.0))
+    nearly = persson.persson_mean_separation(P, spectrum(rolloff=99.99e-6, hurst=0.9999))
+    np.testing.assert_allclose(without, nearly, rtol=2e-3)
+
+
+@pytest.mark.parametrize("hurst", [0.8, 1.0])
+def test_stiffness_is_the_derivative_of_the_separation(hurst):
+    p, step = np.array([1e-4, 1e-2, 0.1, 0.5]), 1e-3
+    surface = spectrum(hurst=hurst)
+    above, below = (persson.persson_mean_separation(p * np.exp(s), surface) for s in (step, -step))
+    stiffness = p * 2 * step / (below - above)
+    np.testing.assert_allclose(persson.persson_stiffness(p, surface), stiffness, rtol=2e-4)
+
+
+def test_stiffness_is_proportional_to_small_pressures():
+    p = np.array([1e-7, 1e-6, 1e-5])
+    ratio = persson.persson_stiffness(p, spectrum()) / p
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-3)
+    # u0 is 0.4-0.5 h_rms (Persson, Phys. Rev. Lett. 99 (2007) 125502).
+    assert 1 / ratio[0] == pytest.approx(0.45, abs=0.1)
+
+
+def test_stiffness_is_near_boundary_elements():
+    # Slopes of the separation between the loads of `test_mean_separation_is_near_boundary_elements`; at smaller ones
+    # few of a finite surface's highest hills touch, and the ratio of stiffness to pressure rises (Pastewka et al.,
+    # Phys. Rev. E 87 (2013) 062809).
+    p = np.array([1e-2, 3.16e-2, 0.1])
+    measured = np.diff(np.log(p)) / -np.diff([1.62, 1.07, 0.52])
+    middle = np.sqrt(p[1:] * p[:-1])
+    np.testing.assert_allclose(persson.persson_stiffness(middle, spectrum()) / middle, measured, rtol=0.15)
+
+
+@pytest.mark.parametrize("theory", [persson.persson_mean_separation, persson.persson_stiffness])
+def test_pressure_must_be_positive(theory):
+    with pytest.raises(ValueError, match="reduced_pressure"):
+        theory([0.0, 0.1], spectrum())
+
+
+@pytest.mark.parametrize("name", ["gfmd_area", "area_slope", "contact_mechanics_challenge"])
+def test_literature_is_cited_and_consistent(name):
+    entry = literature(name)
+    assert all(isinstance(entry[key], str) and entry[key] for key in ("title", "description", "citation"))
+    assert entry["doi"] and all(doi.startswith("10.") for doi in entry["doi"])
+    numbers = {key: value for key, value in entry.items() if isinstance(value, int | float)}
+    lists = {key: value for key, value in entry.items() if isinstance(value, list) and key != "doi"}
+    assert set(entry["units"]) == numbers.keys() | lists.keys()
+    assert len({len(values) for values in lists.values()}) <= 1
+    for key, unit in entry["units"].items():
+        assert unit == "1" or key.endswith("_" + unit.replace(" ", "_").replace("-", ""))
+
+
+def test_no_entry_of_the_literature_is_left_out_above():
+    with pytest.raises(ValueError, match=r"there are gfmd_area, area_slope, contact_mechanics_challenge$"):
+        literature("other")
+
+
+def test_published_areas_lie_between_the_theories():
+    gfmd, slope = literature("gfmd_area"), literature("area_slope")
+    p, area = np.array(gfmd["reduced_pressure"][:3]), np.array(gfmd["area_fraction"][:3])
+    assert np.all(persson.persson_area(p) < area) and np.all(area < summits.bush_gibson_thomas_area(p))
+    assert persson.PERSSON_SLOPE < slope["area_slope"] < summits.BUSH_GIBSON_THOMAS_SLOPE
+    few = area < slope["largest_area_fraction"]
+    np.testing.assert_allclose(area[few] / p[few], slope["area_slope"], rtol=0.2)
+
+
+def test_challenge_reference_pressure_and_tabor_parameter():
+    cmc = literature("contact_mechanics_challenge")
+    assert cmc["reference_pressure_Pa"] == pytest.approx(0.01 * cmc["contact_modulus_Pa"] * cmc["rms_slope"])
+    length = cmc["surface_energy_J_m2"] / cmc["contact_modulus_Pa"]
+    mu = (length**2 * cmc["rms_curvature_radius_m"]) ** (1 / 3) / cmc["interaction_range_m"]
+    assert mu == pytest.approx(cmc["tabor_parameter"], rel=0.01)
+
+
+def test_reference_dataset_is_complete_and_byte_stable(tmp_path):
+    moments = spectral_moments(spectrum().realise(grid=256, seed=1))
+    soft = {(1.0, "cmc"): icha.Material(25e6, 0.05, 2e-9), (0.2, "soft"): icha.Material(0.24e6, 0.002, 2e-9)}
+    for name in ("a.nc", "b.nc"):
+        write_dataset(reference_dataset(spectrum(), moments, soft), tmp_path / name)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+    dataset = read_dataset(tmp_path / "a.nc")
+    assert float(dataset["bush_gibson_thomas_area_fraction"].max()) <= 0.1
+    assert float(dataset["summit_area_fraction"].max()) == pytest.approx(0.1)
+    theories = [name for name in dataset if name.startswith(("persson", "bush", "greenwood", "gfmd", "fuller"))]
+    labels = {"fuller_tabor_rms_slope", "fuller_tabor_material"}
+    assert len(theories) == 12
+    assert all("references" in dataset[name].attrs for name in theories if name not in labels)
+    assert {"persson_reduced_separation", "persson_reduced_stiffness"}.isdisjoint(reference_dataset())
+    assert not [name for name in reference_dataset(spectrum()) if name.startswith(("greenwood", "fuller"))]
+    assert not [name for name in reference_dataset(spectrum(), moments) if name.startswith("fuller")]
+
+
+def test_reference_dataset_holds_the_theories_at_their_own_slopes():
+    moments = spectral_moments(spectrum().realise(grid=256, seed=1))
+    soft = icha.Material(0.24e6, 0.002, 2e-9)
+    dataset = reference_dataset(None, moments, {(0.2, "soft"): soft})
+    area = dataset["summit_area_fraction"].values
+    p, u = (dataset[f"greenwood_williamson_reduced_{name}"].values for name in ("pressure", "separation"))
+    np.testing.assert_allclose(summits.greenwood_williamson_area(u, moments), area, rtol=1e-9)
+    np.testing.assert_allclose(summits.greenwood_williamson_pressure(u, moments), p, rtol=1e-9)
+    (curve,) = np.flatnonzero((dataset["fuller_tabor_rms_slope"] == 0.2) & (dataset["fuller_tabor_material"] == "soft"))
+    p, u = (dataset[f"fuller_tabor_reduced_{name}"].values[curve] for name in ("pressure", "separation"))
+    own = moments.scaled_to_rms_slope(0.2)
+    np.testing.assert_allclose(summits.fuller_tabor_area(u, own, soft), area, rtol=1e-9)
+    np.testing.assert_allclose(summits.fuller_tabor_pressure(u, own, soft), p, rtol=1e-9)

@@ -1,0 +1,423 @@
+"""The report is one page without outside parts, shows failures, and changes with the data only."""
+
+import re
+from html.parser import HTMLParser
+
+import compared_campaign as compared
+import cyclic_campaign as cyclic
+import numpy as np
+import pytest
+import small_campaign as small
+from scipy.stats import t
+
+from icha.analysis.checks import Check, check_campaign
+from icha.analysis.common_loads import at_round_pressures, compare_campaign, compare_runs, interpolated
+from icha.analysis.model_error import model_error
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.files import read_campaign, read_dataset, write_dataset, write_surface
+from icha.datasets.labels import RunLabels
+from icha.figures import fig1_jkr
+from icha.figures.select import path_steps
+from icha.figures.style import save
+from icha.report.report import (
+    MOST_ROWS,
+    Benchmark,
+    ReportFigure,
+    read_benchmarks,
+    read_surface_statistics,
+    write_report,
+    write_times_page,
+)
+
+
+class Page(HTMLParser):
+    """Collects what a page refers to, and sees that tags are closed."""
+
+    VOID = frozenset({"meta", "link", "img", "br"})
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.targets, self.ids = [], [], set()
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name in ("href", "src"):
+                self.targets.append(value)
+            if name == "id":
+                self.ids.add(value)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture
+def write(tmp_path):
+    save(fig1_jkr.figure(), tmp_path / "figures" / "fig1_jkr.png", tmp_path / "figures" / "fig1_jkr.pdf")
+    write_surface(tmp_path / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    picture = ReportFigure(
+        "fig1_jkr", fig1_jkr.CAPTION, tmp_path / "figures" / "fig1_jkr.png", tmp_path / "figures" / "fig1_jkr.pdf"
+    )
+
+    def written(name="report.html", **changes):
+        arguments = {
+            "campaign": small.tree(),
+            "figures": [picture],
+            "checks": check_campaign(small.tree()),
+            "comparison": compare_campaign(small.tree()),
+            "surfaces": [read_dataset(tmp_path / "s.nc")],
+            "configuration": "name: small\ntext: <script>alert('no')</script>\n",
+            "dataset_path": tmp_path / "dataset" / "small.nc",
+        }
+        write_report(tmp_path / name, **(arguments | changes))
+        return (tmp_path / name).read_text(encoding="utf-8")
+
+    return written
+
+
+def _half_width(values):
+    """Half the width of the 95 % band of confidence of a mean, by Student's t."""
+    return t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values))
+
+
+def test_page_needs_nothing_from_outside(write, tmp_path):
+    page = Page(write())
+    for target in page.targets:
+        assert target.startswith(("data:", "#")) or target in ("figures/fig1_jkr.pdf", "dataset/small.nc")
+        if target.startswith("#"):
+            assert target[1:] in page.ids
+    assert "://" not in re.sub(r"base64,[^\"]*", "", write())
+    assert str(tmp_path) not in write()
+
+
+def test_page_shows_parameters_results_and_checks(write):
+    text = write()
+    passed = f"all {len(check_campaign(small.tree()))} passed"
+    for part in ("Small campaign", "25 MPa", "50 mJ/m²", "2.071 nm", passed, "100 µm", "CC0-1.0"):
+        assert part in text, part
+    assert "<script>alert" not in text and "&lt;script&gt;alert" in text
+    area = dict((p, a) for p, a, _ in at_round_pressures(small.run(rms_slope=0.2, material="hertz")))[1e-2]
+    assert f"{area:.4f}" in text
+
+
+def test_error_of_the_model_has_a_section_where_it_is_known(write):
+    assert 'id="error"' not in write() and "#error" not in Page(write()).targets
+    text = write(campaign=compared.tree(), comparison=None, checks=[], model_error=compared.errors())
+    page = Page(text)
+    assert "error" in page.ids and "#error" in page.targets
+    section = text[text.index('<h2 id="error">') : text.index('<h2 id="surfaces">')]
+    adhesive, bare = section.split("<h3>")[1:]
+    # A quarter more area and a fifth less separation in every state without adhesion ...
+    for part in (
+        "In 6 states",
+        "seeds 1, 2, 3",
+        "−20.0 % in the median",
+        "+25.0 %, from +25.0 % to +25.0 %",
+        "96² nodes",
+    ):
+        assert part in bare, part
+    assert "hysteresis" in adhesive and "hysteresis" not in bare
+    # ... and a factor of the seed with it.
+    errors = 100 / np.array(list(compared.AREA_FACTORS.values())) - 100
+    for value in (np.median(errors), errors.min(), errors.max()):
+        assert f"{value:.1f} %".replace("-", "−") in adhesive
+    assert f"{errors.mean():.1f} ± {_half_width(errors):.1f}".replace("-", "−") in adhesive
+    run = compared.runs()["one", "rough", 2, 1.0, "hertz"]
+    areas = [
+        float(own["contact_area_fraction"].values[0])
+        for labels, own in compared.runs().items()
+        if labels.material == "hertz"
+    ]
+    assert f"{np.mean(areas):.5f}" in bare and f"{1.25 * np.mean(areas):.4f}" in bare
+    assert f"{float(run['nayak_parameter']):.3g}" in text
+
+
+def test_error_of_one_seed_has_no_scatter_and_sources_are_cited(write):
+    pairs = compared.solutions("one", lambda labels: labels.seed == 2)
+    cited = [(labels, own.assign_attrs(references="B. Elements, J. Tests 1 (2020) 1; PAPER")) for labels, own in pairs]
+    errors = model_error(compared.tree(), cited)
+    text = write(campaign=compared.tree(), comparison=None, checks=[], model_error=errors)
+    section = text[text.index('<h2 id="error">') : text.index('<h2 id="surfaces">')]
+    assert "±" not in section.split("<h3>")[1] and "0.0 %" in section and "-0.0" not in section
+    assert text.count("B. Elements, J. Tests 1 (2020) 1") == 1
+    Page(text)
+
+
+def loop_rows(text):
+    """The cells of the two tables on pull-off and loss, by material."""
+    tables = re.findall(r"<caption>(Pull-off|Hysteresis loss)</caption>(.*?)</table>", text, flags=re.DOTALL)
+    assert [name for name, _ in tables] == ["Pull-off", "Hysteresis loss"]
+    found = []
+    for _, table in tables:
+        head = [re.sub("<.*?>", "", cell) for cell in re.findall(r"<th[ >].*?</th>", table.split("<tbody>")[0])]
+        rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in table.split("<tbody>")[1].split("</tr>")[:-1]]
+        assert all(len(row) == len(head) for row in rows)
+        found.append({row[1]: dict(zip(head, row, strict=True)) for row in rows})
+    return found
+
+
+def plain(value):
+    """A small number as the page shows it, without its tags."""
+    exponent = int(np.floor(np.log10(value)))
+    mantissa = f"{value / 10.0**exponent:.2f}"
+    return f"{mantissa}&thinsp;×&thinsp;10−{-exponent}" if exponent < -3 else f"{value:.{2 - exponent}f}"
+
+
+def test_runs_that_come_back_have_tables_of_pull_off_and_loss(write):
+    assert "Hysteresis loss" not in write()
+    text = write(campaign=cyclic.tree(), comparison=compare_campaign(cyclic.tree()), checks=[])
+    Page(text)
+    pull_off, loss = loop_rows(text)
+    runs = [run for labels, run in cyclic.runs().items() if (labels.study, labels.material) == ("loops", "soft")]
+    tensions = np.array([float(run["pull_off_pressure"]) for run in runs]) / 1e3
+    assert tensions.min() > 10 and tensions.max() < 1000
+    assert pull_off["soft"]["Pull-off"] == f"{tensions.mean():.0f} kPa<br>±&thinsp;{_half_width(tensions):.0f}"
+    assert pull_off["soft"]["Seeds"] == "2" and pull_off["soft"]["over all asperities"] == "0.250"
+    assert pull_off["soft"]["Last contact"].startswith("−")
+    assert pull_off["hertz"]["Pull-off"] == "0 Pa" and pull_off["hertz"]["Last contact"] == "–"
+    # All is lost in jumping off, and nothing without adhesion.
+    assert loss["soft"]["Jumping off, %"] == "100.0" and loss["hertz"]["Jumping off, %"] == "–"
+    assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["over Δγ"] == "–"
+    over = np.array([float(run["hysteresis_loss"]) / 0.05 for run in runs])
+    assert re.sub("<.*?>", "", loss["soft"]["over Δγ"]) == f"{plain(over.mean())}±&thinsp;{plain(_half_width(over))}"
+    assert "Unions, %" not in loss["soft"], "what is nowhere lost has no column"
+    formed, broken = loss["soft"]["Contacts formed, broken"].split("<br>")
+    assert formed == broken == f"{np.mean([float(run['spot_count'].max()) for run in runs]):.4g}"
+    assert loss["soft"]["Unions, undone"] == "0<br>0"
+    # One seed has no scatter.
+    one = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops" and labels.seed == 1}
+    text = write(campaign=campaign_tree(one.items()), comparison=None, checks=[])
+    assert "±" not in "".join(loop_rows(text)[0]["soft"].values()) and "Seeds" not in loop_rows(text)[0]["soft"]
+
+
+def test_statistics_are_of_the_first_loading(write):
+    text = write(campaign=cyclic.tree(), comparison=None, checks=[])
+    statistics = text[text.index('<h2 id="statistics">') :]
+    run = cyclic.run(seed=2, material="soft", between=4)
+    spots = int(small.run(seed=2)["spot_count"][-1])
+    assert spots > 0
+    row = re.search(r"<tr><th>loops: rough, seed 2, slope 1, soft</th>(.*?)</tr>", statistics).group(1)
+    assert re.findall(r"<td[^>]*>(.*?)</td>", row)[:3] == [
+        str(run.sizes["step"]),
+        str(int(run["asperity_count"])),
+        str(spots),
+    ]
+
+
+def test_comparison_is_of_the_first_loading():
+    study = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
+    there = campaign_tree((labels, small.run(labels.seed, 1.0, labels.material)) for labels in study)
+    one, other = compare_campaign(cyclic.tree())["loops"], compare_campaign(there)["loops"]
+    assert one.sizes["reduced_pressure"] > 5
+    for name in other.data_vars:
+        np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=name)
+    assert at_round_pressures(cyclic.run(between=3)) == at_round_pressures(small.run())
+
+
+def test_failures_are_loud(write):
+    failed = Check("residual", 1e-3, 1e-8, False, "largest equilibrium error over h_rms", "slopes/rough")
+    checks = [*check_campaign(small.tree()), failed]
+    text = write(checks=checks)
+    assert f"1 of {len(checks)} failed" in text and "✗ failed" in text and "slopes/rough" in text
+    not_finite = Check("residual", -1.0, 1e-8, False, "largest equilibrium error over h_rms", "slopes/rough")
+    assert "not finite" in write(checks=[not_finite])
+
+
+def test_same_bytes_twice_whatever_the_times(write, tmp_path):
+    times = tmp_path / "benchmarks" / "index.html"
+    text = write("a.html", times_path=times)
+    write_times_page(times, [Benchmark("runs/a/b", 3.0, 120.0)])
+    assert text == write("b.html", times_path=times)
+    assert '<object class="times" type="text/html" data="benchmarks/index.html"' in text
+    assert "benchmarks/index.html" not in write()
+
+
+def test_times_are_summed_by_kind_of_job(tmp_path):
+    jobs = [Benchmark("runs/a/1", 3.0, 120.0), Benchmark("runs/a/2", 90.0, None), Benchmark("dataset", 7300.0, 300.4)]
+    write_times_page(tmp_path / "t.html", jobs)
+    text = (tmp_path / "t.html").read_text(encoding="utf-8")
+    Page(text)
+    kinds, longest = (part.split("</tbody>")[0] for part in text.split("<tbody>")[1:])
+    rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in kinds.split("</tr>")[:-1]]
+    assert [(row[0], row[1], row[2], row[4], row[5]) for row in rows] == [
+        ("dataset", "1", "2 h 1 min", "2 h 1 min", "300 MB"),
+        ("runs", "2", "1 min 33 s", "1 min 30 s", "120 MB"),
+    ]
+    assert re.findall(r"<tr><th>(.*?)</th>", longest) == ["dataset", "runs/a/2", "runs/a/1"]
+    write_times_page(tmp_path / "t.html", [])
+    Page((tmp_path / "t.html").read_text(encoding="utf-8"))
+
+
+def test_incomplete_campaigns_are_reported(write):
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    tree = campaign_tree(runs[:-1], design=[labels for labels, _ in runs], attrs={"title": "Half"})
+    text = write(campaign=tree, checks=check_campaign(tree), comparison=compare_campaign(tree))
+    assert "3 of 4" in text and "1 of" in text and "nan" not in re.sub(r"base64,[^\"]*", "", text).lower().split()
+    Page(text)
+
+
+def section(text, start, end):
+    return text[text.index(f'<h2 id="{start}">') : text.index(f'<h2 id="{end}">')]
+
+
+def test_failed_runs_are_listed_with_their_reasons(write, tmp_path):
+    assert 'id="failures"' not in write()
+    runs = list(small.runs())
+    runs[1] = (runs[1][0], runs[1][1].assign_attrs(incomplete="no equilibrium: <residual> 1e-3"))
+    tree = campaign_tree(runs)
+    text = write(campaign=tree, comparison=compare_campaign(tree), results=tmp_path)
+    page = Page(text)
+    (row,) = re.findall(r"<tr>(.*?)</tr>", section(text, "failures", "figures").split("<tbody>")[1])
+    assert "no equilibrium: &lt;residual&gt; 1e-3" in row
+    assert f"runs/{runs[1][0].path}.nc" in row and "#failures" in page.targets
+    assert "3 of 4 runs are complete" in text and "3 runs, 1 failed" in text
+    # Its values stand nowhere.
+    shown = section(text, "studies", "surfaces")
+    assert f"runs/{runs[0][0].path}.nc" in shown and f"runs/{runs[1][0].path}.nc" not in shown
+
+
+def test_means_over_the_seeds_have_their_confidence(write):
+    text = write()
+    assert text.count("Means over <i>n</i> seeds") == 1, "of the study of two seeds alone"
+    table = text[text.index("Means over <i>n</i> seeds") :].split("</table>")[0]
+    pressures = re.findall(r'<th class="num">([\d.]+)</th>', table)
+    cells = dict(zip(pressures, re.findall(r"<td[^>]*>(.*?)</td>", table)[-len(pressures) :], strict=True))
+    areas = [dict((p, a) for p, a, _ in at_round_pressures(small.run(seed)))[1e-2] for seed in (1, 2)]
+    assert cells["0.01"].split("<br>")[0] == f"{np.mean(areas):.4f} ± {_half_width(areas):.4f}"
+
+
+def test_figures_stand_with_their_study_and_are_numbered_as_they_come(write, tmp_path):
+    def figure(name, studies):
+        files = [tmp_path / "figures" / f"fig1_jkr.{ending}" for ending in ("png", "pdf")]
+        return ReportFigure(name, f"Caption of {name}.", *files, studies)
+
+    figures = [figure("late", ("single",)), figure("early", ("slopes",)), figure("both", ("slopes", "single"))]
+    text = write(figures=figures)
+    order = re.findall(r'<figure id="(.*?)">|<h3 id="(study-.*?)">', text)
+    assert [one or other for one, other in order] == ["both", "study-slopes", "early", "study-single", "late"]
+    assert re.findall(r"<b>Figure (\d)\.</b> Caption of (\w+)", text) == [("1", "both"), ("2", "early"), ("3", "late")]
+
+
+@pytest.mark.parametrize("name", ["measured", "dataset", "surfaces", "report"])
+def test_graph_shows_studies_whatever_they_are_called(write, tmp_path, name):
+    source = {"source_file": "scan.txt", "source_sha256": "ab", "preparation": "none", "surface": "scan"}
+    runs = tuple((labels._replace(study=name), run) for labels, run in small.runs() if labels.study == "single")
+    measured = read_dataset(tmp_path / "s.nc").assign_attrs(source)
+    text = write(campaign=campaign_tree(runs), checks=[], comparison=None, surfaces=[measured])
+    graph = text.partition('<svg class="graph"')[2].partition("</svg>")[0]
+    boxes = re.findall(r'class="name"[^>]*>([^<]*)<', graph)
+    expected = ["Configuration", "Measurements", "Surfaces", name, "Campaign dataset", "Figures", "Checks", "Report"]
+    assert boxes == expected
+    # Every box but the first ones is reached, and every one but the last leads on.
+    assert graph.count('class="arrow"') == 2 + 1 + 1 + 2 + 2
+
+
+def test_surfaces_show_spectra_and_where_measurements_come_from(write, tmp_path):
+    text = write()
+    plain = read_surface_statistics(tmp_path / "s.nc")
+    assert "height" not in plain and text.count('<polyline class="curve"') == 1
+    origin = {"source_file": "scan & co.x3p", "source_sha256": "ab" * 32, "preparation": "tilt removed"}
+    measured = plain.assign(measured_rms_slope=0.321).assign_attrs(origin | {"surface": "scan"})
+    text = section(write(surfaces=[plain, measured, measured.assign(seed=2)]), "surfaces", "checks")
+    assert text.count('<polyline class="curve"') == 2
+    for part in ("scan &amp; co.x3p", "ab" * 32, "tilt removed", "0.321"):
+        assert part in text
+    assert text.count("ab" * 32) == 1
+    without = plain.drop_dims("psd_bin")
+    assert "<polyline" not in section(write(surfaces=[without]), "surfaces", "checks")
+    many = [plain.assign_attrs(surface=f"rough-hurst0.{k}") for k in range(20, 60)]
+    text = section(write(surfaces=many), "surfaces", "checks")
+    assert text.count("<polyline") == 40 and text.count('<path class="curve"') == 3, "only some have a name"
+
+
+def test_long_tables_are_folded_and_cut_and_say_so(write, tmp_path):
+    count = MOST_ROWS + 20
+    runs = [
+        (RunLabels("many", "rough", seed, 1.0, "soft"), small.run().assign(seed=small.run()["seed"] * 0 + seed))
+        for seed in range(1, count + 1)
+    ]
+    tree = campaign_tree(runs)
+    text = write(campaign=tree, checks=[], comparison=None, results=tmp_path)
+    Page(text)
+    statistics = section(text, "statistics", "data")
+    assert statistics.count("<tr>") == MOST_ROWS + 1 and f"<summary>Every run ({count})" in statistics
+    assert f"The first {MOST_ROWS} of {count} rows" in text
+    assert len(re.sub(r"base64,[^\"]*", "", text)) < 1.5e6
+    assert f"<b>{count}</b> complete runs" in text
+
+
+def test_benchmark_files_of_both_kinds(tmp_path):
+    (tmp_path / "a.tsv").write_text("s\th:m:s\tmax_rss\n1.5\t0:00:01\t120.5\n2.5\t0:00:02\t-\n")
+    (tmp_path / "b.jsonl").write_text('{"s": 0.25, "max_rss": null}\n')
+    found = read_benchmarks({"a": tmp_path / "a.tsv", "b": tmp_path / "b.jsonl", "not there": tmp_path / "c.tsv"})
+    assert found == [Benchmark("a", 4.0, 120.5), Benchmark("b", 0.25, None)]
+
+
+def test_interpolation_is_exact_at_the_stops_and_monotone_between():
+    run = small.run()
+    load, area = run["reduced_pressure"].values, run["contact_area_fraction"].values
+    np.testing.assert_allclose(interpolated(load, area, load, logarithmic=True), area, rtol=1e-12)
+    fine = interpolated(load, area, np.geomspace(load[0], load[-1], 200), logarithmic=True)
+    assert np.all(np.diff(fine) > 0)
+    np.testing.assert_allclose(
+        interpolated([1e-3, 1e-2, 1e-1], [2e-3, 2e-2, 2e-1], [3e-3, 5e-2], logarithmic=True), [6e-3, 0.1], rtol=1e-12
+    )
+    with pytest.raises(ValueError, match="outside"):
+        interpolated(load, area, [2 * load[-1]], logarithmic=True)
+
+
+def test_comparison_of_slopes_without_adhesion_shows_no_spread():
+    runs = [(labels, run) for labels, run in small.runs() if labels.material == "hertz"]
+    comparison = compare_runs(campaign_tree(runs)["slopes"].to_dataset())
+    # Stops differ between the slopes, so the curves agree to the interpolation's accuracy only ...
+    assert float(comparison["slope_spread"].max()) < 0.03
+    # ... but at the stops they share, the areas are the same.
+    first, second = (run for _, run in runs)
+    areas = [path_steps(run)["contact_area_fraction"].values for run in (first, second)]
+    np.testing.assert_allclose(areas[0], areas[1], rtol=1e-6)
+    assert float(comparison["slope_spread_at_load"].min()) > 1
+
+
+def test_differences_are_told_where_there_is_something_to_compare(write):
+    def own_slopes(*materials):
+        runs = [
+            (RunLabels("own", f"patch{slope:g}", 1, slope, material), small.run(1, slope, material))
+            for slope in (1.0, 0.2)
+            for material in materials
+        ]
+        tree = campaign_tree(runs)
+        return write(campaign=tree, checks=[], comparison=compare_campaign(tree))
+
+    both = write()
+    assert "between materials" in both and "between rms slopes" in both
+    # Every surface has a slope of its own: no two runs differ in the slope alone.
+    assert "Largest difference" not in own_slopes("soft")
+    several = own_slopes("soft", "hertz").partition("Largest difference")[2].partition("</p>")[0]
+    assert "between materials" in several and "between rms slopes" not in several
+    assert several.strip().endswith("at equal reduced pressure.")
+
+
+def test_comparison_can_be_kept(tmp_path):
+    for name in ("a.nc", "b.nc"):
+        write_dataset(compare_campaign(small.tree()), tmp_path / name)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+    single = read_campaign(tmp_path / "a.nc")["single"]
+    areas = single["contact_area_fraction"].values
+    np.testing.assert_allclose(single["area_mean"].values, areas.mean(axis=1))
+    np.testing.assert_allclose(single["area_deviation"].values, areas.std(axis=1, ddof=1))
+    assert float(single["material_spread"].max()) == 0
+
+
+def test_studies_without_a_common_load_are_compared_where_they_can_be(tmp_path):
+    labels, run = next((labels, run) for labels, run in small.runs() if labels.study == "slopes")
+    steep = run.isel(step=run["reduced_pressure"].values > 5e-3)
+    flat = small.run(rms_slope=0.2).isel(step=slice(0, steep.sizes["step"]))
+    keep = {"snapshot": slice(0, 0), "spot": slice(0, 0)}
+    tree = campaign_tree([(labels, steep.isel(keep)), (labels._replace(rms_slope=0.2), flat.isel(keep))])
+    comparison = compare_campaign(tree)
+    assert comparison["slopes"].sizes["relative_load"] == 0
+    write_dataset(comparison, tmp_path / "c.nc")
+    assert read_campaign(tmp_path / "c.nc")["slopes"].sizes["relative_load"] == 0

@@ -1,0 +1,147 @@
+"""Results that are not what was written are found, and what only looks changed is not among them."""
+
+import hashlib
+import json
+import os
+import random
+import shutil
+
+import pytest
+
+from icha.support.checksums import begin, damaged, distrust, is_whole, lost, recorded, set_aside, write_record
+
+PATH = "runs/load/seed1.nc"
+CONTENT = random.Random(7).randbytes(5000)
+
+
+@pytest.fixture
+def results(tmp_path):
+    """A campaign's folder with two results and their records."""
+    for path in (PATH, "checks.json"):
+        file = tmp_path / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(CONTENT)
+        write_record(tmp_path, path)
+    return tmp_path
+
+
+def flip(file, place, bit=0):
+    content = bytearray(file.read_bytes())
+    content[place] ^= 1 << bit
+    file.write_bytes(content)
+
+
+def keep_time(file, change):
+    """Change a file as a failing disk does: its time of change stays."""
+    status = file.stat()
+    change(file)
+    os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+def test_a_record_is_the_sha256_and_size_of_its_file(results):
+    record = json.loads((results / f"checksums/{PATH}.json").read_text())
+    assert record["sha256"] == hashlib.sha256(CONTENT).hexdigest() and record["size"] == len(CONTENT)
+    assert list(recorded(results)) == ["checks.json", PATH]
+    assert damaged(results) == damaged(results, thorough=True) == []
+
+
+@pytest.mark.parametrize("place", [0, 2500, 4999])
+@pytest.mark.parametrize("bit", [0, 7])
+def test_one_flipped_bit_is_found(results, place, bit):
+    flip(results / PATH, place, bit)
+    assert damaged(results) == [PATH]
+    flip(results / PATH, place, bit)
+    assert damaged(results) == []
+
+
+@pytest.mark.parametrize("size", [0, 2500, 4999])
+def test_a_file_that_was_cut_off_is_found(results, size):
+    keep_time(results / PATH, lambda file: os.truncate(file, size))
+    assert damaged(results) == [PATH]
+
+
+def test_what_the_disk_has_spoilt_is_found_where_everything_is_hashed(results):
+    keep_time(results / PATH, lambda file: flip(file, 100))
+    assert is_whole(results, PATH) and not is_whole(results, PATH, thorough=True)
+    assert damaged(results) == []
+    # Whoever has found it tells those that come after.
+    distrust(results, PATH)
+    assert damaged(results) == [PATH]
+
+
+def test_files_that_were_touched_or_copied_are_whole_and_hashed_but_once(results, tmp_path_factory):
+    elsewhere = shutil.copytree(results, tmp_path_factory.mktemp("copy") / "results", copy_function=shutil.copyfile)
+    assert damaged(elsewhere) == []
+    # Their records have the new time: this change of content alone, in the same time, goes unseen.
+    keep_time(elsewhere / PATH, lambda file: flip(file, 3))
+    assert is_whole(elsewhere, PATH)
+
+
+def test_a_damaged_file_is_set_aside_and_nothing_is_lost(results):
+    for number, name in enumerate(("seed1.nc.damaged", "seed1.nc.damaged2", "seed1.nc.damaged3")):
+        (results / PATH).write_bytes(CONTENT + bytes([number]))
+        write_record(results, PATH)
+        flip(results / PATH, 0)
+        wrong = (results / PATH).read_bytes()
+        assert set_aside(results, PATH) == (results / PATH).with_name(name)
+        assert (results / PATH).with_name(name).read_bytes() == wrong
+        assert not (results / PATH).exists()
+        assert lost(results) == [PATH] and damaged(results) == []
+
+
+def test_results_without_record_and_records_without_result_are_no_damage(results):
+    assert lost(results) == []
+    (results / "checks.json").unlink()
+    (results / "verdict.txt").write_text("all well\n")
+    assert is_whole(results, "verdict.txt", thorough=True) and is_whole(results, "checks.json", thorough=True)
+    assert damaged(results, thorough=True) == [] and lost(results) == ["checks.json"]
+
+
+def test_a_result_that_was_not_finished_is_neither_damaged_nor_forgotten(results):
+    begin(results, PATH)
+    (results / PATH).write_bytes(b"another one")  # and the job was killed before it could record it
+    assert damaged(results, thorough=True) == []
+    (results / PATH).unlink()
+    assert lost(results) == [PATH]
+    (results / PATH).write_bytes(CONTENT)
+    write_record(results, PATH)
+    flip(results / PATH, 0)
+    assert damaged(results) == [PATH]
+
+
+@pytest.mark.parametrize("content", [b"", b'{"sha256": "', b"[1]", b'{"sha256": "a"}', b"\xff\xfe", b"null"])
+def test_a_record_that_cannot_be_read_vouches_for_nothing(results, content):
+    (results / f"checksums/{PATH}.json").write_bytes(content)
+    assert damaged(results) == [PATH]
+    set_aside(results, PATH)
+    assert damaged(results) == [] and lost(results) == [PATH]
+
+
+def test_a_folder_is_one_result(results):
+    folder = results / "publish/tiny-1.0"
+    (folder / "data").mkdir(parents=True)
+    (folder / "data/a.nc").write_bytes(CONTENT)
+    (folder / "README.md").write_text("What this is.\n")
+    write_record(results, "publish/tiny-1.0")
+    (folder / ".snakemake_timestamp").touch()
+    assert damaged(results, thorough=True) == []
+    (folder / "data/b.nc").write_bytes(b"")
+    assert damaged(results) == ["publish/tiny-1.0"]
+    (folder / "data/b.nc").unlink()
+    assert damaged(results) == []
+    flip(folder / "data/a.nc", 4000)
+    assert damaged(results) == ["publish/tiny-1.0"]
+    assert set_aside(results, "publish/tiny-1.0").name == "tiny-1.0.damaged"
+    assert not folder.exists()
+
+
+def test_records_of_results_that_are_read_only_need_not_be_written(results, monkeypatch):
+    os.utime(results / PATH, (1, 1))
+
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("os.replace", refuse)
+    assert is_whole(results, PATH)
+    flip(results / PATH, 0)
+    assert not is_whole(results, PATH)

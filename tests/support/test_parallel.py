@@ -1,0 +1,59 @@
+"""The number of cores follows what the process may use, and never changes a bit of a result."""
+
+import numpy as np
+import pytest
+
+from icha import SelfAffineSpectrum, Surface
+from icha.support.parallel import blocks, cores, on_cores
+from icha.surfaces.summits import find_summits
+
+PERIOD = 100e-6
+
+
+@pytest.mark.parametrize(("asked", "expected"), [("1", 1), ("3", 3), ("0", None), ("", None), ("two", None)])
+def test_the_environment_says_how_many_threads(monkeypatch, asked, expected):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    default = cores()
+    assert default >= 1
+    monkeypatch.setenv("OMP_NUM_THREADS", asked)
+    assert cores() == (expected or default)
+
+
+@pytest.mark.parametrize("threads", ["1", "4"])
+def test_results_come_in_the_order_of_the_items(monkeypatch, threads):
+    monkeypatch.setenv("OMP_NUM_THREADS", threads)
+    assert on_cores(lambda k: k**2, range(50)) == [k**2 for k in range(50)]
+    assert on_cores(len, []) == []
+    with pytest.raises(ZeroDivisionError):
+        on_cores(lambda k: 1 / k, [2, 1, 0])
+
+
+@pytest.mark.parametrize("length", [0, 1, 63, 64, 65, 200])
+def test_blocks_cover_the_range_once(length):
+    covered = [k for block in blocks(length, 64) for k in range(block.start, block.stop)]
+    assert covered == list(range(length))
+
+
+@pytest.mark.filterwarnings("ignore:grid")
+def test_surfaces_and_summits_have_the_same_bits_on_any_number_of_cores(monkeypatch):
+    # Odd and even grids of several blocks, the last of them not full.
+    results = []
+    for threads in ("1", "2", "5"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        bits = b""
+        for grid in (333, 600):
+            surface = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 100, 0.8).realise(grid, 1)
+            summits = find_summits(surface)
+            bits += surface.heights.tobytes() + np.array(surface.spectral_moments).tobytes()
+            bits += summits.position.tobytes() + summits.height.tobytes() + summits.radius.tobytes()
+        results.append(bits)
+    assert results[0] == results[1] == results[2]
+
+
+def test_blocks_leave_no_seam():
+    # The statistics and summits of a wave are everywhere the same, whichever block they fall into.
+    n = 200
+    x = 2 * np.pi * np.arange(n) / n
+    summits = find_summits(Surface(np.cos(20 * x)[None, :] + np.cos(20 * x)[:, None], PERIOD))
+    assert len(summits) == 400
+    np.testing.assert_allclose(summits.radius, summits.radius[0], rtol=1e-9)

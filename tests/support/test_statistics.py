@@ -1,0 +1,111 @@
+"""Statistics over seeds against known numbers, and that bands hold the mean as often as they say."""
+
+import numpy as np
+import pytest
+import small_campaign as small
+import xarray as xr
+from scipy.stats import t, ttest_1samp
+
+from icha.analysis.common_loads import compare_runs, mean_curve, mean_way
+from icha.datasets.campaign import LABELS, campaign_tree, reduced_gap
+from icha.datasets.labels import RunLabels
+from icha.support.statistics import ensemble
+
+
+def test_known_numbers():
+    # Student's own table: 2.776 for four degrees of freedom, 12.706 for one.
+    five = ensemble([1.0, 2.0, 3.0, 4.0, 5.0])
+    assert (float(five.mean), float(five.deviation), int(five.count)) == (3.0, pytest.approx(np.sqrt(2.5)), 5)
+    assert float(five.confidence) == pytest.approx(2.7764451 * np.sqrt(2.5 / 5), rel=1e-7)
+    two = ensemble([1.0, 3.0])
+    assert float(two.confidence) == pytest.approx(12.7062047, rel=1e-7)
+
+
+def test_the_band_is_what_the_t_test_does_not_refuse():
+    rng = np.random.default_rng(1)
+    samples = rng.normal(2.0, 0.7, (9, 4))
+    over = ensemble(samples)
+    for edge in (over.mean - over.confidence, over.mean + over.confidence):
+        np.testing.assert_allclose(ttest_1samp(samples, edge).pvalue, 0.05, rtol=1e-9)
+    np.testing.assert_allclose(over.confidence, t.interval(0.95, 8, scale=over.deviation / 3)[1])
+
+
+def test_bands_hold_the_mean_nineteen_times_of_twenty():
+    rng = np.random.default_rng(2)
+    over = ensemble(rng.normal(1.0, 3.0, (4, 40000)))
+    held = np.mean(np.abs(over.mean - 1.0) <= over.confidence)
+    assert held == pytest.approx(0.95, abs=4 * np.sqrt(0.05 * 0.95 / 40000))
+
+
+def test_members_without_a_value_do_not_count():
+    over = ensemble([[1.0, np.nan, np.nan], [3.0, 5.0, np.nan]])
+    np.testing.assert_array_equal(over.count, [2, 1, 0])
+    np.testing.assert_array_equal(over.mean, [2.0, 5.0, np.nan])
+    assert np.isfinite(over.confidence).tolist() == np.isfinite(over.deviation).tolist() == [True, False, False]
+
+
+def test_curves_of_the_same_stops_are_not_interpolated():
+    load = np.array([1e-3, 1e-2, 1e-1])
+    at, over = mean_curve([(load, 2 * load), (load[::-1], 4 * load[::-1])], logarithmic=True)
+    np.testing.assert_array_equal(at, load)
+    np.testing.assert_array_equal(over.mean, 3 * load)
+
+
+def test_curves_of_other_stops_are_averaged_where_all_are():
+    one, other = np.geomspace(1e-4, 1e-1, 9), np.geomspace(1e-3, 1.0, 7)
+    at, over = mean_curve([(one, 2 * one**0.9), (other, 4 * other**0.9)], logarithmic=True)
+    assert (at[0], at[-1]) == pytest.approx((1e-3, 1e-1))
+    np.testing.assert_allclose(over.mean, 3 * at**0.9, rtol=1e-9)
+    np.testing.assert_allclose(over.confidence, 12.7062047 * at**0.9, rtol=1e-7)
+    apart, _ = mean_curve(
+        [(np.array([1e-3, 2e-3]), np.ones(2)), (np.array([1e-2, 2e-2]), np.ones(2))], logarithmic=True
+    )
+    assert len(apart) == 0
+
+
+def way(separation, pressure):
+    area = np.where(np.asarray(pressure) == 0, 0.0, 0.1)
+    columns = {"reduced_separation": separation, "reduced_pressure": pressure, "contact_area_fraction": area}
+    return xr.Dataset({name: ("step", np.asarray(values, float)) for name, values in columns.items()})
+
+
+def test_ways_are_averaged_at_the_same_displacement_and_are_zero_when_separated():
+    at, over = mean_way([way([3, 2, 1], [0, 1, 2]), way([4.5, 3, 0.5], [0, 3, 8])])
+    # From where they are loaded most: at 1 and 0.5, which is 0.75 in the mean.
+    assert (at[0], at[-1]) == pytest.approx((4.75, 0.75))
+    pressure = over["reduced_pressure"].mean
+    assert pressure[0] == 0 and pressure[-1] == (2 + 8) / 2
+    assert np.interp(-1.75, -at, pressure) == pytest.approx((1 + 6) / 2, rel=1e-2)
+    assert np.interp(-3.75, -at, pressure) == pytest.approx((0 + 2) / 2, rel=1e-2)
+    # On the way back, in its order; ways that end in contact end where the first of them does.
+    at, _ = mean_way([way([1, 2, 3], [2, 1, 0]), way([0.5, 3, 4.5], [8, 3, 0])])
+    assert (at[0], at[-1]) == pytest.approx((0.75, 4.75))
+    at, _ = mean_way([way([1, 2, 3], [2, 1, 0.5]), way([0.5, 3, 4.5], [8, 3, 0.5])])
+    assert (at[0], at[-1]) == pytest.approx((0.75, 2.75))
+
+
+def test_the_comparison_has_bands_over_the_complete_seeds():
+    runs = [(RunLabels("one", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2, 3)]
+    runs.append((RunLabels("one", "rough", 4, 1.0, "soft"), small.run(4).assign_attrs(incomplete="a test")))
+    comparison = compare_runs(campaign_tree(runs)["one"].to_dataset())
+    areas = comparison["contact_area_fraction"].transpose(*LABELS, ...).values[0, :3, 0, 0]
+    expected = ensemble(areas)
+    assert comparison["seed_count"].item() == 3
+    for name in ("mean", "deviation", "confidence"):
+        np.testing.assert_allclose(comparison[f"area_{name}"].values[0, 0, 0], getattr(expected, name), rtol=1e-12)
+        assert np.all(comparison[f"separation_{name}"].values > 0)
+    one = compare_runs(campaign_tree(runs[:1])["one"].to_dataset())
+    assert np.isnan(one["area_confidence"].values).all() and np.isfinite(one["area_mean"].values).all()
+
+
+def test_separations_of_a_free_square_are_compared_by_its_mean_gap():
+    study = xr.Dataset(
+        {
+            "reduced_separation": (("surface", "step"), [[2.0, 1.0], [-1.0, -2.0]]),
+            "mean_gap": (("surface", "step"), [[4e-6, 2e-6], [3e-6, 1e-6]]),
+            "rms_height": ("surface", [2e-6, 1e-6]),
+            "boundary": ("surface", ["periodic", "free"]),
+        }
+    )
+    np.testing.assert_allclose(reduced_gap(study), [[2.0, 1.0], [3.0, 1.0]])
+    np.testing.assert_allclose(reduced_gap(study.isel(surface=1)), [3.0, 1.0])

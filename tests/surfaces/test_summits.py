@@ -1,0 +1,195 @@
+"""Summits against the exact maxima of band-limited surfaces, evaluated as Fourier sums."""
+
+import numpy as np
+import pytest
+import scipy.optimize
+from scipy.spatial import cKDTree
+
+from icha import SelfAffineSpectrum, Surface
+from icha.surfaces.summits import find_summits
+
+PERIOD = 100e-6
+SPECTRUM = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 16, 0.8)
+
+
+class FourierSum:
+    """Heights, gradients and Hessians of a band-limited periodic surface at any point, in units of the cell."""
+
+    def __init__(self, surface, highest):
+        n = surface.grid
+        spectrum = np.fft.fft2(surface.heights) / n**2
+        self.k = np.arange(-highest, highest + 1)
+        self.c = spectrum[np.ix_(self.k % n, self.k % n)]
+
+    def __call__(self, x, y, dy=0, dx=0):
+        ey = (2j * np.pi * self.k) ** dy * np.exp(2j * np.pi * self.k * y)
+        ex = (2j * np.pi * self.k) ** dx * np.exp(2j * np.pi * self.k * x)
+        return (ey @ self.c @ ex).real
+
+    def gradient(self, at):
+        return np.array([self(*at, 0, 1), self(*at, 1, 0)])
+
+    def hessian(self, at):
+        mixed = self(*at, 1, 1)
+        return np.array([[self(*at, 0, 2), mixed], [mixed, self(*at, 2, 0)]])
+
+
+def exact_maxima(surface, highest=16, fine=512):
+    """All maxima: from the nodes of a far finer grid (Fourier interpolation) near a critical point."""
+    exact = FourierSum(surface, highest)
+    n = fine
+    spectrum = np.zeros((n, n), dtype=complex)
+    spectrum[np.ix_(exact.k % n, exact.k % n)] = exact.c
+    q = 2j * np.pi * np.fft.fftfreq(n, 1 / n)
+    qy, qx = q[:, None], q[None, :]
+    gy, gx, hyy, hxx, hxy = (np.fft.ifft2(spectrum * factor).real * n**2 for factor in (qy, qx, qy**2, qx**2, qx * qy))
+    determinant = hyy * hxx - hxy**2
+    with np.errstate(divide="ignore"):
+        step = np.hypot(hxx * gy - hxy * gx, hyy * gx - hxy * gy) / np.abs(determinant)
+    start = np.argwhere((determinant > 0) & (hxx < 0) & (step < 1.5 / n))[:, ::-1] / n
+    found = []
+    for guess in start:
+        solution = scipy.optimize.root(exact.gradient, guess, jac=exact.hessian, tol=1e-13)
+        at = solution.x
+        if np.max(np.abs(exact.gradient(at))) < 1e-9 * surface.rms_height * 1e3 and np.all(
+            np.linalg.eigvalsh(exact.hessian(at)) < 0
+        ):
+            at = np.mod(at, 1)
+            if not any(np.max(np.abs((at - other + 0.5) % 1 - 0.5)) < 1e-6 for other in found):
+                found.append(at)
+    at = np.array(found)
+    height = np.array([exact(*p) for p in at])
+    radius = np.array([1 / np.sqrt(np.linalg.det(exact.hessian(p))) for p in at])
+    return at * surface.period, height, radius * surface.period**2
+
+
+@pytest.mark.parametrize(("grid", "height_error", "radius_error"), [(128, 2e-4, 1e-2), (256, 3e-6, 3e-4)])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_all_maxima_of_a_rough_surface_are_found(grid, height_error, radius_error, seed):
+    surface = SPECTRUM.realise(grid, seed)
+    position, height, radius = exact_maxima(surface)
+    summits = find_summits(surface)
+    assert len(summits) == len(height)
+    distance, index = cKDTree(np.mod(position, PERIOD), boxsize=PERIOD).query(summits.position)
+    assert len(set(index)) == len(index)
+    np.testing.assert_allclose(summits.height, height[index], atol=height_error * surface.rms_height)
+    # Where one of the curvatures nearly vanishes, its relative error is amplified: the others must be as good as
+    # the spline, the worst may be ten times worse.
+    error = np.abs(summits.radius / radius[index] - 1)
+    assert np.quantile(error, 0.9) < radius_error
+    assert error.max() < 10 * radius_error
+    assert np.quantile(distance, 0.9) < 0.05 * surface.spacing
+
+
+@pytest.mark.parametrize("centre", [(0.5, 0.5), (0.503, 0.4963), (0.0, 0.9999)])
+def test_one_paraboloid_is_found_below_the_grid(centre):
+    n, curvature_radius = 64, 7e-3
+    x = np.arange(n) / n
+    dx, dy = x - centre[0], x - centre[1]
+    r2 = ((dx - np.rint(dx)) ** 2)[None, :] + ((dy - np.rint(dy)) ** 2)[:, None]
+    heights = -r2 * PERIOD**2 / (2 * curvature_radius)
+    summits = find_summits(Surface(heights, PERIOD))
+    assert len(summits) == 1
+    offset = summits.position[0] / PERIOD - centre
+    np.testing.assert_allclose(offset - np.rint(offset), 0, atol=1e-9)
+    assert summits.height[0] == pytest.approx(-heights.mean(), rel=1e-9)
+    assert summits.radius[0] == pytest.approx(curvature_radius, rel=1e-8)
+
+
+def test_the_radius_is_the_geometric_mean_of_an_ellipsoidal_summit():
+    n = 64
+    x = 2 * np.pi * np.arange(n) / n
+    heights = 3e-7 * np.cos(x)[None, :] + 2e-7 * np.cos(x)[:, None]
+    summits = find_summits(Surface(heights, PERIOD))
+    q2 = (2 * np.pi / PERIOD) ** 2
+    assert len(summits) == 1
+    # The quintic spline has the curvature of a wave to (q dx)^4/720.
+    error = (2 * np.pi / n) ** 4 / 720
+    assert summits.radius[0] == pytest.approx(1 / np.sqrt(3e-7 * q2 * 2e-7 * q2), rel=1.1 * error)
+
+
+def test_a_summit_between_equal_nodes_is_found_once():
+    n = 32
+    x = 2 * np.pi * (np.arange(n) - 0.5) / n
+    surface = Surface(1e-6 * (np.cos(4 * x)[None, :] + np.cos(4 * x)[:, None]), PERIOD)
+    summits = find_summits(surface)
+    assert len(summits) == 16
+    offset = (summits.position / surface.spacing - 0.5) / 8
+    np.testing.assert_allclose(offset, np.rint(offset), atol=1e-6)
+
+
+@pytest.mark.parametrize("grid", [32, 64, 128])
+def test_oblique_elongated_summits_do_not_depend_on_the_grid(grid):
+    # Ridges with 125 times the curvature across as along, at an angle to the grid: the highest nodes of a coarse
+    # grid lie somewhere along the crest.
+    x = 2 * np.pi * np.arange(grid) / grid
+    across = np.cos(4 * x[None, :] + 3 * x[:, None])
+    along = np.cos(-1 * x[None, :] + 1 * x[:, None])
+    summits = find_summits(Surface(1e-6 * (across + 0.1 * along), PERIOD))
+    # Both cosines are one at 7 points of the cell, the determinant of ((4, 3), (-1, 1)); there det H = A B 7^2 q^4.
+    assert len(summits) == 7
+    exact = 1 / (1e-6 * np.sqrt(0.1) * 7 * (2 * np.pi / PERIOD) ** 2)
+    # The spline's error of the large curvature, (q dx)^4/720, is that much larger beside the small one.
+    error = 0.5 * 125 * (5 * 2 * np.pi / grid) ** 4 / 720
+    np.testing.assert_allclose(summits.radius, exact, rtol=error)
+    np.testing.assert_allclose(summits.height, 1.1e-6, rtol=error / 125)
+
+
+def test_density_of_summits_is_that_of_a_gaussian_surface():
+    # Longuet-Higgins (Nayak): (1/(6 pi sqrt 3)) m4/m2 per area, with the moments of a profile.
+    surface = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 32, 0.8).realise(256, 3)
+    _, slope2, laplacian2 = surface.spectral_moments
+    density = (3 / 8 * laplacian2) / (0.5 * slope2) / (6 * np.pi * np.sqrt(3))
+    expected = density * PERIOD**2
+    assert len(find_summits(surface)) == pytest.approx(expected, rel=0.1)
+
+
+def test_turning_and_shifting_the_surface_turns_and_shifts_the_summits():
+    surface = SPECTRUM.realise(128, 4)
+    reference = find_summits(surface)
+
+    def matched(heights, back):
+        summits = find_summits(Surface(heights, PERIOD))
+        assert len(summits) == len(reference)
+        tree = cKDTree(np.mod(back(summits.position), PERIOD), boxsize=PERIOD)
+        distance, index = tree.query(reference.position)
+        assert distance.max() < 1e-6 * surface.spacing
+        np.testing.assert_allclose(summits.height[index], reference.height, rtol=1e-10)
+        np.testing.assert_allclose(summits.radius[index], reference.radius, rtol=1e-7)
+
+    matched(np.roll(surface.heights, (17, -40), axis=(0, 1)), lambda p: p - np.array([-40, 17]) * surface.spacing)
+    # rot90 takes node (row, column) to (n - 1 - column, row).
+    matched(
+        np.rot90(surface.heights),
+        lambda p: np.stack([(127 * surface.spacing - p[:, 1]), p[:, 0]], axis=1),
+    )
+
+
+def test_positions_lie_in_the_cell_and_values_are_finite():
+    for seed in range(5):
+        summits = find_summits(SPECTRUM.realise(64, seed))
+        assert np.all((summits.position >= 0) & (summits.position < PERIOD))
+        assert np.all(np.isfinite(summits.height))
+        assert np.all((summits.radius > 0) & np.isfinite(summits.radius))
+
+
+def test_no_summit_lies_above_the_surface_around_it():
+    # Near-degenerate curvatures must not throw a summit off: its height is the interpolated surface's.
+    surface = SPECTRUM.realise(64, 6)
+    summits = find_summits(surface)
+    exact = FourierSum(surface, 16)
+    there = np.array([exact(*p) for p in summits.position / PERIOD])
+    np.testing.assert_allclose(summits.height, there, atol=2e-3 * surface.rms_height)
+
+
+def test_noise_on_every_node_is_no_obstacle():
+    heights = np.random.default_rng(8).normal(size=(64, 64))
+    summits = find_summits(Surface(heights, 1.0))
+    assert len(summits) > 0.1 * 64**2
+    assert np.all(np.isfinite(summits.radius))
+
+
+def test_a_ridge_without_summits_is_refused():
+    x = 2 * np.pi * np.arange(32) / 32
+    with pytest.raises(ValueError, match="heights"):
+        find_summits(Surface(np.cos(x)[None, :] * np.ones((32, 1)), 1.0))

@@ -1,0 +1,137 @@
+"""A run that fails does not stop its campaign: its file says why, the verdict lists it, the rest is drawn."""
+
+import cyclic_campaign as cyclic
+import numpy as np
+import pytest
+import small_campaign as small
+
+from icha.analysis.checks import check_campaign, read_checks
+from icha.datasets.campaign import RunLabels, campaign_tree, select_run
+from icha.datasets.files import read_campaign, read_run, write_dataset, write_surface
+from icha.figures.fig2_area_and_gap import figure
+from icha.figures.select import NothingToDraw
+
+ATTRIBUTES = {"campaign": "small", "study": "sticky", "config_sha256": "0", "license": "CC0-1.0"}
+PATH = {"reduced_pressures": [1e-3], "snapshots": [("reduced_pressure", 1e-3)]}
+# The energy is ten times that which it takes to press the summits flat.
+STICKY = {"contact_modulus": 1e6, "surface_energy": 48.0, "interaction_range": 8e-6}
+BARE = {"contact_modulus": 25e6, "surface_energy": 0.0, "interaction_range": 2.071e-9}
+
+
+@pytest.fixture(autouse=True)
+def scripts(request, monkeypatch):
+    monkeypatch.syspath_prepend(str(request.config.rootpath / "workflow/scripts"))
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    """Press the same surface against a material by the job's own script; give the file."""
+    from run_sweep import run_sweep
+
+    write_surface(tmp_path / "surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+
+    def run(name, material, path=PATH):
+        said = []
+        run_sweep(
+            tmp_path / "surface.nc",
+            tmp_path / f"{name}.nc",
+            rms_slope=1.0,
+            seed=1,
+            material=material,
+            path=path,
+            attributes=ATTRIBUTES,
+            progress=said.append,
+        )
+        return tmp_path / f"{name}.nc", said
+
+    return run
+
+
+@pytest.fixture
+def dataset(tmp_path):
+    """Put files of runs into a campaign dataset by the job's own script; give its file."""
+    from make_dataset import make_dataset
+
+    def make(files):
+        labels = [tuple(RunLabels("sticky", "rough", 1, 1.0, name)) for name in files]
+        make_dataset(
+            files.values(), tmp_path / "c.nc", labels=labels, attributes={"title": "Sticky", "config_sha256": "1"}
+        )
+        return tmp_path / "c.nc", labels
+
+    return make
+
+
+def test_the_file_of_a_run_without_a_single_stop_says_why(sweep):
+    file, said = sweep("sticky", STICKY)
+    run = read_run(file)
+    assert run.sizes["step"] == run.sizes["snapshot"] == run.sizes["spot"] == 0
+    assert "sticky" in run.attrs["incomplete"] and "after 0 of 1 stops" in run.attrs["incomplete"]
+    assert said[-1] == f"Failed: {run.attrs['incomplete']}"
+    assert float(run["surface_energy"]) == 48.0 and run.attrs["config_sha256"] == "0"
+    again, _ = sweep("again", STICKY)
+    assert again.read_bytes() == file.read_bytes()
+
+
+@pytest.mark.parametrize("path", [PATH, PATH | {"unload": True}], ids=["loading", "both ways"])
+def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset, tmp_path, path):
+    from check_results import check_results
+    from judge_results import judge_results
+
+    # The failed one comes first: what a study has is known from the others.
+    files = {"glue": sweep("glue", STICKY, path)[0], "soft": sweep("soft", BARE, path)[0]}
+    file, labels = dataset(files)
+    broken = read_run(files["glue"])
+    reason = broken.attrs["incomplete"]
+    tree = read_campaign(file)
+    study = tree["sticky"].to_dataset().isel(surface=0, seed=0, rms_slope=0)
+    assert study["status"].values.tolist() == [1, 0] and study["failure"].values.tolist() == [reason, ""]
+    assert int(study["step_count"][0]) == broken.sizes["step"] < study.sizes["step"]
+    whole, soft = read_run(files["soft"]), select_run(tree, labels[1])
+    for name in ("nominal_pressure", "gap_density", "spot_force", "jump_in_count"):
+        np.testing.assert_array_equal(soft[name].values, whole[name].values)
+    glue = select_run(tree, labels[0])
+    assert glue.attrs["incomplete"] == reason
+    assert glue.sizes["snapshot"] == glue.sizes["spot"] == 0
+    np.testing.assert_array_equal(glue["nominal_pressure"].values, broken["nominal_pressure"].values)
+
+    check_results(file, [], tmp_path / "checks.json", labels=labels, solution_labels=[])
+    failed = [check for check in read_checks(tmp_path / "checks.json") if not check.passed]
+    assert [(check.subject, check.description) for check in failed] == [("sticky/rough/seed1/slope1/glue", reason)]
+    with pytest.raises(ValueError) as verdict:
+        judge_results(tmp_path / "checks.json", tmp_path / "verdict.txt", known={})
+    first, line = str(verdict.value).splitlines()
+    assert first.startswith("1 of ") and line == f"sticky/rough/seed1/slope1/glue: the run failed: {reason}"
+    assert not (tmp_path / "verdict.txt").exists()
+    judge_results(
+        tmp_path / "checks.json", tmp_path / "verdict.txt", known={"sticky/rough/seed1/slope1/glue": "sticky"}
+    )
+    first, line = (tmp_path / "verdict.txt").read_text().splitlines()
+    assert first.endswith("known failures:") and line == "sticky/rough/seed1/slope1/glue: sticky"
+
+
+def test_a_campaign_of_failed_runs_only_is_a_dataset_and_an_empty_page(sweep, dataset, tmp_path):
+    from draw_figure import draw_figure
+
+    file, _ = dataset({name: sweep(name, STICKY)[0] for name in ("one", "two")})
+    tree = read_campaign(file)
+    assert tree["sticky"].sizes["step"] == 0
+    assert {check.name for check in check_campaign(tree) if not check.passed} == {"completed"}
+    with pytest.raises(NothingToDraw):
+        figure(tree, study="sticky")
+    files = [tmp_path / f"fig2.{ending}" for ending in ("png", "pdf")]
+    draw_figure("fig2_area_and_gap", *files, data={"campaign": file}, options={"study": "sticky"})
+    assert all(file.stat().st_size > 1000 for file in files)
+
+
+def test_other_errors_still_fail_the_job(sweep, tmp_path):
+    with pytest.raises(ValueError, match="beyond what the model covers"):
+        sweep("wrong", BARE, PATH | {"snapshots": [("relative_load", 1e3)]})
+    assert not (tmp_path / "wrong.nc").exists()
+
+
+def test_a_way_back_that_breaks_off_keeps_its_reason_through_its_file(tmp_path):
+    labels, run = next(iter(cyclic.runs().items()))
+    write_dataset(run.isel(step=slice(0, 6)).assign_attrs(incomplete="the path ends there"), tmp_path / "run.nc")
+    taken = select_run(campaign_tree([(labels, read_run(tmp_path / "run.nc"))]), labels)
+    assert taken.attrs["incomplete"] == "the path ends there" and taken.sizes["step"] == 6

@@ -1,0 +1,133 @@
+"""What surrounds the work of every job: records of results, damaged inputs, logs that cannot be written, its end."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from conftest import REPOSITORY
+
+from icha.support.atomic_files import whole_file, why_not_writable
+from icha.support.checksums import is_whole, lost, write_record
+
+RESULTS = "results/tiny"
+SCRIPT = f"""
+import sys
+from types import SimpleNamespace
+sys.path.insert(0, {str(REPOSITORY / "workflow/scripts")!r})
+from job import guarded
+snakemake = SimpleNamespace(
+    input=["{RESULTS}/surfaces/a.nc", "elsewhere.txt"], output=["{RESULTS}/runs/b.nc"], log=[sys.argv[1]]
+)
+with guarded(snakemake):
+    print("at work", flush=True)
+"""
+WORK = f"    open('{RESULTS}/runs/b.nc', 'w').write('a result')\n"
+
+
+@pytest.fixture
+def job(tmp_path):
+    """Start a job with one input in a folder of results."""
+    for folder in ("surfaces", "runs", "logs"):
+        (tmp_path / RESULTS / folder).mkdir(parents=True)
+    (tmp_path / RESULTS / "surfaces/a.nc").write_bytes(b"heights")
+    write_record(tmp_path / RESULTS, "surfaces/a.nc")
+
+    def start(work, log="logs/b.log", **environment):
+        return subprocess.Popen(
+            [sys.executable, "-c", SCRIPT + work, f"{RESULTS}/{log}"],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": str(REPOSITORY)} | environment,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    start.results = tmp_path / RESULTS
+    return start
+
+
+def ended(process):
+    said = process.communicate(timeout=60)[1]
+    return process.returncode, said
+
+
+def test_a_job_records_what_it_wrote(job):
+    assert ended(job(WORK)) == (0, "")
+    assert json.loads((job.results / "checksums/runs/b.nc.json").read_text())["size"] == len("a result")
+    assert (job.results / "logs/b.log").read_text() == "at work\n"
+    assert "cpu_seconds" in json.loads((job.results / "logs/b.usage.json").read_text())
+
+
+def test_a_job_that_fails_leaves_its_result_to_be_made_again(job):
+    (job.results / "runs/b.nc").write_text("a former result")
+    write_record(job.results, "runs/b.nc")
+    (job.results / "runs/b.nc").unlink()
+    assert ended(job("    raise ValueError('wrong input')\n"))[0] == 1
+    assert (job.results / "logs/b.log").read_text() == "at work\nError: wrong input\n"
+    assert lost(job.results) == ["runs/b.nc"]
+
+
+def test_a_job_refuses_what_the_disk_has_spoilt_and_the_next_call_knows(job):
+    file = job.results / "surfaces/a.nc"
+    before = file.stat()
+    file.write_bytes(b"hexghts")
+    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert is_whole(job.results, "surfaces/a.nc")
+    assert ended(job(WORK))[0] == 1
+    said = (job.results / "logs/b.log").read_text()
+    assert said.startswith(f"Error: {RESULTS}/surfaces/a.nc: not what was written") and "at work" not in said
+    assert not (job.results / "runs/b.nc").exists()
+    assert not is_whole(job.results, "surfaces/a.nc")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a file on which nothing can be written")
+def test_what_a_job_has_to_say_comes_to_the_terminal_if_its_log_cannot_be_written(job):
+    (job.results / "logs/full.log").symlink_to("/dev/full")
+    status, said = ended(job(WORK, log="logs/full.log"))
+    assert status == 1
+    assert said.removeprefix("at work\n") == "Error: [Errno 28] No space left on device\n"
+
+
+def test_a_job_ends_with_the_snakemake_that_wants_it(job):
+    snakemake = subprocess.Popen(["sleep", "600"])
+    process = job(f"    import time\n{WORK}    time.sleep(600)\n", ICHA_SNAKEMAKE=str(snakemake.pid))
+    until = time.monotonic() + 60
+    while not (job.results / "runs/b.nc").exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    assert process.poll() is None
+    snakemake.send_signal(signal.SIGKILL)
+    snakemake.wait()
+    assert ended(process) == (1, "")
+
+
+def test_a_library_that_cannot_write_is_told_apart_from_one_that_will_not(tmp_path):
+    # A largest size of files stands for the full disk: netCDF says of both that there was an HDF error.
+    code = f"""
+import resource, sys
+import numpy as np, netCDF4
+from icha.support.atomic_files import whole_file
+resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+with whole_file({str(tmp_path / "folder/large.nc")!r}) as temporary:
+    with netCDF4.Dataset(temporary, "w") as data:
+        data.createDimension("x", 100000)
+        data.createVariable("y", "f8", ("x",))[:] = np.arange(100000.0)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPOSITORY)
+    assert f"OSError: [Errno 27] File too large: '{tmp_path}/folder'" in done.stderr.splitlines()[-1]
+    assert list((tmp_path / "folder").iterdir()) == []
+
+
+def test_what_cannot_be_removed_does_not_hide_the_reason(tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(30, "Read-only file system")
+
+    for what in ("write_bytes", "unlink"):
+        monkeypatch.setattr(Path, what, refuse)
+    assert why_not_writable(tmp_path).errno == 30
+    with pytest.raises(OSError, match="Read-only file system") as raised, whole_file(tmp_path / "a.txt"):
+        raise RuntimeError("a library's own words")
+    assert raised.value.filename == str(tmp_path)

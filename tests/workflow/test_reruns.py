@@ -1,0 +1,234 @@
+"""What is computed again after an edit: what depends on it, and nothing else.
+
+A copy of the project with a finished campaign is edited; a dry run then says which jobs Snakemake would run.
+"""
+
+import ast
+import os
+import re
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+from conftest import copy_project, snakemake
+
+REPOSITORY = Path(__file__).parents[2]
+
+ALL_RULES = {
+    "configuration",
+    "surface",
+    "reference",
+    "boundary_elements",
+    "boundary_element_loop",
+    "error_sources",
+    "one_asperity",
+    "run",
+    "campaign_dataset",
+    "comparison",
+    "model_error",
+    "checks",
+    "verdict",
+    "figure",
+    "report_page",
+}
+BESIDE_RUNS = {"reference", "boundary_elements", "boundary_element_loop", "error_sources", "one_asperity"}
+WHAT_FOLLOWS_RUNS = ALL_RULES - {"configuration", "surface"} - BESIDE_RUNS
+
+
+def planned(project, *arguments):
+    """Rules that would run, with the number of their jobs, and the messages of those jobs."""
+    plan = snakemake(project, "--dry-run", *arguments)
+    text = plan.stdout
+    assert plan.returncode == 0, text
+    jobs = {}
+    if "Nothing to be done" not in text:
+        table = text.split("Job stats:")[1].split("total")[0]
+        jobs = {name: int(count) for name, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
+        jobs.pop("all", None)
+    return jobs, re.findall(r"^Job \d+: (.*)$", text, re.MULTILINE)
+
+
+def replace(file, old, new):
+    text = file.read_text(encoding="utf-8")
+    assert old in text, f"{file.name} no longer holds {old!r}"
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def add_statement(file):
+    """Change what a module does, if only by a name that nobody asks for."""
+    with file.open("a", encoding="utf-8") as module:
+        module.write("\n_ADDED_BY_A_TEST = 1\n")
+
+
+def test_nothing_runs_twice(project):
+    assert planned(project) == ({}, [])
+
+
+def test_comments_docstrings_formatting_and_touch_run_nothing(project):
+    now = time.time()
+    for file in [*project.glob("icha/**/*.py"), *project.glob("workflow/**/*.py"), *project.glob("workflow/**/*.smk")]:
+        text = file.read_text(encoding="utf-8")
+        if file.suffix == ".py":
+            tree = ast.parse(text)
+            doc = tree.body[0] if tree.body and ast.get_docstring(tree) else None
+            if doc is not None:
+                lines = text.splitlines(keepends=True)
+                text = "".join(['"""Another docstring."""\n', *lines[doc.end_lineno :]])
+            text = f"# A new comment.\n{text}\n\n# And one at the end.\n"
+        file.write_text(text, encoding="utf-8")
+        os.utime(file, (now, now))
+    os.utime(project / "config/campaigns/smoke.yaml", (now, now))
+    assert planned(project) == ({}, [])
+
+
+def test_a_fresh_clone_with_unpacked_results_runs_nothing(smoke, tmp_path):
+    clone = copy_project(smoke, tmp_path / "elsewhere")
+    now = time.time()
+    for file in clone.rglob("*"):
+        os.utime(file, (now, now))
+    shutil.copytree(smoke / "results", clone / "results")
+    shutil.copytree(smoke / ".snakemake", clone / ".snakemake")
+    assert planned(clone) == ({}, [])
+
+
+@pytest.mark.parametrize(
+    ("module", "beside"),
+    {
+        "equilibrium": {"error_sources", "one_asperity"},
+        "jkr": {"reference", "error_sources", "one_asperity"},
+        "elasticity": {"error_sources", "one_asperity"},
+        "simulation": set(),
+        "path": {"error_sources"},
+        "dissipation": {"error_sources"},
+    }.items(),
+)
+def test_the_physics_runs_sweeps_and_what_follows(module, beside, project):
+    add_statement(project / f"icha/{module}.py")
+    jobs, _ = planned(project)
+    assert jobs["run"] == 12
+    # Boundary elements know nothing of the model: they are not solved again.
+    assert set(jobs) == WHAT_FOLLOWS_RUNS | beside
+
+
+def test_the_spectrum_runs_surfaces_and_all_that_needs_them(project):
+    add_statement(project / "icha/surfaces/spectrum.py")
+    jobs, _ = planned(project)
+    assert jobs["surface"] == 3
+    assert set(jobs) == ALL_RULES - {"configuration", "one_asperity"}
+
+
+def test_other_authors_run_the_dataset_which_names_them_and_no_sweep(project):
+    replace(project / "config/campaigns/smoke.yaml", "name: ICHA developers", "name: A team")
+    jobs, _ = planned(project)
+    assert {"configuration", "campaign_dataset", "report_page"} <= set(jobs)
+    assert not {"surface", "run", *BESIDE_RUNS} & set(jobs)
+
+
+def test_another_licence_runs_all_that_names_it(project):
+    replace(project / "config/campaigns/smoke.yaml", "license: CC-BY-4.0", "license: CC0-1.0")
+    jobs, _ = planned(project)
+    assert jobs["run"] == 12 and jobs["surface"] == 3 and set(jobs) >= BESIDE_RUNS | {"campaign_dataset", "comparison"}
+
+
+def test_a_figure_runs_itself_and_the_report(project):
+    add_statement(project / "icha/figures/fig3_distributions.py")
+    jobs, messages = planned(project)
+    assert jobs == {"figure": 1, "report_page": 1}
+    assert "Figure fig3_distributions" in messages
+
+
+def test_the_style_runs_all_figures(project):
+    add_statement(project / "icha/figures/style.py")
+    jobs, _ = planned(project)
+    assert jobs == {"figure": 16, "report_page": 1}
+
+
+def test_boundary_elements_run_without_the_sweeps(project):
+    add_statement(project / "icha/references/boundary_elements.py")
+    jobs, _ = planned(project)
+    assert jobs["boundary_elements"] == 6
+    what_follows = {"model_error", "checks", "verdict", "figure", "report_page"}
+    assert set(jobs) == {"boundary_elements", "boundary_element_loop", "error_sources", "one_asperity"} | what_follows
+
+
+def test_a_finer_grid_costs_its_own_solutions(project):
+    replace(project / "config/campaigns/smoke.yaml", "refinement: 2", "refinement: 3")
+    jobs, messages = planned(project)
+    assert jobs["boundary_elements"] == 4
+    assert "run" not in jobs
+    assert not [message for message in messages if "cmc_300nm" in message]
+
+
+def test_a_solution_that_is_lost_is_the_only_one_computed_again(project):
+    (project / "results/smoke/references/boundary_elements/adhesive/challenge/seed2/slope1/cmc_300nm/p0.01.nc").unlink()
+    jobs, _ = planned(project)
+    assert jobs["boundary_elements"] == 1
+    assert "run" not in jobs
+
+
+def test_the_page_template_runs_the_report(project):
+    with (project / "icha/templates/report.html").open("a") as template:
+        template.write("<!-- changed -->\n")
+    assert planned(project)[0] == {"report_page": 1}
+
+
+def test_literature_runs_references_and_what_shows_them(project):
+    replace(project / "icha/reference/literature.json", "0.185", "0.186")
+    jobs, messages = planned(project)
+    assert set(jobs) == {"reference", "figure", "report_page"}
+    assert "Figure fig2_area_and_gap" in messages
+
+
+def test_a_script_runs_its_own_rule_and_what_follows(project):
+    add_statement(project / "workflow/scripts/compare_runs.py")
+    assert set(planned(project)[0]) == {"comparison", "report_page"}
+
+
+def test_the_configurations_model_runs_nothing(project):
+    for name in ("model", "load", "expansion", "design", "problems"):
+        add_statement(project / f"icha/configuration/{name}.py")
+    assert planned(project) == ({}, [])
+
+
+def test_another_way_to_write_a_value_runs_no_sweep(project):
+    replace(project / "config/campaigns/smoke.yaml", "25 MPa", "25000 kPa")
+    jobs, _ = planned(project)
+    assert "run" not in jobs and "surface" not in jobs
+    assert "configuration" in jobs
+
+
+def test_a_value_runs_the_sweeps_that_it_concerns(project):
+    replace(project / "config/campaigns/smoke.yaml", "2 mJ/m^2", "3 mJ/m^2")
+    jobs, _ = planned(project)
+    assert jobs["run"] == 3
+    # A curve of Fuller & Tabor is that of the material.
+    assert jobs["reference"] == 1 and not {"surface", "boundary_elements", "error_sources"} & set(jobs)
+
+
+def test_a_new_seed_costs_its_own_sweeps(project):
+    replace(project / "config/campaigns/smoke.yaml", "seeds: [1, 2]", "seeds: [1, 2, 3]")
+    jobs, messages = planned(project)
+    assert jobs["surface"] == 1 and jobs["run"] == 3 and jobs["boundary_elements"] == 3
+    own = ("Surface", "Sweep", "Boundary")
+    assert all("seed 3" in message for message in messages if message.startswith(own))
+
+
+def test_an_option_of_a_figure_draws_that_figure(project):
+    replace(project / "config/campaigns/smoke.yaml", "fig1_jkr: {}", "fig1_jkr: {tabor_parameter: 4}")
+    jobs, messages = planned(project)
+    assert jobs == {"configuration": 1, "figure": 1, "report_page": 1}
+    assert "Figure fig1_jkr" in messages
+
+
+def test_fingerprints_refuse_imports_that_they_cannot_follow(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    from fingerprint import code_fingerprint
+
+    script = tmp_path / "script.py"
+    script.write_text("from icha import simulate\n")
+    with pytest.raises(ValueError, match="from the module that defines it"):
+        code_fingerprint(script)
+    script = tmp_path / "other.py"
+    script.write_text("from icha.simulation import simulate\n")
+    assert code_fingerprint(script) != code_fingerprint(REPOSITORY / "workflow/scripts/publish.py")
