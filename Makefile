@@ -67,6 +67,7 @@ test: environment
 lint: environment
 	ruff check .
 	ruff format --check .
+	lint-imports
 	snakefmt --check Snakefile workflow
 	snakemake --lint
 

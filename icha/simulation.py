@@ -10,8 +10,10 @@ from threadpoolctl import threadpool_limits
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
+from icha.asperity.stickiness import stickiness
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.attributes import COMPUTED, discovery
-from icha.datasets.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
+from icha.datasets.bins import bin_table, bin_values, with_bounds
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.energy import new_events
 from icha.equilibrium.equilibrium import (
@@ -28,7 +30,7 @@ from icha.equilibrium.equilibrium import (
 from icha.path.limits import MAX_REDUCED_PRESSURE
 from icha.path.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target, follow
 from icha.support.validation import integer
-from icha.surfaces.moments import spectral_moments, stickiness
+from icha.surfaces.moments import spectral_moments
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
 

@@ -12,7 +12,8 @@ import pytest
 import xarray as xr
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.surfaces.moments import spectral_moments, stickiness
+from icha.asperity.stickiness import stickiness
+from icha.surfaces.moments import spectral_moments
 
 PERIOD, MODULUS, ENERGY, RANGE = 100e-6, 25e6, 0.05, 2.071e-9
 ADHESIVE, BARE = Material(MODULUS, ENERGY, RANGE), Material(MODULUS, 0.0, RANGE)

@@ -11,8 +11,9 @@ import numpy as np
 import xarray as xr
 from scipy.stats import wasserstein_distance
 
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.attributes import DERIVED, collected
-from icha.datasets.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
+from icha.datasets.bins import bin_table, bin_values, with_bounds
 from icha.datasets.campaign import LABELS, RAGGED, find_snapshot, select_run, spots_of
 from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, status_variable
 from icha.datasets.labels import RunLabels, SolutionLabels

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from icha.half_space.interaction import periodic_difference
+from icha.surfaces.square import periodic_difference
 
 
 def overlapping_pairs(position, a, first, second, r):

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.asperity.jkr import JKR
-from icha.datasets.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
+from icha.contact.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
 from icha.equilibrium.equilibrium import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, displacement_field, row_blocks, windows
-from icha.half_space.interaction import cell_of
 from icha.support.parallel import on_cores
 from icha.support.validation import integer
+from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
 
 

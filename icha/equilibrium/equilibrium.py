@@ -30,7 +30,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.asperity.coalescence import covering_spot, disjoint_pairs, equivalent_spots, overlapping_pairs
 from icha.asperity.jkr import JKR
-from icha.half_space.interaction import HalfSpace, Interaction, displacement_at, mean_displacement, periodic_difference
+from icha.half_space.interaction import HalfSpace, Interaction, displacement_at, mean_displacement
+from icha.surfaces.square import periodic_difference
 from icha.surfaces.summits import Asperities
 
 # Largest equilibrium error in units of h_rms at which an equilibrium counts as found.

@@ -23,8 +23,9 @@ from scipy.special import beta, erf
 
 from icha.asperity.jkr import JKR
 from icha.half_space.free_square import basis, image_field
-from icha.half_space.interaction import _short_mean, _smooth_mode, cell_of
+from icha.half_space.interaction import _short_mean, _smooth_mode
 from icha.support.parallel import blocks, on_cores
+from icha.surfaces.square import cell_of
 
 # Cut of both halves of the Ewald sum: erfc(4.6) = 8e-11.
 _CUT = 4.6

@@ -29,6 +29,7 @@ from scipy.special import erf, erfc
 
 from icha.asperity.jkr import JKR
 from icha.half_space.free_square import basis, image_field, interpolated
+from icha.surfaces.square import cell_of, periodic_difference
 
 # Cut of both halves of the Ewald sum: erfc(4.3) = 1.2e-9.
 _CUT = 4.3
@@ -72,17 +73,6 @@ def _smooth_mode(q, alpha, contact_modulus, period):
 def _short_mean(alpha, contact_modulus, period):
     """Mean displacement by a unit point force and its images, the short-ranged half; the smooth half has none."""
     return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
-
-
-def cell_of(period, free):
-    """Side of the cell in which the points of a square repeat, m: twice the square's where it is single."""
-    return 2 * period if free else period
-
-
-def periodic_difference(first, second, period):
-    """Shortest way first - second between coordinates in the periodic cell, of any shape, m."""
-    difference = first - second
-    return difference - period * np.rint(difference / period)
 
 
 def _distance(first, second, period):

@@ -28,8 +28,9 @@ import xarray as xr
 
 from icha.asperity.cohesive_zone import longest_spacing, resolution_problem, strength_number
 from icha.asperity.material import Material
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
-from icha.datasets.bins import GAP_BINS, PRESSURE_BINS, bin_table, bin_values, with_bounds
+from icha.datasets.bins import bin_table, bin_values, with_bounds
 from icha.support.validation import integer, positive
 from icha.surfaces.surface import Surface
 

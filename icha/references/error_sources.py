@@ -46,7 +46,7 @@ from icha.asperity.material import Material
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.equilibrium.distributions import contact_cover
 from icha.equilibrium.equilibrium import Contact, ContactState, area_fraction
-from icha.half_space.interaction import HalfSpace, Interaction, displacement_at, periodic_difference
+from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
 from icha.path.path import Path, follow
 from icha.references.boundary_elements import (
     DEFAULT_TOLERANCE,
@@ -57,6 +57,7 @@ from icha.references.boundary_elements import (
     perimeter_correction,
 )
 from icha.support.validation import integer
+from icha.surfaces.square import periodic_difference
 from icha.surfaces.summits import Asperities, find_summits
 from icha.surfaces.surface import Surface
 

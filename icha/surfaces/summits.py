@@ -9,8 +9,8 @@ import scipy.ndimage
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.spatial import cKDTree
 
-from icha.half_space.interaction import cell_of
 from icha.support.parallel import blocks, on_cores
+from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
 
 # A quintic spline reproduces a parabola exactly, depends on far nodes only weakly (0.43 per cell), and at eight

@@ -9,7 +9,7 @@ from half_space import periodic_displacement
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
-from icha.datasets.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.equilibrium.distributions import (
     _gap_bin,
     contact_cover,

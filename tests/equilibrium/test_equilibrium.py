@@ -21,7 +21,8 @@ from icha.equilibrium.equilibrium import (
     mean_pressure,
     untouched,
 )
-from icha.half_space.interaction import HalfSpace, Interaction, displacement_at, periodic_difference
+from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
+from icha.surfaces.square import periodic_difference
 from icha.surfaces.summits import Asperities, find_summits
 
 MODULUS, ENERGY = 25e6, 0.05

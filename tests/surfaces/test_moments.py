@@ -7,8 +7,9 @@ import pytest
 from scipy.optimize import brentq
 
 from icha import Material, SelfAffineSpectrum, Surface
+from icha.asperity.stickiness import stickiness
 from icha.datasets.files import read_spectral_moments, write_surface
-from icha.surfaces.moments import SpectralMoments, spectral_moments, stickiness
+from icha.surfaces.moments import SpectralMoments, spectral_moments
 
 MATERIAL = Material(25e6, 0.05, 2.071e-9)
 
