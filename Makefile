@@ -12,14 +12,15 @@ export UV_NO_PROGRESS := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment slurm-environment run validation hysteresis test lint format schema docs linkcheck benchmarks benchmarks-page faults validators-environment validate clean
+.PHONY: help publish environment slurm-environment run validation hysteresis test test-all lint format schema docs linkcheck benchmarks benchmarks-page faults validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
 	@echo "make publish make the deposit of that campaign, and before it what is missing; docs/howto/publish.md"
 	@echo "make validation  run campaign validation (an hour) and write docs/validation.md and docs/error_sources.md from it"
 	@echo "make hysteresis  run campaign hysteresis (twenty minutes) and write docs/hysteresis.md from it"
-	@echo "make test    run the tests"
+	@echo "make test    run the tests that one waits for (four minutes): physics, every rule, wrong input"
+	@echo "make test-all  run them and all others: thousands of random cases, kills, resumption, Slurm, browser, deposits"
 	@echo "make lint    check style of Python code and workflow"
 	@echo "make format  put Python code and workflow into that style"
 	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
@@ -62,7 +63,11 @@ validation hysteresis: environment
 	python docs/write_pages.py $@
 
 test: environment
-	pytest -n $(CORES) --dist loadfile
+	pytest -n $(CORES) --dist loadfile -m "not slow"
+
+# Tests of random cases are run again, with more of them.
+test-all: test
+	pytest -n $(CORES) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough
 
 lint: environment
 	ruff check .

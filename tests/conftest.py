@@ -8,11 +8,18 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
 PARTS += ("pyproject.toml", "uv.lock", "README.md")
 SMOKE = "config/campaigns/smoke.yaml"
+# How many random cases a test tries: as many as one waits for, unless --hypothesis-profile asks for thorough ones. They
+# are the same ones each time, so that no change fails by chance.
+settings.register_profile("fast", max_examples=40, deadline=None, derandomize=True, database=None)
+settings.register_profile("thorough", settings.get_profile("fast"), max_examples=1000)
+settings.load_profile("fast")
+
 # Files whose tests take minutes, the longest first: begun last, they would keep one core waiting.
 LONG = ("every_case_ends", "reruns", "boundary_elements", "workflow", "slurm", "cli_run", "loops", "dissipation")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 from half_space import all_pairs, jkr_approach, jkr_force, periodic_displacement
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import icha.equilibrium.equilibrium
@@ -344,7 +344,6 @@ def counting(monkeypatch, most):
 @example(seed=140, noise=False, adhesion=-0.5, tabor=1.04, first=2.54, moves=[-0.16, -0.43])
 @example(seed=180, noise=True, adhesion=-0.6, tabor=0.5, first=1.5, moves=[0.33, -0.8])
 @example(seed=231, noise=False, adhesion=-0.09, tabor=1.07, first=2.13, moves=[-0.02, -0.4])
-@settings(max_examples=40, deadline=None, derandomize=True, database=None)
 @given(
     seed=st.integers(0, 10**6),
     noise=st.booleans(),

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
@@ -70,7 +70,6 @@ def assert_sound(run):
         assert np.all(run.nominal_pressure >= 0) and np.all(run.contact_stiffness >= 0)
 
 
-@settings(max_examples=1000, deadline=None, derandomize=True, database=None)
 @given(cases())
 def test_every_sweep_ends_converged_or_marked(case):
     surface, material, path = case
