@@ -39,7 +39,7 @@ def new(
 
     It runs as it is; with a measured file, once what that does not say of itself is filled in, which is listed.
     """
-    from icha.configuration.values import NAME_PATTERN
+    from icha.support.values import NAME_PATTERN
 
     folder = project()
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):

@@ -18,8 +18,9 @@ from pydantic import ValidationError
 
 from icha.configuration.model import BESIDE_STUDIES, SCALARS, SURFACE_KINDS, Campaign, Contact, Material, Study
 from icha.configuration.problems import Problem
-from icha.configuration.values import MEASURED, NOTHING, Unit
+from icha.configuration.values import MEASURED
 from icha.datasets.labels import number_label
+from icha.support.values import NOTHING, Unit
 
 MAX_RUNS = 100_000
 # Lists of a study, and what one of their entries is called in a case.

@@ -19,7 +19,8 @@ from icha.configuration.measurement import read_columns
 from icha.configuration.model import SURFACE_KINDS, Campaign, Defaults, Topography
 from icha.configuration.problems import Problem, problems
 from icha.configuration.topography import Crop, MeasuredSurface
-from icha.configuration.values import MEASURED, NAME_PATTERN, NOTHING
+from icha.configuration.values import MEASURED
+from icha.support.values import NAME_PATTERN, NOTHING
 from icha.surfaces.measured.height_map import read_height_map
 
 

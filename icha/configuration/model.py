@@ -23,11 +23,12 @@ from pydantic import (
 
 from icha.configuration.publication import Publication
 from icha.configuration.topography import MeasuredSurface
-from icha.configuration.values import (
-    MAX_GRID,
-    MEASURED,
+from icha.configuration.values import MAX_GRID, MEASURED, Slope, Slopes, Values
+from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.path.states import AreaFraction, ReducedPressure, Snapshot
+from icha.support.units import conversion_factor
+from icha.support.values import (
     ROUNDING,
-    AreaFraction,
     File,
     Flag,
     Label,
@@ -35,14 +36,10 @@ from icha.configuration.values import (
     Modulus,
     Name,
     Positive,
-    ReducedPressure,
     Section,
     Seeds,
-    Slope,
-    Slopes,
     SurfaceEnergy,
     Text,
-    Values,
     decreasing,
     distinct,
     exactly_one,
@@ -52,8 +49,6 @@ from icha.configuration.values import (
     number,
     stops,
 )
-from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
-from icha.support.units import conversion_factor
 
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
@@ -185,25 +180,6 @@ class Targets(Section):
         """Kind and value (SI units) of the last stop."""
         ((kinds, values),) = self.model_dump(exclude_none=True).items()
         return kinds.removesuffix("s"), values[-1]
-
-
-class Snapshot(Section):
-    """A state of which spots, gap and pressure distributions are kept: exactly one of the four keys."""
-
-    reduced_pressure: ReducedPressure | None = Field(default=None, description="At this p/(E* h'rms).")
-    relative_load: Positive | None = Field(
-        default=None, description="At this p/E* = F/(E* A0), the same load for surfaces of different slope."
-    )
-    area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
-    mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
-
-    _check = model_validator(mode="after")(exactly_one)
-
-    @property
-    def target(self) -> tuple[str, float]:
-        """Kind and value (SI units) of the state."""
-        ((kind, value),) = self.model_dump(exclude_none=True).items()
-        return kind, value
 
 
 class TurningPoint(Section):

@@ -22,8 +22,9 @@ from icha.configuration.model import (
     SourcesFigure,
     TaborFigure,
 )
-from icha.configuration.values import MAX_GRID, ROUNDING
+from icha.configuration.values import MAX_GRID
 from icha.path.limits import MAX_REDUCED_PRESSURE
+from icha.support.values import ROUNDING
 
 # Location in the configuration, value, and what is wrong with it and allowed.
 Problem = tuple[tuple, Any, str]

@@ -15,7 +15,7 @@ from urllib.parse import quote
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
-from icha.configuration.values import Section, Text, distinct
+from icha.support.values import Section, Text, distinct
 
 # How a deposit may stand to something else: the relation types of DataCite 4.5 that Zenodo knows, too.
 RELATIONS = (

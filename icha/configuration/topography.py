@@ -6,8 +6,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from icha.configuration.values import MAX_GRID, File, Length, Section, Text, integer, number, quantity
+from icha.configuration.values import MAX_GRID
 from icha.support.units import PATTERN, conversion_factor, to_si
+from icha.support.values import File, Length, Section, Text, integer, number, quantity
 
 
 def _unit_of_length(value: Any) -> float:

@@ -78,7 +78,7 @@ def gaussian_summits(period: float, m2: float, m4: float) -> float:
 
 
 def self_affine_summits(period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float) -> float:
-    """Expected number of summits of a self-affine surface with roll-off (`icha.surfaces.spectrum.SelfAffineSpectrum`); m.
+    """Expected number of summits of a self-affine surface with roll-off; m.
 
     Of the spectrum's moments as integrals over the plane of wave vectors, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
     """

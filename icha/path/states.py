@@ -1,0 +1,32 @@
+"""States of a path as a configuration names them."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+
+from icha.path.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
+from icha.support.values import Length, Positive, Section, exactly_one, number
+
+ReducedPressure = number(
+    f"a number in (0, {MAX_REDUCED_PRESSURE}], which the model covers", above=0, most=MAX_REDUCED_PRESSURE
+)
+AreaFraction = number(f"a number in (0, {MAX_AREA_FRACTION}], which the model covers", above=0, most=MAX_AREA_FRACTION)
+
+
+class Snapshot(Section):
+    """A state of which spots, gap and pressure distributions are kept: exactly one of the four keys."""
+
+    reduced_pressure: ReducedPressure | None = Field(default=None, description="At this p/(E* h'rms).")
+    relative_load: Positive | None = Field(
+        default=None, description="At this p/E* = F/(E* A0), the same load for surfaces of different slope."
+    )
+    area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
+    mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
+
+    _check = model_validator(mode="after")(exactly_one)
+
+    @property
+    def target(self) -> tuple[str, float]:
+        """Kind and value (SI units) of the state."""
+        ((kind, value),) = self.model_dump(exclude_none=True).items()
+        return kind, value

@@ -1,0 +1,202 @@
+"""Types of the values of a configuration: read with their units, kept in SI units, refused with what is allowed."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+
+from icha.support.units import PATTERN, PHYSICAL_NAMES, to_number, to_si
+
+NAME_PATTERN = r"^[a-z0-9_-]+$"
+# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
+ROUNDING = 1e-9
+
+
+def quantity(si_unit, example, minimum=None):
+    """Type of a value that is written with its unit and kept as a float in `si_unit`."""
+    allowed = f"{PHYSICAL_NAMES[si_unit]} with its unit"
+    allowed += {None: ", greater than 0", 0: ", 0 or greater"}[minimum] + f", such as {example!r}"
+
+    def read(value: Any) -> float:
+        try:
+            result = to_si(value, si_unit)
+        except ValueError as error:
+            raise ValueError(f"{error}; allowed: {allowed}") from None
+        if result < 0 or (result == 0 and minimum is None):
+            raise ValueError(f"is too small; allowed: {allowed}")
+        return result
+
+    schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
+    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), Unit(si_unit)]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Unit in which a quantity is kept, to be found in the metadata of its type."""
+
+    si: str
+
+
+def number(allowed, *, above=None, least=None, most=None):
+    """Type of a pure number within bounds; `1e-3`, which YAML takes for text, is one."""
+
+    def read(value: Any) -> float:
+        try:
+            result = to_number(value)
+        except ValueError as error:
+            raise ValueError(f"{error}; allowed: {allowed}") from None
+        if (
+            (above is not None and result <= above)
+            or (least is not None and result < least)
+            or (most is not None and result > most)
+        ):
+            raise ValueError(f"is out of range; allowed: {allowed}")
+        return result
+
+    bounds = {"exclusiveMinimum": above, "minimum": least, "maximum": most}
+    schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
+    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
+
+
+def integer(least, most=2**31 - 1):
+    """Type of an integer within bounds."""
+
+    def read(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise ValueError(f"is not an integer from {least} to {most}; allowed: {least}, {least + 1}, … {most}")
+        return value
+
+    schema = {"type": "integer", "minimum": least, "maximum": most}
+    return Annotated[int, BeforeValidator(read), WithJsonSchema(schema)]
+
+
+def flag(value: Any) -> bool:
+    """True or false, and not one of the many words that YAML and Python take for them."""
+    if not isinstance(value, bool):
+        raise ValueError("is neither true nor false; allowed: true, false")
+    return value
+
+
+def distinct(values):
+    """Refuse a list in which an entry stands twice."""
+    # Seeds may be many; of the others, which cannot all be hashed, there are few.
+    quick = all(isinstance(value, str | int | float) for value in values)
+    seen: set | list = set() if quick else []
+    for value in values:
+        if value in seen:
+            raise ValueError(f"{value!r} is given twice; allowed: every entry once")
+        seen.add(value) if quick else seen.append(value)
+    return values
+
+
+def increasing(values):
+    """Refuse a list of numbers that does not increase."""
+    for before, after in pairwise(values):
+        if not after > before:
+            raise ValueError(f"{after:g} comes after {before:g}; allowed: values in increasing order")
+    return values
+
+
+def decreasing(values):
+    """Refuse a list of lengths that does not decrease."""
+    for before, after in pairwise(values):
+        if not after < before:
+            raise ValueError(f"{after:g} m comes after {before:g} m; allowed: values in decreasing order")
+    return values
+
+
+def exactly_one(section):
+    """Refuse a section with no key given, or more than one."""
+    given = sorted(name for name in section.model_fields_set if getattr(section, name) is not None)
+    if len(given) != 1:
+        names = ", ".join(type(section).model_fields)
+        raise ValueError(f"{' and '.join(given) or 'nothing'} is given; allowed: exactly one of {names}")
+    return section
+
+
+# In the place of a value that is not there, in problems.
+NOTHING = object()
+
+Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=80)]
+# A name, or that of a variant made by a study's `vary`.
+Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_.+-]+$", max_length=200)]
+Text = Annotated[str, Field(strict=True, min_length=1)]
+
+
+def _file(value: str) -> str:
+    """Refuse paths that workflows take for patterns."""
+    if re.search(r"[{}]", value):
+        raise ValueError("has braces; allowed: the path of a file without { and } in it")
+    return value
+
+
+# The path of a file.
+File = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_file)]
+Length = quantity("m", "100 um")
+Modulus = quantity("Pa", "25 MPa")
+SurfaceEnergy = quantity("J/m^2", "50 mJ/m^2", minimum=0)
+Positive = number("a number greater than 0", above=0)
+Flag = Annotated[bool, BeforeValidator(flag)]
+
+
+def stops(kind, in_order):
+    """Type of a list of values, at least one, that `in_order` does not refuse."""
+    return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
+
+
+def list_of_names(description, kind=Name):
+    """Type of a list of names, at least one and each once."""
+    return Annotated[list[kind], Field(min_length=1, description=description), AfterValidator(distinct)]
+
+
+class Section(BaseModel):
+    """A part of the configuration: immutable, and without room for keys that nobody reads."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+_RANGE = re.compile(r"\s*(\d+)\s*\.\.\s*(\d+)\s*")
+_SEED = integer(0)
+# More are a slip of the pen.
+_MOST_SEEDS = 10**5
+
+
+def _seeds(value: Any) -> Any:
+    """Seeds with their ranges written out: `1..50`, or a list of integers and such ranges."""
+    allowed = "allowed: integers from 0 and ranges of them, such as 1..50 or [1..5, 9]"
+    if isinstance(value, list) and not value:
+        return value
+    found = []
+    for entry in value if isinstance(value, list) else [value]:
+        if not isinstance(entry, str):
+            found.append(entry)
+            continue
+        shown = f"{entry!r} " if isinstance(value, list) else ""
+        match = _RANGE.fullmatch(entry)
+        if not match:
+            raise ValueError(f"{shown}is no range of seeds; {allowed}")
+        first, last = map(int, match.groups())
+        if last < first or last - first >= _MOST_SEEDS:
+            raise ValueError(f"{shown}ends before it begins, or has more than {_MOST_SEEDS} seeds; {allowed}")
+        found += range(first, last + 1)
+    return found if isinstance(value, list | str) else value
+
+
+Seeds = Annotated[
+    list[_SEED],
+    Field(min_length=1),
+    BeforeValidator(_seeds),
+    AfterValidator(distinct),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string", "pattern": r"^\s*\d+\s*\.\.\s*\d+\s*$", "examples": ["1..50"]},
+                {"type": "array", "minItems": 1, "items": {"type": ["integer", "string"]}},
+            ]
+        }
+    ),
+]
