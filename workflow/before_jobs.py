@@ -8,7 +8,7 @@ from pathlib import Path
 
 from snakemake.logging import logger
 
-from icha.support import checksums as integrity
+from icha.support import checksums
 from icha.support.atomic_files import why_not_writable
 
 
@@ -47,14 +47,14 @@ def set_damaged_aside(results: str, dry_run: bool) -> list[str]:
     asked for, and takes what was made of them for up to date. A result of which Snakemake's record cannot be read is
     not known to be up to date, and counts as one whose job was killed.
     """
-    damaged = integrity.damaged(results)
+    damaged = checksums.damaged(results)
     for path in damaged:
         file = f"{results}/{path}"
         if dry_run:
             _tell(f"damaged, to be made again: {file}")
             continue
         try:
-            aside = integrity.set_aside(results, path)
+            aside = checksums.set_aside(results, path)
         except OSError as error:
             raise SystemExit(
                 f"{file} is not what was written, by its checksum, and cannot be set aside: {error.strerror}. "
@@ -68,7 +68,7 @@ def set_damaged_aside(results: str, dry_run: bool) -> list[str]:
             unfinished.parent.mkdir(parents=True, exist_ok=True)
             unfinished.write_text(json.dumps({"external_jobid": None}), encoding="ascii")
             record.unlink()
-    return [f"{results}/{path}" for path in {*damaged, *integrity.lost(results)}]
+    return [f"{results}/{path}" for path in {*damaged, *checksums.lost(results)}]
 
 
 def jobs_end_with_this_process() -> None:

@@ -1,11 +1,11 @@
-"""Whether results are what was written: a record of every file, made when it was.
+"""Checksum sidecars of results: begun, written, verified; and results set aside that are not what was written.
 
-The record of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`, with the file's SHA-256, size
+The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`, with the file's SHA-256, size
 and time of change. A file of the same size and time is trusted, any other one is hashed; what the storage itself has
 spoilt changes neither, and is found where a file is hashed in any case (`thorough`). A result may be a folder, too.
 
-A record without its result says that the result was there, or was about to be, and is to be made again. Results without
-a record, those of older versions for one, are taken as they are.
+A sidecar without its result says that the result was there, or was about to be, and is to be made again. Results
+without a sidecar, those of older versions for one, are taken as they are.
 """
 
 from __future__ import annotations
@@ -23,82 +23,82 @@ from icha.support.atomic_files import whole_file
 FOLDER = "checksums"
 
 
-class Record(NamedTuple):
-    """What is known of a result since it was written; of a folder the sum of sizes and the latest time of its files."""
+class Checksum(NamedTuple):
+    """A result as it was written; of a folder the sum of sizes and the latest time of its files."""
 
     sha256: str
     size: int
     mtime_ns: int
 
 
-def write_record(results: str | os.PathLike, path: str) -> None:
-    """Record the result `path`, given from the campaign's folder `results`.
+def write_checksum(results: str | os.PathLike, path: str) -> None:
+    """Write the sidecar of the result `path`, given from the campaign's folder `results`.
 
     Raises
     ------
     OSError
-        If there is no such result, or the record cannot be written.
+        If there is no such result, or the sidecar cannot be written.
     """
     file = Path(results, path)
     size, mtime_ns = _size_and_time(file)
-    _write(results, path, Record(_sha256(file), size, mtime_ns))
+    _write(results, path, Checksum(_sha256(file), size, mtime_ns))
 
 
 def begin(results: str | os.PathLike, path: str) -> None:
-    """Record that a result is about to be written; until it is recorded, whatever is there counts as whole."""
+    """Say that a result is about to be written; until its checksum is, whatever is there counts as whole."""
     _write(results, path, _BEGUN)
 
 
 def distrust(results: str | os.PathLike, path: str) -> None:
     """Have a result hashed by whoever looks at it next, whatever its size and time."""
-    record = _read(results, path)
-    if record not in (None, _BEGUN):
-        _write(results, path, record._replace(mtime_ns=0))
+    written = _read(results, path)
+    if written not in (None, _BEGUN):
+        _write(results, path, written._replace(mtime_ns=0))
 
 
 def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -> bool:
-    """Whether the result `path` in the campaign's folder `results` is what was written, as far as that is recorded.
+    """True if the result `path` in the campaign's folder `results` is what was written, or has no sidecar.
 
-    A file of the recorded size and time is taken for whole, unless all are to be hashed (`thorough`). A file that was
-    only copied or touched has another time and the same content; its record gets the new time, where it can be written.
+    A file of the same size and time is taken for whole, unless all are to be hashed (`thorough`). A file that was only
+    copied or touched has another time and the same content; its sidecar gets the new time, where it can be written.
 
-    A record that cannot be read vouches for nothing: its result does not count as whole.
+    A sidecar that cannot be read vouches for nothing: its result does not count as whole.
     """
     file = Path(results, path)
     try:
-        record = _read(results, path)
+        written = _read(results, path)
     except ValueError:
         return not file.exists()
-    if record in (None, _BEGUN):
+    if written in (None, _BEGUN):
         return True
     try:
         size, mtime_ns = _size_and_time(file)
     except FileNotFoundError:
         return True  # nothing there that could be damaged
-    if size != record.size:
+    if size != written.size:
         return False
-    if mtime_ns == record.mtime_ns and not thorough:
+    if mtime_ns == written.mtime_ns and not thorough:
         return True
-    if _sha256(file) != record.sha256:
+    if _sha256(file) != written.sha256:
         return False
-    if mtime_ns != record.mtime_ns:
+    if mtime_ns != written.mtime_ns:
         with contextlib.suppress(OSError):
-            _write(results, path, record._replace(mtime_ns=mtime_ns))
+            _write(results, path, written._replace(mtime_ns=mtime_ns))
     return True
 
 
 def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
     """Paths of all results of a campaign that are there but are not what was written, sorted."""
-    return [path for path in recorded(results) if not is_whole(results, path, thorough=thorough)]
+    return [path for path in with_sidecar(results) if not is_whole(results, path, thorough=thorough)]
 
 
 def lost(results: str | os.PathLike) -> list[str]:
-    """Paths of all results of a campaign that are recorded but are not there, sorted."""
-    return [path for path in recorded(results) if not os.path.exists(os.path.join(results, path))]
+    """Paths of all results of a campaign that have a sidecar but are not there, sorted."""
+    return [path for path in with_sidecar(results) if not os.path.exists(os.path.join(results, path))]
 
 
-def recorded(results: str | os.PathLike) -> Iterator[str]:
-    """Paths of all results that have a record, whether they are there or not, sorted."""
+def with_sidecar(results: str | os.PathLike) -> Iterator[str]:
+    """Paths of all results that have a sidecar, whether they are there or not, sorted."""
     top = os.path.join(results, FOLDER)
     for folder, folders, names in os.walk(top):
         folders.sort()
@@ -111,7 +111,7 @@ def recorded(results: str | os.PathLike) -> Iterator[str]:
 def set_aside(results: str | os.PathLike, path: str) -> Path:
     """Rename a result to `<name>.damaged`, or `.damaged2` and so on; return the new path.
 
-    Its record stays: the result is lost now, and to be made again.
+    Its sidecar stays: the result is lost now, and to be made again.
 
     Raises
     ------
@@ -127,27 +127,27 @@ def set_aside(results: str | os.PathLike, path: str) -> Path:
 
 
 # No file has this digest.
-_BEGUN = Record("", 0, 0)
+_BEGUN = Checksum("", 0, 0)
 
 
-def _record_file(results, path) -> Path:
+def _sidecar(results, path) -> Path:
     return Path(results, FOLDER, f"{path}.json")
 
 
-def _read(results, path) -> Record | None:
-    """The record of a result, if it has one; `ValueError` if it cannot be read."""
+def _read(results, path) -> Checksum | None:
+    """The checksum in the sidecar of a result, if it has one; `ValueError` if it cannot be read."""
     try:
         with open(os.path.join(results, FOLDER, f"{path}.json"), "rb") as file:
-            return Record(**json.loads(file.read()))
+            return Checksum(**json.loads(file.read()))
     except FileNotFoundError:
         return None
     except TypeError as error:
-        raise ValueError(f"{_record_file(results, path)}: not a record: {error}") from None
+        raise ValueError(f"{_sidecar(results, path)}: no checksum: {error}") from None
 
 
-def _write(results, path, record: Record) -> None:
-    with whole_file(_record_file(results, path)) as temporary:
-        temporary.write_text(json.dumps(record._asdict()) + "\n", encoding="ascii")
+def _write(results, path, checksum: Checksum) -> None:
+    with whole_file(_sidecar(results, path)) as temporary:
+        temporary.write_text(json.dumps(checksum._asdict()) + "\n", encoding="ascii")
 
 
 def _size_and_time(file) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from icha.configuration.expansion import run_cases, run_sha256
 from icha.configuration.load import load_configuration
 from icha.datasets.files import write_dataset, write_surface
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
-from icha.support.checksums import damaged, write_record
+from icha.support.checksums import damaged, write_checksum
 
 
 def icha(*arguments):
@@ -230,7 +230,7 @@ def test_files_that_were_cut_off_are_damaged_and_to_do_again(project):
     for path in (whole, cut, *empty):
         (results / path).parent.mkdir(parents=True, exist_ok=True)
         write_dataset(small.run().assign_attrs(config_sha256=sha256), results / path)
-        write_record(results, path)
+        write_checksum(results, path)
     assert damaged(results) == []
     (results / cut).write_bytes((results / cut).read_bytes()[:-100])
     for path in empty:

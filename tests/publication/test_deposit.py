@@ -51,7 +51,7 @@ from icha.publication.environment import differences, refuse_other_environment
 from icha.publication.licences import known_licence, licence_page
 from icha.publication.readme import markdown, readme
 from icha.publication.source import committed_source
-from icha.support.checksums import write_record
+from icha.support.checksums import write_checksum
 
 # Where and by whom the campaign is run: words that are nowhere else.
 PLACE, PERSON, MACHINE, SECRET = "Quittenbaumhof", "zwetschgenwirt", "mirabellenrechner", "hagebuttengeheimnis"
@@ -650,7 +650,7 @@ def test_what_fails_leaves_the_deposit_that_was_there(project, published, result
 def test_results_that_are_not_what_was_written_are_refused(project, published, results, tmp_path):
     spoilt = shutil.copytree(results, tmp_path / "spoilt", ignore=shutil.ignore_patterns("publish"))
     figure = spoilt / "figures/fig5_multi_slope.png"
-    write_record(spoilt, "figures/fig5_multi_slope.png")
+    write_checksum(spoilt, "figures/fig5_multi_slope.png")
     content, times = bytearray(figure.read_bytes()), figure.stat()
     content[len(content) // 2] ^= 1
     figure.write_bytes(content)

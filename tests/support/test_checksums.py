@@ -8,7 +8,7 @@ import shutil
 
 import pytest
 
-from icha.support.checksums import begin, damaged, distrust, is_whole, lost, recorded, set_aside, write_record
+from icha.support.checksums import begin, damaged, distrust, is_whole, lost, set_aside, with_sidecar, write_checksum
 
 PATH = "runs/load/seed1.nc"
 CONTENT = random.Random(7).randbytes(5000)
@@ -16,12 +16,12 @@ CONTENT = random.Random(7).randbytes(5000)
 
 @pytest.fixture
 def results(tmp_path):
-    """A campaign's folder with two results and their records."""
+    """A campaign's folder with two results and their sidecars."""
     for path in (PATH, "checks.json"):
         file = tmp_path / path
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(CONTENT)
-        write_record(tmp_path, path)
+        write_checksum(tmp_path, path)
     return tmp_path
 
 
@@ -38,10 +38,10 @@ def keep_time(file, change):
     os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
 
 
-def test_a_record_is_the_sha256_and_size_of_its_file(results):
-    record = json.loads((results / f"checksums/{PATH}.json").read_text())
-    assert record["sha256"] == hashlib.sha256(CONTENT).hexdigest() and record["size"] == len(CONTENT)
-    assert list(recorded(results)) == ["checks.json", PATH]
+def test_a_checksum_is_the_sha256_and_size_of_its_file(results):
+    written = json.loads((results / f"checksums/{PATH}.json").read_text())
+    assert written["sha256"] == hashlib.sha256(CONTENT).hexdigest() and written["size"] == len(CONTENT)
+    assert list(with_sidecar(results)) == ["checks.json", PATH]
     assert damaged(results) == damaged(results, thorough=True) == []
 
 
@@ -72,7 +72,7 @@ def test_what_the_disk_has_spoilt_is_found_where_everything_is_hashed(results):
 def test_files_that_were_touched_or_copied_are_whole_and_hashed_but_once(results, tmp_path_factory):
     elsewhere = shutil.copytree(results, tmp_path_factory.mktemp("copy") / "results", copy_function=shutil.copyfile)
     assert damaged(elsewhere) == []
-    # Their records have the new time: this change of content alone, in the same time, goes unseen.
+    # Their sidecars have the new time: this change of content alone, in the same time, goes unseen.
     keep_time(elsewhere / PATH, lambda file: flip(file, 3))
     assert is_whole(elsewhere, PATH)
 
@@ -80,7 +80,7 @@ def test_files_that_were_touched_or_copied_are_whole_and_hashed_but_once(results
 def test_a_damaged_file_is_set_aside_and_nothing_is_lost(results):
     for number, name in enumerate(("seed1.nc.damaged", "seed1.nc.damaged2", "seed1.nc.damaged3")):
         (results / PATH).write_bytes(CONTENT + bytes([number]))
-        write_record(results, PATH)
+        write_checksum(results, PATH)
         flip(results / PATH, 0)
         wrong = (results / PATH).read_bytes()
         assert set_aside(results, PATH) == (results / PATH).with_name(name)
@@ -89,7 +89,7 @@ def test_a_damaged_file_is_set_aside_and_nothing_is_lost(results):
         assert lost(results) == [PATH] and damaged(results) == []
 
 
-def test_results_without_record_and_records_without_result_are_no_damage(results):
+def test_results_without_sidecar_and_sidecars_without_result_are_no_damage(results):
     assert lost(results) == []
     (results / "checks.json").unlink()
     (results / "verdict.txt").write_text("all well\n")
@@ -99,18 +99,18 @@ def test_results_without_record_and_records_without_result_are_no_damage(results
 
 def test_a_result_that_was_not_finished_is_neither_damaged_nor_forgotten(results):
     begin(results, PATH)
-    (results / PATH).write_bytes(b"another one")  # and the job was killed before it could record it
+    (results / PATH).write_bytes(b"another one")  # and the job was killed before it could say so
     assert damaged(results, thorough=True) == []
     (results / PATH).unlink()
     assert lost(results) == [PATH]
     (results / PATH).write_bytes(CONTENT)
-    write_record(results, PATH)
+    write_checksum(results, PATH)
     flip(results / PATH, 0)
     assert damaged(results) == [PATH]
 
 
 @pytest.mark.parametrize("content", [b"", b'{"sha256": "', b"[1]", b'{"sha256": "a"}', b"\xff\xfe", b"null"])
-def test_a_record_that_cannot_be_read_vouches_for_nothing(results, content):
+def test_a_sidecar_that_cannot_be_read_vouches_for_nothing(results, content):
     (results / f"checksums/{PATH}.json").write_bytes(content)
     assert damaged(results) == [PATH]
     set_aside(results, PATH)
@@ -122,7 +122,7 @@ def test_a_folder_is_one_result(results):
     (folder / "data").mkdir(parents=True)
     (folder / "data/a.nc").write_bytes(CONTENT)
     (folder / "README.md").write_text("What this is.\n")
-    write_record(results, "publish/tiny-1.0")
+    write_checksum(results, "publish/tiny-1.0")
     (folder / ".snakemake_timestamp").touch()
     assert damaged(results, thorough=True) == []
     (folder / "data/b.nc").write_bytes(b"")
@@ -135,7 +135,7 @@ def test_a_folder_is_one_result(results):
     assert not folder.exists()
 
 
-def test_records_of_results_that_are_read_only_need_not_be_written(results, monkeypatch):
+def test_sidecars_of_results_that_are_read_only_need_not_be_written(results, monkeypatch):
     os.utime(results / PATH, (1, 1))
 
     def refuse(*_):

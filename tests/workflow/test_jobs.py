@@ -12,7 +12,7 @@ import pytest
 from conftest import REPOSITORY
 
 from icha.support.atomic_files import whole_file, why_not_writable
-from icha.support.checksums import is_whole, lost, write_record
+from icha.support.checksums import is_whole, lost, write_checksum
 
 RESULTS = "results/tiny"
 SCRIPT = f"""
@@ -35,7 +35,7 @@ def job(tmp_path):
     for folder in ("surfaces", "runs", "logs"):
         (tmp_path / RESULTS / folder).mkdir(parents=True)
     (tmp_path / RESULTS / "surfaces/a.nc").write_bytes(b"heights")
-    write_record(tmp_path / RESULTS, "surfaces/a.nc")
+    write_checksum(tmp_path / RESULTS, "surfaces/a.nc")
 
     def start(work, log="logs/b.log", **environment):
         return subprocess.Popen(
@@ -64,7 +64,7 @@ def test_a_job_records_what_it_wrote(job):
 
 def test_a_job_that_fails_leaves_its_result_to_be_made_again(job):
     (job.results / "runs/b.nc").write_text("a former result")
-    write_record(job.results, "runs/b.nc")
+    write_checksum(job.results, "runs/b.nc")
     (job.results / "runs/b.nc").unlink()
     assert ended(job("    raise ValueError('wrong input')\n"))[0] == 1
     assert (job.results / "logs/b.log").read_text() == "at work\nError: wrong input\n"

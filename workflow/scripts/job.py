@@ -1,4 +1,4 @@
-"""What the scripts of all jobs share: where they write what they have to say, how they fail, and records of results."""
+"""What the scripts of all jobs share: where they say what they have to say, how they fail, checksums of results."""
 
 import contextlib
 import json
@@ -11,7 +11,7 @@ import traceback
 from contextlib import contextmanager
 from pathlib import Path
 
-from icha.support import checksums as integrity
+from icha.support import checksums
 from icha.support.atomic_files import whole_file
 
 # Set by the Snakefile: the process that wants the job.
@@ -30,7 +30,7 @@ def _failures_of_solvers():
 
 @contextmanager
 def guarded(snakemake):
-    """Surround the work of a job: its inputs must be what was written, its outputs are recorded, its errors told.
+    """Surround the work of a job: its inputs must be what was written, its outputs get checksums, its errors are told.
 
     All output goes to the job's log; an error ends the job with its message there. The errors that users can mend say
     all in their message. The traceback of any other one is for the developers and is kept beside the log; so is what
@@ -47,11 +47,11 @@ def guarded(snakemake):
             os.dup2(file.fileno(), 1)
             os.dup2(file.fileno(), 2)
         for path in outputs:
-            integrity.begin(results, path)
+            checksums.begin(results, path)
         _refuse_damaged(results, snakemake.input)
         yield
         for path in outputs:
-            integrity.write_record(results, path)
+            checksums.write_checksum(results, path)
         sys.stdout.flush()
     except Exception as error:
         expected = (ValueError, OSError, *_failures_of_solvers())
@@ -83,7 +83,7 @@ def _results(snakemake):
 
 
 def _result(results, path):
-    """What is recorded of an output: itself, but the folder whose files it lists if it is a list of checksums."""
+    """What has the checksum of an output: itself, but the folder whose files it lists if it is a list of checksums."""
     file = Path(path).relative_to(results)
     return str(file.parent if file.name == "SHA256SUMS" else file)
 
@@ -91,10 +91,10 @@ def _result(results, path):
 def _refuse_damaged(results, inputs):
     """Raise an error that names all inputs that are not what was written; the next call will find them, too."""
     paths = [os.path.relpath(path, results) for path in inputs if path.startswith(f"{results}/")]
-    wrong = [path for path in paths if not integrity.is_whole(results, path, thorough=True)]
+    wrong = [path for path in paths if not checksums.is_whole(results, path, thorough=True)]
     for path in wrong:
         with contextlib.suppress(OSError):
-            integrity.distrust(results, path)
+            checksums.distrust(results, path)
     if wrong:
         names = ", ".join(f"{results}/{path}" for path in wrong)
         raise ValueError(
