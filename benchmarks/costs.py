@@ -1,4 +1,4 @@
-"""Predicted over measured: processor time, peak memory and disk by `icha.planning.costs` against small cases, one at a time.
+"""Predicted over measured: processor time, memory and disk by `icha.planning.costs` against small cases, one at a time.
 
 python benchmarks/costs.py [--quick]
 

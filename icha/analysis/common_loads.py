@@ -81,10 +81,10 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     cover (of length zero where there is no such range) between stops of their first loading. On each, with the suffix
     `_at_load` on the second: `contact_area_fraction` and `reduced_separation` along surface, seed, rms_slope and
     material; over the seeds mean, standard deviation and half the width of the 95 % band of confidence of both
-    (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`); `material_spread` and
-    `slope_spread`, the largest over the smallest area of all materials (slopes), less one. Runs that are not complete
-    lack values, as `status` says, and do not count; `seed_count` says how many seeds there are of every surface, slope
-    and material. A single one has no deviation and no band: they are missing.
+    (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
+    `material_spread` and `slope_spread`, the largest over the smallest area of all materials (slopes), less one. Runs
+    that are not complete lack values, as `status` says, and do not count; `seed_count` says how many seeds there are of
+    every surface, slope and material. A single one has no deviation and no band: they are missing.
     """
     complete = study["status"].transpose(*LABELS).values == COMPLETE
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values

@@ -22,7 +22,7 @@ def campaign_tree(
     design: Iterable[RunLabels | tuple] | None = None,
     attrs: Mapping[str, str] = {},
 ) -> xr.DataTree:
-    """The campaign dataset of some runs in memory; arguments and errors as `icha.datasets.campaign_file.write_campaign`."""
+    """The campaign dataset of some runs in memory; arguments and errors as `campaign_file.write_campaign`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "campaign.nc")
         write_campaign(runs, path, design=design, attrs=attrs)

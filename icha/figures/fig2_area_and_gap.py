@@ -58,7 +58,7 @@ def figure(
     ----------
     campaign : the campaign dataset.
     references : theories and points for the study's first surface (`icha.references.reference_dataset`), if any.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, for the boundary elements beside its runs, if any.
+    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements beside runs, if any.
     study : name of the study.
 
     Raises

@@ -50,7 +50,7 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, for the boundary elements of the same states, if any.
+    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements of the states, if any.
     study : name of the study.
     kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
 

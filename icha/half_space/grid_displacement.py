@@ -1,7 +1,7 @@
 """Displacement of the half-space at all nodes of a grid, and the spots around which something changes there.
 
-The sum over spots and images is split as in `icha.half_space.interaction`: a smooth half through its Fourier series and a
-short-ranged half around every spot. A field has as many targets as nodes, so that the area of the windows around the
+The sum over spots and images is split as in `icha.half_space.interaction`: a smooth half through its Fourier series and
+a short-ranged half around every spot. A field has as many targets as nodes, so that the area of the windows around the
 spots is what it costs, and many moments of a spot's pressure pay: four of them represent it from five radii on. In
 return the smooth half of a large spot must be smooth on the scale of that spot: spots are put into groups of like
 size, every group with a Fourier series of its own length.

@@ -52,7 +52,7 @@ def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GA
     Parameters
     ----------
     reduced_pressure : p*, positive.
-    spectrum : `icha.surfaces.spectrum.SelfAffineSpectrum`; its isotropic continuum, not the lattice of its cell, is meant.
+    spectrum : `icha.surfaces.spectrum.SelfAffineSpectrum`; its isotropic continuum is meant, not its lattice.
     gamma : their parameter; 0.45 unless told.
     points : wave numbers of the quadrature on either side of the roll-off; odd, for Simpson's rule.
     """
