@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 
-from icha.configuration.model import BesideStudy, Campaign, RunFigure
+from icha.configuration.model import BesideStudy, Campaign
 from icha.configuration.topography import MeasuredSurface
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, number_label
 
@@ -71,23 +71,9 @@ def map_solution(campaign: Campaign) -> SolutionLabels | None:
         return None
     if kind != "reduced_pressure":
         return None
-    run = map_case(campaign, figure)
+    run = figure.run(campaign)
     found = [case for case in solution_cases(campaign) if case.run == run and case.reduced_pressure == value]
     return max(found, key=lambda case: campaign.boundary_elements[case.entry].refinement, default=None)
-
-
-def map_case(campaign: Campaign, figure: RunFigure) -> RunLabels:
-    """The run that a map (figures 4 and 16) shows: of its study's first, with adhesion if it does not say."""
-    cases = [
-        case
-        for case in run_cases(campaign)
-        if case.study == figure.study
-        and figure.surface in (None, case.surface)
-        and figure.seed in (None, case.seed)
-        and figure.rms_slope in (None, case.rms_slope)
-        and figure.material in (None, case.material)
-    ]
-    return next((case for case in cases if campaign.materials[case.material].surface_energy > 0), cases[0])
 
 
 def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:

@@ -11,16 +11,7 @@ from icha.configuration.expansion import run_cases
 from icha.configuration.model import (
     BESIDE_STUDIES,
     Campaign,
-    ComparedFigure,
-    LoopsFigure,
-    LossFigure,
-    PullOffFigure,
     SelfAffineSurface,
-    SlopesFigure,
-    SnapMapFigure,
-    SnapshotFigure,
-    SourcesFigure,
-    TaborFigure,
 )
 from icha.configuration.values import MAX_GRID
 from icha.path.limits import MAX_REDUCED_PRESSURE
@@ -55,21 +46,7 @@ def problems(campaign: Campaign) -> list[Problem]:
             known(("measurements", label, "material"), measurement.material, campaign.materials)
     found += _publication_problems(campaign)
     for label, figure in campaign.figures.drawn().items():
-        if isinstance(figure, SourcesFigure):
-            known(("figures", label, "entry"), figure.entry, campaign.error_sources)
-            if figure.entry in campaign.error_sources:
-                found += _sources_problems(campaign, ("figures", label, "entry"), figure.entry)
-        for key in ("studies", "load_studies"):
-            names = figure.model_dump().get(key) or []
-            for index, name in enumerate(names):
-                known(("figures", label, key, index), name, campaign.studies)
-                found += _apart_problems(campaign, ("figures", label, key, index), figure, name)
-        if not hasattr(figure, "study"):
-            continue
-        known(("figures", label, "study"), figure.study, campaign.studies)
-        found += _apart_problems(campaign, ("figures", label, "study"), figure, figure.study)
-        if figure.study in campaign.studies:
-            found += _figure_problems(campaign, ("figures", label), figure, campaign.studies[figure.study])
+        found += [(("figures", label, *place), value, reason) for place, value, reason in figure.problems(campaign)]
     return found
 
 
@@ -81,15 +58,6 @@ def _publication_problems(campaign: Campaign):
         if failure.run not in runs:
             location = ("publication", "known_failures", index, "run")
             yield location, failure.run, f"is not a run; allowed: a run of the campaign, such as {min(runs)}"
-
-
-def _apart_problems(campaign: Campaign, location, figure, name):
-    """Studies that do not come back, in figures of the way back."""
-    if name not in campaign.studies or not isinstance(figure, LoopsFigure | PullOffFigure | LossFigure | SnapMapFigure):
-        return
-    study = campaign.studies[name]
-    if not study.unload and (isinstance(figure, PullOffFigure | LossFigure) or not study.turning_points):
-        yield location, name, "is not unloaded; allowed: a study with `unload: true`"
 
 
 def _load_problems(location, study):
@@ -172,68 +140,6 @@ def _unresolved(campaign: Campaign, location, entry, surface: str) -> Iterator[P
         material = Interface(**campaign.materials[label].model_dump())
         if problem := resolution_problem(material, spacing):
             yield (*location, "materials"), label, f"on surface {surface!r}: {problem}"
-
-
-def _sources_problems(campaign: Campaign, location, name):
-    """What keeps the runs without adhesion of an entry of error sources from differing in their seeds only."""
-    entry = campaign.error_sources[name]
-    if entry.study not in campaign.studies:
-        return
-    contacts = campaign.solved(entry)
-    bare = [each for each in contacts if campaign.materials[each.material].surface_energy == 0]
-    for what, asked in (
-        ("surface", [each.surface for each in contacts]),
-        ("rms slope", [each.rms_slope for each in contacts]),
-        ("material without adhesion", [each.material for each in bare]),
-    ):
-        there = list(dict.fromkeys(asked))
-        if len(there) != 1:
-            listed = f" ({', '.join(map(str, there))})" if there else ""
-            yield (
-                location,
-                name,
-                f"has not one {what} but {len(there)}{listed}; allowed: an entry with one, and any seeds",
-            )
-
-
-def _figure_problems(campaign: Campaign, location, figure, study):
-    for key, there in (
-        ("surface", study.surfaces),
-        ("seed", study.seeds),
-        ("material", study.materials),
-        ("rms_slope", study.rms_slopes),
-    ):
-        value = getattr(figure, key, None)
-        if value is not None and value not in there:
-            allowed = ", ".join(map(str, there))
-            yield (*location, key), value, f"is not in study {figure.study!r}; allowed: {allowed}"
-    snapshots = campaign.snapshots_of(figure.study)
-    kinds = [kind for kind, _ in snapshots or []]
-    if isinstance(figure, SlopesFigure):
-        for kind in ("relative_load", "area_fraction"):
-            if kind not in kinds:
-                reason = f"has no snapshot of kind {kind}; allowed: a study with one"
-                yield (*location, "study"), figure.study, reason
-    if isinstance(figure, TaborFigure):
-        if not any(campaign.materials[name].surface_energy > 0 for name in study.materials):
-            reason = "has no material with adhesion, so no Tabor parameter; allowed: a study with one"
-            yield (*location, "study"), figure.study, reason
-    if isinstance(figure, ComparedFigure) and figure.study not in {
-        e.study for e in campaign.boundary_elements.values()
-    }:
-        reason = "has no boundary elements beside it; allowed: a study that an entry of boundary_elements names"
-        yield (*location, "study"), figure.study, reason
-    if isinstance(figure, SnapshotFigure) and snapshots == []:
-        yield (*location, "study"), figure.study, "keeps no snapshot to draw; allowed: a study with one"
-    snapshot = getattr(figure, "snapshot", None)
-    if snapshot is not None and snapshot.target not in (snapshots or []):
-        there = ", ".join(f"{kind} {value:g}" for kind, value in snapshots or [])
-        kind, value = snapshot.target
-        yield (
-            (*location, "snapshot"),
-            f"{kind} {value:g}",
-            f"is no snapshot of study {figure.study!r}; allowed: {there or 'none, for the study names none'}",
-        )
 
 
 # Rms slopes beyond this are rather a mistake about units than a surface.

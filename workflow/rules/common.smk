@@ -17,7 +17,6 @@ from icha.configuration.expansion import (
     campaign_sha256,
     loop_cases,
     loop_settings,
-    map_case,
     map_solution,
     measurement_settings,
     run_cases,
@@ -208,7 +207,7 @@ def figure_data(name):
     if name == "fig13_loops" and loops_of(options.study):
         data["loops"] = loops_of(options.study)
     if name == "fig16_snap_map":
-        case = map_case(CAMPAIGN, options)
+        case = options.run(CAMPAIGN)
         data["surface"] = f"{RESULTS}/surfaces/{case.surface}/seed{case.seed}.nc"
     if name in ("fig2_area_and_gap", "fig7_stiffness"):
         data["references"] = f"{RESULTS}/references/{study.surfaces[0]}.nc"
@@ -216,7 +215,7 @@ def figure_data(name):
         if any(entry.study == options.study for entry in CAMPAIGN.boundary_elements.values()):
             data["model_error"] = MODEL_ERROR[0]
     if name == "fig4_contact_map":
-        case = map_case(CAMPAIGN, options)
+        case = options.run(CAMPAIGN)
         data["surface"] = f"{RESULTS}/surfaces/{case.surface}/seed{case.seed}.nc"
         solution = map_solution(CAMPAIGN)
         if solution is not None:

@@ -1,0 +1,120 @@
+"""The declaration of a figure: what a campaign may ask of it, and what it is drawn from.
+
+A module `fig<number>_<words>` of this folder is a figure. Its `FIGURE` is a `Figure`, its function `figure` draws it,
+and nothing else knows its name: `icha.figures.registry` finds it. Reading a configuration imports all of them, so that
+they import libraries for drawing, and modules that need xarray, only where they draw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
+from icha.support.values import Section
+
+# Location in the configuration, value, and what is wrong with it and allowed.
+Problem = tuple[tuple, Any, str]
+
+
+class Campaign(Protocol):
+    """What of a configuration figures may ask for (`icha.configuration`): its sections, and its runs."""
+
+    studies: Mapping[str, Any]
+    materials: Mapping[str, Any]
+    boundary_elements: Mapping[str, Any]
+    boundary_element_loops: Mapping[str, Any]
+    error_sources: Mapping[str, Any]
+    measurements: Mapping[str, Any]
+
+    def contacts(self, study: str) -> list[tuple[str, int, float, str]]:
+        """Surface, seed, rms slope and material of every run of a study."""
+
+    def solved(self, entry: Any) -> list[tuple[str, int, float, str]]:
+        """The same of an entry beside a study."""
+
+    def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
+        """Kind and value of all states that the runs of a study keep; None where they keep their last one."""
+
+
+@dataclass(frozen=True)
+class ResultFiles:
+    """The files of a campaign's results from which figures are drawn, below the folder of the results."""
+
+    results: str
+    dataset: str
+    model_error: str
+
+    def surface(self, run: RunLabels) -> str:
+        """Topography of a run."""
+        return f"{self.results}/surfaces/{run.surface}/seed{run.seed}.nc"
+
+    def theories(self, surface: str) -> str:
+        """Theories for a surface."""
+        return f"{self.results}/references/{surface}.nc"
+
+    def solution(self, labels: SolutionLabels) -> str:
+        """A boundary-element solution."""
+        return f"{self.results}/references/boundary_elements/{labels.path}.nc"
+
+    def loop(self, labels: ContactLabels) -> str:
+        """Boundary elements both ways."""
+        return f"{self.results}/references/loops/{labels.path}.nc"
+
+    def error_sources(self, labels: ContactLabels) -> str:
+        """A study of the sources of the model's error."""
+        return f"{self.results}/references/error_sources/{labels.path}.nc"
+
+
+# Files by the names of the arguments that are read from them: one, or a list of them.
+Inputs = dict[str, str | list[str]]
+
+
+class FigureOptions(Section):
+    """The section of a figure in a configuration."""
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """What keeps the figure from being drawn although each of its values is allowed by itself."""
+        yield from ()
+
+    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
+        """The studies whose runs it shows."""
+        return ()
+
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of the function that draws it, other than data."""
+        return self.model_dump(exclude_none=True)
+
+
+def dataset_only(campaign: Campaign, options: FigureOptions, files: ResultFiles) -> Inputs:
+    """The inputs of a figure of the campaign dataset alone."""
+    return {"campaign": files.dataset}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure that a campaign may ask for.
+
+    Parameters
+    ----------
+    description : what it shows, in a line, for those who write configurations.
+    caption : what it shows, for those who look at it; printed in the report.
+    options : the model of its section; its first line of documentation is part of the schema.
+    inputs : the files of its arguments. Datasets are read, of other files the paths are handed over.
+    arguments : arguments that the rest of the configuration gives, beside those of the options.
+    holds_topography : whether it takes memory for arrays of the surface's size.
+    """
+
+    description: str
+    caption: str
+    options: type[FigureOptions]
+    inputs: Callable[[Campaign, Any, ResultFiles], Inputs] = dataset_only
+    arguments: Callable[[Campaign, Any], dict[str, Any]] = lambda campaign, options: {}
+    holds_topography: bool = False
+
+
+def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
+    """The problem of a name that is none of some section's, if it is one."""
+    if name not in names:
+        yield location, name, f"is not defined; allowed: {', '.join(names) or 'none, for there is none'}"
