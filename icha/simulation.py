@@ -12,21 +12,12 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.events import EVENT_KINDS, Events
+from icha.contact.failures import NotConverged
 from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.bins import bin_table, bin_values, with_bounds
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
-from icha.equilibrium.energy import new_events
-from icha.equilibrium.equilibrium import (
-    EVENT_KINDS,
-    Contact,
-    Events,
-    NotConverged,
-    area_fraction,
-    contact_stiffness,
-    mean_gap,
-    mean_pressure,
-    stored_energy,
-)
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.limits import MAX_REDUCED_PRESSURE
 from icha.path.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target, follow
 from icha.support.validation import integer
@@ -282,7 +273,7 @@ def simulate(
     pulled = None  # step and state of the largest tension
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
-        contact = Contact(law, find_summits(surface), surface.rms_height, path.united_until)
+        contact = InteractingAsperities(law, find_summits(surface), surface.rms_height, path.united_until)
         unit = material.contact_modulus * surface.rms_slope
         try:
             before = None
@@ -292,7 +283,9 @@ def simulate(
                     snapshots.append(_snapshot(law, surface, waypoint.target, waypoint.state, len(steps) - 1))
                 if path.cyclic:
                     steps[-1] |= _balance(contact, waypoint)
-                    events.append(Events.joined(()) if before is None else new_events(before, waypoint.state))
+                    events.append(
+                        Events.joined(()) if before is None else contact.events_between(before, waypoint.state)
+                    )
                     before = waypoint.state
                 if pulled is None or waypoint.leg > pulled[2] or _pressure(steps[-1]) < _pressure(steps[pulled[0]]):
                     pulled = len(steps) - 1, waypoint.state, waypoint.leg
@@ -315,18 +308,18 @@ def _pressure(step):
 def _step(contact, waypoint, unit):
     state, target = waypoint.state, waypoint.target
     spots = state.spots
-    pressure = mean_pressure(contact, spots)
+    pressure = contact.pressure(state)
     single = spots.members == 1
     mu = contact.law.material.tabor_parameter(spots.radius_of_curvature[single])
     outside = np.count_nonzero((mu < WU_RANGE[0]) | (mu > WU_RANGE[1]))
     adhesive = contact.law.material.surface_energy > 0
     return {
         "mean_separation": state.separation,
-        "mean_gap": mean_gap(contact, state),
+        "mean_gap": contact.mean_gap(state),
         "nominal_pressure": pressure,
-        "contact_area_fraction": area_fraction(contact, spots),
+        "contact_area_fraction": contact.area_fraction(state),
         "spot_count": len(spots),
-        "contact_stiffness": contact_stiffness(contact, state),
+        "contact_stiffness": contact.stiffness(state),
         "residual": state.residual,
         "converged": np.int8(1),
         "branch": "loading" if waypoint.loading else "unloading",
@@ -349,7 +342,7 @@ def _balance(contact, waypoint):
     balance = waypoint.balance
     return {
         "work": balance.work,
-        "stored_energy": stored_energy(contact, waypoint.state),
+        "stored_energy": contact.stored_energy(waypoint.state),
         "dissipated_by_jump_in": balance.jump_in,
         "dissipated_by_jump_off": balance.jump_off,
         "dissipated_by_coalescence": balance.coalescence,
@@ -368,7 +361,9 @@ def _loop(contact, steps, pulled):
     losses = {
         name: last[f"dissipated_{name}"] for name in ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
     }
-    summits = 1.5 * np.pi * material.surface_energy * float(np.sum(contact.asperities.radius)) / contact.area
+    summits = (
+        1.5 * np.pi * material.surface_energy * float(np.sum(contact.asperities.radius_of_curvature)) / contact.area
+    )
     strength = 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range
     return {
         "pull_off_pressure": tension,
@@ -456,7 +451,7 @@ def _event_columns(steps, events):
 
 
 def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
-    radius = 1 / surface.rms_curvature
+    radius_of_curvature = 1 / surface.rms_curvature
     moments = spectral_moments(surface)
     values = {
         **bin_values("gap", GAP_BINS * surface.rms_height),
@@ -475,7 +470,7 @@ def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
         "boundary": surface.boundary,
         "grid": surface.grid,
         "seed": seed,
-        "tabor_parameter": float(material.tabor_parameter(radius)),
+        "tabor_parameter": float(material.tabor_parameter(radius_of_curvature)),
         "stickiness": stickiness(moments, material),
         "asperity_count": len(contact.asperities),
         "control": path.control,

@@ -30,23 +30,23 @@ class Asperities:
         # Steeper is higher and sharper.
         self.height = RMS_HEIGHT * rms_slope * np.sort(rng.normal(size=COUNT))[::-1]
         self.position = rng.uniform(0, PERIOD, (COUNT, 2))
-        self.radius = RADIUS / rms_slope
+        self.radius_of_curvature = RADIUS / rms_slope
         self.law, self.material = JKR(material), material
         self.rms_height, self.rms_slope = RMS_HEIGHT * rms_slope, rms_slope
 
     @property
     def jump_in(self):
         """Mean separations at which contacts form, m."""
-        return self.height - self.law.jump_in_approach(self.radius)
+        return self.height - self.law.jump_in_approach(self.radius_of_curvature)
 
     @property
     def jump_off(self):
         """Mean separations at which contacts break, m."""
-        return self.height - self.law.jump_off_approach(self.radius)
+        return self.height - self.law.jump_off_approach(self.radius_of_curvature)
 
     def energy(self, approach):
         """Elastic and adhesive energy of a contact, J: the integral of JKR's force along its curve from a = 0."""
-        a, R = self.law.contact_radius(approach, self.radius), self.radius
+        a, R = self.law.contact_radius(approach, self.radius_of_curvature), self.radius_of_curvature
         E, gamma = self.material.contact_modulus, self.material.surface_energy
         neck = np.sqrt(2 * np.pi * gamma * E)
         return 8 / 15 * E * a**5 / R**2 - 4 / 3 * neck * a**3.5 / R + np.pi * gamma * a**2
@@ -54,8 +54,12 @@ class Asperities:
     def state(self, separation, touching):
         """Pressure (Pa), area fraction and stored energy (J/m^2) of some of the asperities in contact."""
         approach = (self.height - separation)[touching]
-        a = self.law.contact_radius(approach, self.radius)
-        values = np.sum(self.law.force(a, self.radius)), np.pi * np.sum(a**2), np.sum(self.energy(approach))
+        a = self.law.contact_radius(approach, self.radius_of_curvature)
+        values = (
+            np.sum(self.law.force(a, self.radius_of_curvature)),
+            np.pi * np.sum(a**2),
+            np.sum(self.energy(approach)),
+        )
         return np.array(values) / PERIOD**2
 
     def run(self, depth, points=60, seed=1):
@@ -135,7 +139,7 @@ class Asperities:
             "pull_off_pressure": tension,
             "pull_off_separation": u[weakest],
             "pull_off_over_strength": tension / (16 * gamma / (9 * np.sqrt(3) * 20e-9)) if gamma else 0.0,
-            "pull_off_over_summits": tension / (1.5 * np.pi * gamma * COUNT * self.radius / PERIOD**2)
+            "pull_off_over_summits": tension / (1.5 * np.pi * gamma * COUNT * self.radius_of_curvature / PERIOD**2)
             if gamma
             else 0.0,
             "detachment_pressure": pressure[last],

@@ -20,7 +20,7 @@ def main(folder):
             folder / f"patch{seed}.npz",
             position=found.position,
             height=found.height,
-            radius=found.radius,
+            radius=found.radius_of_curvature,
             period=found.period,
             rms_height=surface.rms_height,
             rms_slope=surface.rms_slope,

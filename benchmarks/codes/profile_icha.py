@@ -14,8 +14,8 @@ import numpy as np
 import icha
 from icha import simulation
 from icha.datasets.files import write_dataset
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space import interaction as elasticity
-from icha.path.path import path
 
 MODULUS, SURFACE_ENERGY, RANGE = 25e6, 0.05, 2.071e-9
 SNAPSHOT = [("reduced_pressure", 0.01)]
@@ -107,9 +107,9 @@ def main(kind, adhesion, answer):
             (simulation, "pressure_distribution", "fields of the snapshot"),
         ):
             watched.enter_context(mock.patch.object(owner, name, stages.timed(stage, getattr(owner, name))))
-        watched.enter_context(mock.patch.object(simulation, "load", stages.timed_steps("path", simulation.load)))
+        watched.enter_context(mock.patch.object(simulation, "follow", stages.timed_steps("path", simulation.follow)))
         for owner, name, what in (
-            (path, "equilibrium", "equilibria"),
+            (InteractingAsperities, "equilibrium", "equilibria"),
             (elasticity.Interaction, "tangent", "linearisations"),
             (elasticity.Tangent, "__call__", "products with the tangent"),
             (elasticity.Tangent, "nearly", "products with the tangent"),
@@ -137,7 +137,7 @@ def main(kind, adhesion, answer):
                 "grid": grid,
                 "asperities": int(run.asperity_count),
                 "stops": run.sizes["step"],
-                "stops_asked": len(simulation.Path(**stops).targets),
+                "stops_asked": len(icha.Path(**stops).targets),
                 "spots": int(run.spot_count[-1]) if run.sizes["step"] else 0,
                 "area_fraction": float(run.contact_area_fraction[-1]) if run.sizes["step"] else 0.0,
                 "residual": float(run.residual.max()) if run.sizes["step"] else 0.0,

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 import icha
 from icha.asperity.jkr import JKR
-from icha.equilibrium.equilibrium import Contact, area_fraction
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.path import follow
 from icha.surfaces.summits import Asperities
 
@@ -50,7 +50,7 @@ def main(folder, patches, adhesion, answer):
     asperities, rms_height, rms_slope = side_by_side(folder, patches)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     material = MATERIAL[adhesion]
-    contact = Contact(JKR(material), asperities, rms_height)
+    contact = InteractingAsperities(JKR(material), asperities, rms_height)
     unit = material.contact_modulus * rms_slope
     path = icha.Path(reduced_pressures=list(REDUCED_PRESSURES), snapshots=[])
     start = time.perf_counter()
@@ -62,7 +62,7 @@ def main(folder, patches, adhesion, answer):
                 {
                     "seconds": time.perf_counter() - start,
                     "spots": len(state.spots),
-                    "area_fraction": area_fraction(contact, state.spots),
+                    "area_fraction": contact.area_fraction(state),
                     "residual": float(state.residual),
                     "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
                 }

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 import icha
 from icha.asperity.jkr import JKR
-from icha.equilibrium.equilibrium import Contact, area_fraction, mean_pressure
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.path import follow
 from icha.surfaces.summits import find_summits
 
@@ -24,12 +24,12 @@ def main():
     surface = icha.Surface(task.heights, task.period)
     material = icha.Material(task.contact_modulus, task.surface_energy, task.interaction_range)
     with threadpool_limits(1):
-        contact = Contact(JKR(material), find_summits(surface), surface.rms_height)
+        contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
         for waypoint in follow(contact, path, unit):
             state = waypoint.state
             task.answer_stop(
-                pressure=mean_pressure(contact, state.spots),
-                area_fraction=area_fraction(contact, state.spots),
+                pressure=contact.pressure(state),
+                area_fraction=contact.area_fraction(state),
                 mean_gap=state.separation,
                 residual=state.residual,
                 spots=len(state.spots),

@@ -8,7 +8,7 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.contact.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
-from icha.equilibrium.equilibrium import ContactState, Spots
+from icha.equilibrium.states import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, displacement_field, row_blocks, windows
 from icha.support.parallel import on_cores
 from icha.support.validation import integer

@@ -11,23 +11,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from icha.equilibrium.equilibrium import (
-    COALESCENCE,
-    JUMP_IN,
-    JUMP_OFF,
-    SPLIT,
-    Contact,
-    ContactState,
-    Events,
-    contact_stiffness,
-    mean_pressure,
-    stored_energy,
-)
+from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
+from icha.contact.model import ContactModel, State
+from icha.equilibrium.problem import Problem
+from icha.equilibrium.states import ContactState
 
 
-def new_events(before: ContactState, after: ContactState) -> Events:
-    """The events on the path from one state to a later one."""
-    return Events.joined(after.history[len(before.history) :])
+def stored_energy(problem: Problem, state: ContactState) -> float:
+    """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of problem.
+
+    Every spot has the work that would make it alone, and half that of its force against the displacement by the
+    others. Force and displacement are those of the spots' centres, as in eq. (4), which makes the interaction of
+    spots of unlike size only nearly reciprocal: along a path without events the energy changes by the work done but
+    for a part of the order of (a/r)^2 of that interaction.
+    """
+    spots, law = state.spots, problem.law
+    a, R = spots.contact_radius, spots.radius_of_curvature
+    displaced = spots.height - state.separation - spots.approach
+    return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / problem.area
 
 
 # Of the work of a step, the part from which on its loss is that of its jumps, and not what is not reciprocal.
@@ -52,22 +53,22 @@ class Step:
     events: Events
 
     @classmethod
-    def between(cls, contact: Contact, before: ContactState, after: ContactState) -> Step:
+    def between(cls, contact: ContactModel, before: State, after: State) -> Step:
         """The step from one state to the next.
 
         The integral is that of the cubic with the pressures and stiffnesses at both ends; what jumps, jumps half way.
         """
-        events = new_events(before, after)
+        events = contact.events_between(before, after)
         width = after.separation - before.separation
-        p, q = mean_pressure(contact, before.spots), mean_pressure(contact, after.spots)
-        slope, end_slope = -contact_stiffness(contact, before), -contact_stiffness(contact, after)
+        p, q = contact.pressure(before), contact.pressure(after)
+        slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
         # Without adhesion contact forms and breaks without a jump of the pressure.
         jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
         bend = width**2 * (slope - end_slope)
         return cls(
             width=width,
             work=-(0.5 * width * (p + q) + bend / 12),
-            gained=stored_energy(contact, after) - stored_energy(contact, before),
+            gained=contact.stored_energy(after) - contact.stored_energy(before),
             pressure_jump=q - p - 0.5 * width * (slope + end_slope) if jumps else 0.0,
             roughness=abs(bend) / 24,
             sudden=bool(jumps),
@@ -84,7 +85,7 @@ class Step:
         """Work that is not stored, J/m^2."""
         return self.work - self.gained
 
-    def set_free(self, contact: Contact) -> float:
+    def set_free(self, contact: ContactModel) -> float:
         """Energy that the jumps of the step set free, as if every spot were alone, J/m^2."""
         return float(np.abs(self.events.energy).sum()) / contact.area
 
@@ -99,7 +100,7 @@ class EnergyBalance:
     """Work done on a contact since first contact and what has been lost of it, by the kind of event, J/m^2.
 
     unattributed: lost in steps without any event: errors of the integration, and what is not reciprocal in the model's
-    interaction (`icha.equilibrium.equilibrium.stored_energy`).
+    interaction (`icha.equilibrium.energy.stored_energy`).
     """
 
     work: float = 0.0
@@ -114,7 +115,7 @@ class EnergyBalance:
         """Sum of all losses, J/m^2."""
         return self.jump_in + self.jump_off + self.coalescence + self.load_jump + self.unattributed
 
-    def after(self, contact: Contact, step: Step) -> EnergyBalance:
+    def after(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """The balance after one more step.
 
         A step with jumps alone has lost its energy in them, if it is about what they would lose, were their spots

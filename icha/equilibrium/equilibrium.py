@@ -22,17 +22,20 @@ would no longer overlap.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.asperity.coalescence import covering_spot, disjoint_pairs, equivalent_spots, overlapping_pairs
-from icha.asperity.jkr import JKR
-from icha.half_space.interaction import HalfSpace, Interaction, displacement_at, mean_displacement
+from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
+from icha.contact.failures import FullContact, NotConverged
+from icha.contact.model import PRESSURE, Control
+from icha.equilibrium.control import gradient_by_radius, held_value, radius_response
+from icha.equilibrium.problem import OVERLAP, Problem
+from icha.equilibrium.states import CONTACT, GONE, TRIAL, ContactState, Union
+from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.square import periodic_difference
-from icha.surfaces.summits import Asperities
 
 # Largest equilibrium error in units of h_rms at which an equilibrium counts as found.
 RESIDUAL_TOLERANCE = 1e-9
@@ -67,7 +70,6 @@ _GONE_PART = 0.25
 # Contact area fraction at which the spots have lost all meaning.
 _FULL_CONTACT = 0.5
 
-_CONTACT, _TRIAL, _GONE = 1, 2, 3
 # Below so many jump-off radii a Newton step back is one of the radius.
 _NEAR_JUMP_OFF = 1.5
 # So large a part of a step that leads back over jump-off may be lost by ending there.
@@ -76,319 +78,9 @@ _NEXT_TO_JUMP_OFF = 0.2
 # Spots whose distances from jump-off differ by this part are equal.
 _SAME_STRENGTH = 1e-3
 
-# Until when united spots stay united.
-DETACHMENT, OVERLAP = "detachment", "overlap"
-
-# Kinds of events.
-JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT = range(4)
-EVENT_KINDS = ("jump_in", "jump_off", "coalescence", "split")
-
-
-class NotConverged(Exception):
-    """An equilibrium was not found; the message says what happened."""
-
-
-class FullContact(NotConverged):
-    """The contact spread over the whole surface."""
-
-
-@dataclass(frozen=True, eq=False)
-class Spots:
-    """Contact spots: asperities in contact, single or coalesced. Arrays of length m.
-
-    position (m, 2), height, radius_of_curvature, contact_radius, approach: m. members: asperities merged into it.
-    """
-
-    position: np.ndarray
-    height: np.ndarray
-    radius_of_curvature: np.ndarray
-    contact_radius: np.ndarray
-    approach: np.ndarray
-    members: np.ndarray
-
-    def __len__(self) -> int:
-        """Number of spots."""
-        return len(self.height)
-
-
-@dataclass(frozen=True, eq=False)
-class Events:
-    """What happened on the way to one equilibrium. Arrays of length k.
-
-    kind: JUMP_IN, JUMP_OFF (a spot, single or united, lets go), COALESCENCE (two spots unite) or SPLIT (a union is
-    undone, and what it was made of stays in contact). position (k, 2), m. members: asperities of the spot concerned.
-    energy: J that a jump would set free if the spot were alone; zero for unions and splits.
-    """
-
-    kind: np.ndarray
-    position: np.ndarray
-    members: np.ndarray
-    energy: np.ndarray
-
-    def __len__(self) -> int:
-        """Number of events."""
-        return len(self.kind)
-
-    def count(self, kind: int) -> int:
-        """Number of events of a kind."""
-        return int(np.count_nonzero(self.kind == kind))
-
-    @classmethod
-    def joined(cls, parts) -> Events:
-        """Several, one after the other."""
-        parts = [cls(np.empty(0, np.int8), np.empty((0, 2)), np.empty(0, int), np.empty(0)), *parts]
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__match_args__))
-
-
-@dataclass(frozen=True, eq=False)
-class Contact:
-    """The contact problem: a law, the summits of one surface, and the length that makes residuals dimensionless.
-
-    united_until: DETACHMENT or OVERLAP, until when united spots stay united.
-    """
-
-    law: JKR
-    asperities: Asperities
-    rms_height: float
-    united_until: str = DETACHMENT
-    jump_in: np.ndarray = field(init=False)
-
-    def __post_init__(self):
-        """Evaluate the asperities' jump-in approaches once."""
-        object.__setattr__(self, "jump_in", self.law.jump_in_approach(self.asperities.radius))
-
-    @property
-    def area(self) -> float:
-        """Nominal contact area A0, m^2."""
-        return self.asperities.period**2
-
-    @property
-    def adhesive(self) -> bool:
-        """Whether contact forms and breaks in jumps."""
-        return self.law.material.surface_energy > 0
-
-
-@dataclass(frozen=True, eq=False)
-class _Union:
-    """Two spots that have become one: what they were, and the radius (m) of the united one at which they just touch.
-
-    position (2, 2), height, radius of curvature and contact radius, asperity, members (2,); parts: those of spots that
-    are unions themselves.
-    """
-
-    touching: float
-    position: np.ndarray
-    height: np.ndarray
-    radius: np.ndarray
-    contact_radius: np.ndarray
-    asperity: np.ndarray
-    members: np.ndarray
-    parts: np.ndarray
-
-    def asperities(self) -> list[list[int]]:
-        """The asperities of either of the two."""
-        return [
-            [own] if part is None else [each for one in part.asperities() for each in one]
-            for own, part in zip(self.asperity.tolist(), self.parts, strict=True)
-        ]
-
-
-@dataclass(frozen=True, eq=False)
-class _Sites:
-    """Places where contact is or may come out of the iteration. Arrays of length n.
-
-    position (n, 2), height, radius (of curvature), jump_off: m. asperity: its index, -1 for united spots.
-    members: asperities united in it. parts: the _Union that it is, None for others and where that is not kept.
-    parted: number of the union out of which a spot has come, -1 for others. arranged: number of sites when the
-    half-space was made.
-    """
-
-    position: np.ndarray
-    height: np.ndarray
-    radius: np.ndarray
-    jump_off: np.ndarray
-    asperity: np.ndarray
-    members: np.ndarray
-    parts: np.ndarray
-    parted: np.ndarray
-    half_space: HalfSpace
-    arranged: int
-
-    _ARRAYS = ("position", "height", "radius", "jump_off", "asperity", "members", "parts", "parted")
-
-    def __len__(self) -> int:
-        return len(self.height)
-
-    def extended(self, **more) -> _Sites:
-        """With more sites after the present ones."""
-        arrays = {name: np.concatenate([getattr(self, name), more[name]]) for name in self._ARRAYS}
-        if not len(self):
-            return self._arranged(arrays)
-        return _Sites(**arrays, half_space=self.half_space.extended(more["position"]), arranged=self.arranged)
-
-    def taken(self, index) -> _Sites:
-        """The sites at `index`, arranged anew."""
-        return self._arranged({name: getattr(self, name)[index] for name in self._ARRAYS})
-
-    def _arranged(self, arrays):
-        ewald = self.half_space.ewald
-        half_space = HalfSpace.at(arrays["position"], ewald.side, ewald.contact_modulus, ewald.free)
-        return _Sites(**arrays, half_space=half_space, arranged=len(arrays["height"]))
-
-
-@dataclass(frozen=True, eq=False)
-class ContactState:
-    """An equilibrium.
-
-    separation: mean separation u in m. sites, with arrays of their length n: approach (m), radius (contact radius, m,
-    zero where there is no contact), status and response d(delta)/du. Arrays of the asperities' length: holder, the
-    site that an asperity is, or is part of, or was found under, -1 where free; seen, its approach (m) when it was last
-    looked at, at the separation seen_at (m).
-    Event counts accumulate along the path; history: the events of every equilibrium of the path up to here.
-    pending: free asperities beyond their jump-in approach that were left free because they had broken contact at
-    the same separation before.
-    """
-
-    separation: float
-    sites: _Sites
-    approach: np.ndarray
-    radius: np.ndarray
-    status: np.ndarray
-    response: np.ndarray
-    holder: np.ndarray
-    seen: np.ndarray
-    seen_at: np.ndarray
-    residual: float = 0.0
-    jump_ins: int = 0
-    jump_offs: int = 0
-    coalescences: int = 0
-    splits: int = 0
-    pending: int = 0
-    history: tuple[Events, ...] = ()
-
-    @cached_property
-    def _in_contact(self):
-        return np.flatnonzero(self.status == _CONTACT)
-
-    @cached_property
-    def spots(self) -> Spots:
-        """The sites in contact."""
-        sites, c = self.sites, self._in_contact
-        return Spots(
-            sites.position[c], sites.height[c], sites.radius[c], self.radius[c], self.approach[c], sites.members[c]
-        )
-
-    @property
-    def responses(self) -> np.ndarray:
-        """d(delta)/du of the spots."""
-        return self.response[self._in_contact]
-
-    @cached_property
-    def owner(self) -> np.ndarray:
-        """For every asperity the index of the spot that it is, or is part of, or lies under; -1 where free."""
-        spot = np.full(len(self.sites) + 1, -1)
-        spot[self._in_contact] = np.arange(len(self._in_contact))
-        return spot[self.holder]  # a holder -1 looks up the last
-
-
-def mean_pressure(contact: Contact, spots: Spots) -> float:
-    """Total force over nominal area, Pa."""
-    return float(np.sum(contact.law.force(spots.contact_radius, spots.radius_of_curvature))) / contact.area
-
-
-def area_fraction(contact: Contact, spots: Spots) -> float:
-    """Total contact area over nominal area."""
-    return float(np.sum(np.pi * spots.contact_radius**2)) / contact.area
-
-
-def mean_gap(contact: Contact, state: ContactState) -> float:
-    """Mean over the square of separation and displacement, m; of a periodic surface the mean separation.
-
-    Of a free square the spots act as forces at their centres.
-    """
-    if not contact.asperities.free:
-        return state.separation
-    law, spots = contact.law, state.spots
-    force = law.force(spots.contact_radius, spots.radius_of_curvature)
-    sunk = mean_displacement(contact.asperities.period, law.material.contact_modulus, spots.position, force)
-    return state.separation + sunk
-
-
-def contact_stiffness(contact: Contact, state: ContactState) -> float:
-    """-dp/du of the present spots, Pa/m, from the tangent of the equilibrium."""
-    return 0.0 - Control("pressure", 0.0).slope(contact, state)
-
-
-def stored_energy(contact: Contact, state: ContactState) -> float:
-    """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact.
-
-    Every spot has the work that would make it alone, and half that of its force against the displacement by the
-    others. Force and displacement are those of the spots' centres, as in eq. (4), which makes the interaction of
-    spots of unlike size only nearly reciprocal: along a path without events the energy changes by the work done but
-    for a part of the order of (a/r)^2 of that interaction.
-    """
-    spots, law = state.spots, contact.law
-    a, R = spots.contact_radius, spots.radius_of_curvature
-    displaced = spots.height - state.separation - spots.approach
-    return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / contact.area
-
-
-def untouched(contact: Contact) -> ContactState:
-    """The state at which the first asperity is about to make contact."""
-    asperities, none = contact.asperities, np.empty(0)
-    separation = float(np.max(asperities.height - contact.jump_in))
-    nowhere, nobody = np.empty((0, 2)), np.empty(0, dtype=int)
-    half_space = HalfSpace.at(nowhere, asperities.period, contact.law.material.contact_modulus, asperities.free)
-    return ContactState(
-        separation=separation,
-        sites=_Sites(nowhere, none, none, none, nobody, nobody, np.empty(0, dtype=object), nobody, half_space, 0),
-        approach=none,
-        radius=none,
-        status=np.empty(0, dtype=np.int8),
-        response=none,
-        holder=np.full(len(asperities), -1),
-        seen=asperities.height - separation,
-        seen_at=np.full(len(asperities), separation),
-    )
-
-
-def _radius_response(law: JKR, a, R, approach, jump_off):
-    """da/d(delta), zero for spots past jump-off; bounded close to it, where it is infinite."""
-    slope = np.zeros(len(a))
-    touching = (a > 0) & (approach >= jump_off)
-    slope[touching] = 1 / np.maximum(law.approach_derivative(a[touching], R[touching]), 1e-3 * (a / R)[touching])
-    return slope
-
-
-@dataclass(frozen=True)
-class Control:
-    """A quantity to hold during a solve: "pressure" (Pa) or "area_fraction", and its value."""
-
-    quantity: str
-    target: float
-
-    def value(self, contact: Contact, a, R) -> float:
-        """The quantity for contact radii a."""
-        if self.quantity == "pressure":
-            return float(np.sum(contact.law.force(a, R))) / contact.area
-        return float(np.sum(np.pi * a**2)) / contact.area
-
-    def gradient(self, contact: Contact, a, R):
-        """Its derivative with respect to the contact radii."""
-        if self.quantity == "pressure":
-            return contact.law.force_derivative(a, R) / contact.area
-        return 2 * np.pi * a / contact.area
-
-    def slope(self, contact: Contact, state: ContactState) -> float:
-        """Its derivative with respect to the mean separation, at unchanged contacts."""
-        sites, c = state.sites, state._in_contact
-        a, R = state.radius[c], sites.radius[c]
-        growth = _radius_response(contact.law, a, R, state.approach[c], sites.jump_off[c]) * state.response[c]
-        return float(np.sum(self.gradient(contact, a, R) * growth))
-
 
 def equilibrium(
-    contact: Contact, state: ContactState, separation: float, control: Control | None = None, *, let_go: int = 0
+    contact: Problem, state: ContactState, separation: float, control: Control | None = None, *, let_go: int = 0
 ) -> ContactState:
     """Bring the contact from one state to another mean separation, or to a given load or area.
 
@@ -436,13 +128,13 @@ class _Search:
         self.fallen = np.full(len(contact.asperities), -1)  # the united spot that an asperity has just fallen out of
         self.split = np.zeros(len(contact.asperities), dtype=bool)  # whether it has fallen out of one before
         self.locked = np.zeros(len(contact.asperities), dtype=bool)
-        self.known = state.status == _CONTACT  # spots that were there before
+        self.known = state.status == CONTACT  # spots that were there before
         self.fresh = np.empty(0, dtype=int)  # united spots whose heights follow from the next evaluation
         self.interaction = None
         self.is_site = np.zeros(len(contact.asperities), dtype=bool)
-        single = (self.sites.asperity >= 0) & (self.status != _GONE)
+        single = (self.sites.asperity >= 0) & (self.status != GONE)
         self.is_site[self.sites.asperity[single]] = True
-        largest_jump = -self.law.jump_off_approach(np.max(contact.asperities.radius))
+        largest_jump = -self.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
         self.sudden_guess, self.sudden_bound = (
             heights * contact.rms_height + jumps * largest_jump for heights, jumps in (_SUDDEN_GUESS, _SUDDEN_BOUND)
         )
@@ -453,7 +145,7 @@ class _Search:
             trial = np.flatnonzero(hopeful & self._free())
             # Where contact was lost the approach is not known, but small.
             expected = np.where(np.isfinite(fall), self.seen + fall, 0.0)
-            self._admit(trial, _TRIAL, expected[trial])
+            self._admit(trial, TRIAL, expected[trial])
 
     # --- the sites ------------------------------------------------------------------------------------------
 
@@ -467,12 +159,12 @@ class _Search:
             return
         asperities = self.contact.asperities
         self.is_site[asperity] = True
-        if status == _CONTACT:
+        if status == CONTACT:
             self.holder[asperity] = len(self.sites) + np.arange(len(asperity))
         self._append(
             position=asperities.position[asperity],
             height=asperities.height[asperity],
-            radius=asperities.radius[asperity],
+            radius_of_curvature=asperities.radius_of_curvature[asperity],
             asperity=asperity,
             members=np.ones(len(asperity), dtype=int),
             parts=np.full(len(asperity), None),
@@ -484,7 +176,7 @@ class _Search:
     def _append(self, *, status, approach, known, parted=-1, **more):
         count = len(approach)
         more["parted"] = np.full(count, parted)
-        self.sites = self.sites.extended(**more, jump_off=self.law.jump_off_approach(more["radius"]))
+        self.sites = self.sites.extended(**more, jump_off=self.law.jump_off_approach(more["radius_of_curvature"]))
         self.height = np.concatenate([self.height, more["height"]])
         self.status = np.concatenate([self.status, np.full(count, status, dtype=np.int8)])
         self.approach = np.concatenate([self.approach, approach])
@@ -494,7 +186,7 @@ class _Search:
 
     def _arrange_if_needed(self):
         """Forget sites that are gone when they are many; choose the near field for the number of the others."""
-        gone = self.status == _GONE
+        gone = self.status == GONE
         if len(gone) <= _GROWTH * self.sites.arranged and np.count_nonzero(gone) <= _GONE_PART * len(gone):
             return
         stay = np.flatnonzero(~gone)
@@ -531,7 +223,7 @@ class _Search:
 
     def _evaluate(self, approach, separation):
         """The equations at given approaches (n,) and separation, m."""
-        part, R = self.status != _GONE, self.sites.radius
+        part, R = self.status != GONE, self.sites.radius_of_curvature
         a = np.zeros(len(self.sites))
         a[part] = self.law.contact_radius(approach[part], R[part])
         if self.interaction is None or np.any(a > self.interaction.windows.radius):
@@ -545,8 +237,8 @@ class _Search:
         error = np.where(part, approach + w + separation - self.height, 0.0)
         miss = gross = 0.0
         if self.control is not None:
-            miss = self.control.value(self.contact, a[part], R[part]) - self.control.target
-            if self.control.quantity == "pressure":
+            miss = held_value(self.contact, self.control.quantity, a[part], R[part]) - self.control.target
+            if self.control.quantity == PRESSURE:
                 gross = float(np.sum(self.law.repulsive_force(a[part], R[part]))) / self.contact.area
         return _Point(approach, separation, a, error, miss, gross)
 
@@ -561,12 +253,12 @@ class _Search:
 
     def _linearised(self, point):
         """Where the unknowns are, da/d(delta) there, and the products of W' da/d(delta), exact and approximate."""
-        part = np.flatnonzero(self.status != _GONE)
-        a, R = point.a[part], self.sites.radius[part]
+        part = np.flatnonzero(self.status != GONE)
+        a, R = point.a[part], self.sites.radius_of_curvature[part]
         off, approach = self.sites.jump_off[part], point.approach[part]
         # Who is about to be drawn back over jump-off behaves as on the near side.
         approach = np.where(self._drawn_back(point)[part] & self.adhesive, off, approach)
-        slope = _radius_response(self.law, a, R, approach, off)
+        slope = radius_response(self.law, a, R, approach, off)
         tangent = self.interaction.tangent(point.a)
 
         def spread(x):
@@ -587,7 +279,9 @@ class _Search:
             return step, du
         # The separation is an unknown too; in terms of what the last response leaves, the bordered matrix is near one.
         response = self.response[part]
-        gradient = slope * self.control.gradient(self.contact, point.a[part], self.sites.radius[part])
+        gradient = slope * gradient_by_radius(
+            self.contact, self.control.quantity, point.a[part], self.sites.radius_of_curvature[part]
+        )
         rate = float(np.sum(gradient * response))
         if rate == 0:
             raise NotConverged(f"{self.control.quantity} does not depend on the separation")
@@ -626,12 +320,12 @@ class _Search:
         sites, law, off = self.sites, self.law, self.sites.jump_off
         drawn_back = self._drawn_back(point)
         moved = np.where((point.approach < off) & ~drawn_back, np.minimum(moved, off), moved)
-        part = np.flatnonzero((self.status != _GONE) & ((step < 0) & (point.approach > off) | drawn_back))
-        R, a = sites.radius[part], point.a[part]
+        part = np.flatnonzero((self.status != GONE) & ((step < 0) & (point.approach > off) | drawn_back))
+        R, a = sites.radius_of_curvature[part], point.a[part]
         lowest = law.jump_off_radius(R)
         near = a < _NEAR_JUMP_OFF * lowest
         part, R, a, lowest = part[near], R[near], a[near], lowest[near]
-        change = _radius_response(law, a, R, np.maximum(point.approach, off)[part], off[part]) * step[part]
+        change = radius_response(law, a, R, np.maximum(point.approach, off)[part], off[part]) * step[part]
         # Where the radius ends, what is left of the error is made up by the approach alone.
         left = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
         reached = law.approach(np.maximum(a + change, lowest), R)
@@ -646,7 +340,7 @@ class _Search:
     def _drawn_back(self, point):
         """Whether a spot is next to jump-off, on the far side, and drawn back over it (n,)."""
         gap = self.sites.jump_off - point.approach
-        return (self.status == _CONTACT) & (gap >= 0) & (gap < -_NEXT_TO_JUMP_OFF * point.error)
+        return (self.status == CONTACT) & (gap >= 0) & (gap < -_NEXT_TO_JUMP_OFF * point.error)
 
     # --- the iteration --------------------------------------------------------------------------------------
 
@@ -694,7 +388,7 @@ class _Search:
         if covered > _FULL_CONTACT:
             raise FullContact(f"the contact area reached {covered:.2f} of the nominal one")
         self.approach = point.approach
-        off = self.status == _CONTACT
+        off = self.status == CONTACT
         if self.adhesive:
             off &= point.approach < self.sites.jump_off - margin
         else:  # a single asperity out of contact is harmless
@@ -714,7 +408,7 @@ class _Search:
         the others may not come back at this separation."""
         sites, spots = self.sites, np.flatnonzero(off)
         self.jump_offs += len(spots)
-        R = sites.radius[spots]
+        R = sites.radius_of_curvature[spots]
         energy = self.law.energy(self.law.jump_off_radius(R), R)
         self._note(JUMP_OFF, sites.position[spots], sites.members[spots], energy)
         before, united = self.holder.copy(), np.append(off & (sites.asperity < 0), False)
@@ -728,7 +422,7 @@ class _Search:
         """Break the contact of `count` spots of the state from which the search starts, and of their equals."""
         here = self.approach - self.response * (self.separation - state.separation)
         rate = np.maximum(-self.response, 1e-3)
-        left = np.where(self.status == _CONTACT, (here - self.sites.jump_off) / rate, np.inf)
+        left = np.where(self.status == CONTACT, (here - self.sites.jump_off) / rate, np.inf)
         last = np.partition(left, count - 1)[count - 1]
         self.approach = here
         self._jump_off(left <= last * (1 + _SAME_STRENGTH))
@@ -737,14 +431,14 @@ class _Search:
         """Undo unions whose two spots would no longer overlap; whether there were any."""
         sites, n = self.sites, len(a)
         touching = np.array([0.0 if union is None else union.touching for union in sites.parts[:n]])
-        apart = np.flatnonzero((self.status[:n] == _CONTACT) & (a < touching))
+        apart = np.flatnonzero((self.status[:n] == CONTACT) & (a < touching))
         for site in apart.tolist():
             union = sites.parts[site]
             shrunk = union.contact_radius * (a[site] / np.hypot(*union.contact_radius))
             held = self.holder == site
             self.holder[held] = -1
             self.seen_at[held] = np.inf  # who lay under the spot is looked at anew
-            self.status[site] = _GONE
+            self.status[site] = GONE
             self.splits += 1
             self._note(SPLIT, sites.position[[site]], sites.members[[site]])
             for k, asperities in enumerate(union.asperities()):
@@ -754,12 +448,12 @@ class _Search:
             self._append(
                 position=union.position,
                 height=union.height,
-                radius=union.radius,
+                radius_of_curvature=union.radius_of_curvature,
                 asperity=union.asperity,
                 members=union.members,
                 parts=union.parts,
-                status=_CONTACT,
-                approach=self.law.approach(shrunk, union.radius),
+                status=CONTACT,
+                approach=self.law.approach(shrunk, union.radius_of_curvature),
                 known=True,
                 parted=self.splits,
             )
@@ -771,7 +465,7 @@ class _Search:
         self.holder[freed] = -1
         self.is_site[freed] = False
         self.seen_at[freed] = np.inf  # their approach is not known
-        self.status[off] = _GONE
+        self.status[off] = GONE
         return freed
 
     def _join(self, point, margin):
@@ -780,8 +474,8 @@ class _Search:
         reach = self.seen + _FASTEST_APPROACH * np.abs(self.seen_at - point.separation)
         reach += self.sudden_guess if margin > 0 else self.sudden_bound
         looked_at = np.flatnonzero((reach >= contact.jump_in) & self._free())
-        spots = np.flatnonzero((point.a > 0) & (self.status != _GONE))
-        a, R, there = point.a[spots], self.sites.radius[spots], self.sites.position[spots]
+        spots = np.flatnonzero((point.a > 0) & (self.status != GONE))
+        a, R, there = point.a[spots], self.sites.radius_of_curvature[spots], self.sites.position[spots]
         w = displacement_at(
             self.law, asperities.period, asperities.position[looked_at], there, a, R, self.sites.half_space.ewald.once
         )
@@ -789,7 +483,7 @@ class _Search:
         self.seen_at[looked_at] = point.separation
         # What has just fallen out of a united spot was in contact, and stays so wherever there is a stable state.
         fell = self.fallen[looked_at] >= 0
-        lowest = self.law.jump_off_approach(asperities.radius[looked_at[fell]])
+        lowest = self.law.jump_off_approach(asperities.radius_of_curvature[looked_at[fell]])
         needed = contact.jump_in[looked_at] + margin
         needed[fell] = lowest
         ready = self.seen[looked_at] >= needed
@@ -812,10 +506,10 @@ class _Search:
         self._note(SPLIT, self.sites.position[stay], self.sites.members[stay])
         if self.adhesive:
             self.jump_ins += len(joining)
-            R = asperities.radius[joining]
+            R = asperities.radius_of_curvature[joining]
             energy = -self.law.energy(self.law.contact_radius(self.seen[joining], R), R)
             self._note(JUMP_IN, asperities.position[joining], 1, energy, joining)
-        self._admit(ready, _CONTACT if self.adhesive else _TRIAL, self.seen[ready])
+        self._admit(ready, CONTACT if self.adhesive else TRIAL, self.seen[ready])
         return True
 
     def _first_of_each_group(self, joining):
@@ -824,7 +518,7 @@ class _Search:
         if len(joining) < 2:
             return joining
         position = asperities.position[joining]
-        a = self.law.contact_radius(self.seen[joining], asperities.radius[joining])
+        a = self.law.contact_radius(self.seen[joining], asperities.radius_of_curvature[joining])
         under = covering_spot(position, position, a, asperities.cell, larger_than=a)
         return joining[under < 0]
 
@@ -844,7 +538,7 @@ class _Search:
         self.jump_ins -= self._forget_jumps_in(self.sites.asperity[np.unique(i)])
         self.holder[self.sites.asperity[i]] = i
         self.is_site[self.sites.asperity[i]] = False
-        self.status[i] = _GONE
+        self.status[i] = GONE
         index = np.append(np.arange(len(self.sites)), -1)
         index[i] = j  # the deepest comes last and stays
         while np.any(index[index] != index):  # who takes one in may be taken in itself, by a larger one
@@ -862,7 +556,7 @@ class _Search:
         sites, period = self.sites, self.contact.asperities.cell
         first, second = windows.source, windows.target
         depth = a[first] + a[second] - windows.r
-        part = (a > 0) & (self.status[: len(a)] != _GONE)
+        part = (a > 0) & (self.status[: len(a)] != GONE)
         touch = (depth > 0) & part[first] & part[second]
         if self.parting and not deep:
             # Two spots that have just come apart would unite again and again, as they settle.
@@ -871,7 +565,10 @@ class _Search:
         if margin > 0 and len(touch):
             # An error of the approach is one of the radius, about R/(2a) times as large.
             i, j = first[touch], second[touch]
-            touch = touch[depth[touch] > margin * 0.5 * (sites.radius[i] / a[i] + sites.radius[j] / a[j])]
+            touch = touch[
+                depth[touch]
+                > margin * 0.5 * (sites.radius_of_curvature[i] / a[i] + sites.radius_of_curvature[j] / a[j])
+            ]
         if deep:
             touch = touch[windows.r[touch] < np.maximum(a[first[touch]], a[second[touch]])]
         if not len(touch):
@@ -880,26 +577,33 @@ class _Search:
         pairs = disjoint_pairs(pairs)
         i, j = pairs.T
         centre, radius, R = equivalent_spots(
-            sites.position[i], a[i], sites.radius[i], sites.position[j], a[j], sites.radius[j], period
+            sites.position[i],
+            a[i],
+            sites.radius_of_curvature[i],
+            sites.position[j],
+            a[j],
+            sites.radius_of_curvature[j],
+            period,
         )
         parts = np.full(len(pairs), None)
         if self.contact.united_until == OVERLAP:
             shrink = np.linalg.norm(periodic_difference(sites.position[j], sites.position[i], period), axis=1)
             touching = radius * np.minimum(shrink / (a[i] + a[j]), 1.0)
             for k, pair in enumerate(pairs):
-                own = (getattr(sites, name)[pair] for name in ("position", "radius", "asperity", "members", "parts"))
-                position, curvature, asperity, members, inner = own
-                parts[k] = _Union(
-                    touching[k], position, self.height[pair], curvature, a[pair], asperity, members, inner
+                own = (
+                    getattr(sites, name)[pair]
+                    for name in ("position", "radius_of_curvature", "asperity", "members", "parts")
                 )
+                position, curvature, asperity, members, inner = own
+                parts[k] = Union(touching[k], position, self.height[pair], curvature, a[pair], asperity, members, inner)
         # Without adhesion a site may have come into contact only now.
-        arrived = pairs[self.status[pairs] == _TRIAL]
+        arrived = pairs[self.status[pairs] == TRIAL]
         self.jump_ins += len(arrived)
         self._note(JUMP_IN, sites.position[arrived], 1, 0.0, sites.asperity[arrived])
         self.holder[sites.asperity[arrived]] = arrived
         single = sites.asperity[pairs]
         self.is_site[single[single >= 0]] = False
-        self.status[pairs] = _GONE
+        self.status[pairs] = GONE
         index = np.append(np.arange(len(sites)), -1)
         index[pairs] = len(sites) + np.arange(len(pairs))[:, None]
         self.holder = index[self.holder]  # -1 looks up the last
@@ -909,11 +613,11 @@ class _Search:
         self._append(
             position=centre,
             height=np.zeros(len(pairs)),
-            radius=R,
+            radius_of_curvature=R,
             asperity=np.full(len(pairs), -1),
             members=sites.members[i] + sites.members[j],
             parts=parts,
-            status=_CONTACT,
+            status=CONTACT,
             approach=self.law.approach(radius, R),
             known=True,
         )
@@ -923,21 +627,21 @@ class _Search:
         approach, sites = point.approach, self.sites
         response = self._response(point)
         if not self.adhesive:
-            made = np.flatnonzero((self.status == _TRIAL) & (approach > 0))
-            self.status[made] = _CONTACT
+            made = np.flatnonzero((self.status == TRIAL) & (approach > 0))
+            self.status[made] = CONTACT
             self.holder[sites.asperity[made]] = made
             self.jump_ins += len(made)
             self._note(JUMP_IN, sites.position[made], 1, 0.0, sites.asperity[made])
-            idle = np.flatnonzero((self.status == _CONTACT) & (approach <= 0))  # of single asperities
+            idle = np.flatnonzero((self.status == CONTACT) & (approach <= 0))  # of single asperities
             self.jump_offs += len(idle)
             self._note(JUMP_OFF, sites.position[idle], 1)
-            self.status[idle] = _TRIAL
+            self.status[idle] = TRIAL
             self.holder[sites.asperity[idle]] = -1
         return ContactState(
             separation=point.separation,
             sites=replace(sites, height=self.height),
             approach=approach,
-            radius=np.where(self.status == _CONTACT, point.a, 0.0),
+            contact_radius=np.where(self.status == CONTACT, point.a, 0.0),
             status=self.status,
             response=response,
             holder=self.holder,

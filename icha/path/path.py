@@ -14,22 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from icha.contact.failures import NotConverged
+from icha.contact.model import AREA_FRACTION as AREA
+from icha.contact.model import PRESSURE, ContactModel, Control, State
 from icha.equilibrium.energy import EnergyBalance, Step
-from icha.equilibrium.equilibrium import (
-    DETACHMENT,
-    OVERLAP,
-    Contact,
-    ContactState,
-    Control,
-    NotConverged,
-    area_fraction,
-    contact_stiffness,
-    equilibrium,
-    mean_gap,
-    mean_pressure,
-    stored_energy,
-    untouched,
-)
+from icha.equilibrium.problem import DETACHMENT, OVERLAP
 from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
 from icha.support.validation import number, positive
 
@@ -68,8 +57,6 @@ _UNITING_STEP = 1 / 16
 # Of the largest tension so far, the part by which it may be missed between two equilibria: at an event, and else.
 _MISSED_TENSION = 1e-3
 _MISSED_SMOOTH_TENSION = 1e-8
-# At such a rate to the separation the approach of a spot rises, as the surfaces part, on an unstable branch only.
-_RUNAWAY = 10.0
 # The first contact is made and the last one broken within this change of separation, in h_rms.
 _SHARP = 1e-12
 
@@ -253,7 +240,7 @@ def _stops(name, kind, values):
 class InsideJump(NotConverged):
     """The target is passed in a jump, and there is no equilibrium at it. `before` is the state just before the jump."""
 
-    def __init__(self, message: str, stop: _Stop, before: ContactState):
+    def __init__(self, message: str, stop: _Stop, before: State):
         """Keep which stop, and where the path can go on."""
         super().__init__(message)
         self.stop, self.before = stop, before
@@ -264,17 +251,17 @@ class _Stop:
     """A target turned into a function of the state that is zero at the target and rises on loading."""
 
     target: Target
-    contact: Contact
+    contact: ContactModel
     pressure_scale: float
 
-    def excess(self, state: ContactState) -> float:
+    def excess(self, state: State) -> float:
         """Relative excess of the state over the target; of a load that is zero in units of its scale."""
         kind, value = self.target.kind, self.target.value
         if kind == MEAN_SEPARATION:
             return (value - state.separation) / self.contact.rms_height
         if kind == AREA_FRACTION:
-            return area_fraction(self.contact, state.spots) / value - 1
-        pressure = mean_pressure(self.contact, state.spots) / self.pressure_scale
+            return self.contact.area_fraction(state) / value - 1
+        pressure = self.contact.pressure(state) / self.pressure_scale
         return (pressure - value) / (abs(value) or 1.0)
 
     @property
@@ -283,21 +270,21 @@ class _Stop:
         if self.target.kind == MEAN_SEPARATION:
             return None
         if self.target.kind == AREA_FRACTION:
-            return Control("area_fraction", self.target.value)
-        return Control("pressure", self.target.value * self.pressure_scale)
+            return Control(AREA, self.target.value)
+        return Control(PRESSURE, self.target.value * self.pressure_scale)
 
-    def expected_separation(self, state: ContactState) -> float:
+    def expected_separation(self, state: State) -> float:
         """The separation at which the target may be met: load and area grow about exponentially; -inf if unknown."""
         if self.target.kind == MEAN_SEPARATION:
             return self.target.value
-        value, slope = 1 + self.excess(state), self.control.slope(self.contact, state) / self.control.target
+        value, slope = 1 + self.excess(state), self.contact.slope(self.control.quantity, state) / self.control.target
         return state.separation - np.log(value) / (slope / value) if value > 0 and slope < 0 else -np.inf
 
-    def meet(self, state: ContactState, separation: float) -> ContactState:
+    def meet(self, state: State, separation: float) -> State:
         """The equilibrium at the target, from a state not far away; the separation is a first guess."""
-        return equilibrium(self.contact, state, separation, self.control)
+        return self.contact.equilibrium(state, separation, self.control)
 
-    def reach(self, before: ContactState, beyond: ContactState) -> ContactState:
+    def reach(self, before: State, beyond: State) -> State:
         """The state at the target, which lies between two states of the path, in either direction.
 
         The bracket is halved until the target is met inside it. When it closes on a jump (an event that carries the
@@ -320,7 +307,7 @@ class _Stop:
             except NotConverged:
                 pass
             try:
-                middle = equilibrium(self.contact, before, beyond.separation + sign * 0.5 * width)
+                middle = self.contact.equilibrium(before, beyond.separation + sign * 0.5 * width)
             except NotConverged:
                 if width > _CLOSE_TO_A_JUMP * self.contact.rms_height:
                     raise
@@ -339,7 +326,7 @@ class _Stop:
         return before.separation + start / (start - end) * (beyond.separation - before.separation)
 
     def _inside_jump(self, before, beyond):
-        low, high = (area_fraction(self.contact, state.spots) for state in (before, beyond))
+        low, high = (self.contact.area_fraction(state) for state in (before, beyond))
         return InsideJump(
             f"{_name(self.target)} lies inside a jump: at a mean separation of "
             f"{beyond.separation / self.contact.rms_height:.4f} h_rms the contact area jumps from {low:.3g} to "
@@ -358,7 +345,7 @@ class Waypoint:
     """
 
     target: Target
-    state: ContactState
+    state: State
     leg: int = 0
     balance: EnergyBalance | None = None
 
@@ -369,7 +356,7 @@ class Waypoint:
 
 
 def follow(
-    contact: Contact,
+    contact: ContactModel,
     path: Path,
     pressure_unit: float,
     progress: Callable[[str], None] | None = None,
@@ -391,7 +378,7 @@ def follow(
         If an equilibrium is not found even with short steps, or a target lies beyond what the model covers. Stops that
         lie inside a jump are left out; on the first loading those after them are yielded before the error is raised.
     """
-    scale = {REDUCED_PRESSURE: pressure_unit, RELATIVE_LOAD: contact.law.material.contact_modulus}
+    scale = {REDUCED_PRESSURE: pressure_unit, RELATIVE_LOAD: contact.contact_modulus}
     journey = _Journey(contact, path, scale, progress)
     if not path.cyclic:
         yield from journey.load()
@@ -415,7 +402,7 @@ class _Journey:
         self.contact, self.path, self.scale, self.progress = contact, path, scale, progress
         self.longest = path.max_step * contact.rms_height
         self.step = self.longest
-        self.first_contact = self.state = untouched(contact)
+        self.first_contact = self.state = contact.untouched()
         self.missed, self.reached, self.loading = [], 0, True
         self.stations = []  # separations met on the way in, in increasing order
         self.total = len(path.targets)
@@ -440,12 +427,12 @@ class _Journey:
     def _arrive(self, state, stop, waiting):
         """Go to a state, at a stop or before those that wait, where the model still holds."""
         what = _name((stop or waiting[0]).target) if stop or waiting else "separation"
-        area = area_fraction(self.contact, state.spots)
+        area = self.contact.area_fraction(state)
         if area > _AREA_MARGIN * MAX_AREA_FRACTION:
             reason = f"the contact area runs to {area:.2f} of the nominal one, beyond what the model covers,"
             raise self._end(NotConverged(f"{reason} before {what}"))
         self.state = state
-        if stop is None and mean_gap(self.contact, state) <= 0:
+        if stop is None and self.contact.mean_gap(state) <= 0:
             raise self._end(NotConverged(f"the mean planes met before {what}, beyond what the model covers"))
 
     def _tell(self, name):
@@ -453,7 +440,7 @@ class _Journey:
             state, contact = self.state, self.contact
             self.progress(
                 f"{name}, separation {state.separation / contact.rms_height:.4f} h_rms, "
-                f"A/A0 {area_fraction(contact, state.spots):.4e}, {len(state.spots)} spots"
+                f"A/A0 {contact.area_fraction(state):.4e}, {contact.spot_count(state)} spots"
             )
 
     def _tell_stop(self, target):
@@ -466,7 +453,7 @@ class _Journey:
         """The stops of a path that ends with the first loading."""
         waiting = [self._stop(target) for target in self.path.targets]
         while waiting:
-            if not len(self.state.spots) and self.state.separation > self.first_contact.separation:
+            if not self.contact.spot_count(self.state) and self.state.separation > self.first_contact.separation:
                 self.state = self.first_contact  # nothing happens on the way there
             try:
                 stop, beyond = _aim(waiting, self.state, self.step) or self._pass(waiting)
@@ -490,7 +477,7 @@ class _Journey:
 
     def _pass(self, waiting):
         """A step of the separation: the stop that it passes first, and its state; or None and the state after it."""
-        beyond = equilibrium(self.contact, self.state, self.state.separation - self.step)
+        beyond = self.contact.equilibrium(self.state, self.state.separation - self.step)
         return self._first_passed(waiting, beyond, -1)
 
     def _first_passed(self, waiting, beyond, direction):
@@ -539,7 +526,7 @@ class _Journey:
         between = self.longest / 64 if self.contact.adhesive else _SAME_SEPARATION * self.contact.rms_height
         highest = self.first_contact.separation - _SAME_SEPARATION * self.contact.rms_height
         while waiting or apart:
-            if direction > 0 and not len(self.state.spots) and self.state.separation >= highest:
+            if direction > 0 and not self.contact.spot_count(self.state) and self.state.separation >= highest:
                 if apart:
                     return
                 raise self._end(NotConverged(self._never_so_far(waiting[0].target)))
@@ -561,7 +548,7 @@ class _Journey:
             self._arrive(met, stop, waiting)
             self.effort += abs(step.work) + abs(step.lost)
             self.jumped += step.set_free(self.contact)
-            self.lowest = min(self.lowest, mean_pressure(self.contact, met.spots))
+            self.lowest = min(self.lowest, self.contact.pressure(met))
             first = leg == 0 and len(visited) == 1
             self.step = self.longest if first else min(self.longest, 2 * self.step)
             if abs(met.separation - visited[-1]) > between:
@@ -628,8 +615,8 @@ class _Journey:
     def _equilibrium(self, start, separation, collective):
         """The equilibrium at a separation; if there is none and it may be lost `collectively`, with spots let go."""
         try:
-            beyond = equilibrium(self.contact, start, separation)
-            if separation > start.separation and np.max(beyond.responses, initial=0.0) > _RUNAWAY:
+            beyond = self.contact.equilibrium(start, separation)
+            if separation > start.separation and self.contact.is_unstable(beyond):
                 raise NotConverged("spots would come closer as the surfaces part: an unstable equilibrium")
             return beyond
         except NotConverged:
@@ -638,10 +625,10 @@ class _Journey:
         count = 1
         while True:
             try:
-                return equilibrium(self.contact, start, separation, let_go=count)
+                return self.contact.equilibrium(start, separation, let_go=count)
             except NotConverged:
                 count *= 2
-                if count > len(start.spots):
+                if count > self.contact.spot_count(start):
                     raise
 
     def _is_resolved(self, start, beyond, step):
@@ -653,28 +640,28 @@ class _Journey:
         if step.unites and abs(step.width) > _UNITING_STEP * self.longest:
             return False
         scale = effort
-        if step.width > 0 and mean_pressure(self.contact, beyond.spots) < 0:
+        if step.width > 0 and self.contact.pressure(beyond) < 0:
             scale = min(effort, 10 * self.jumped)  # there is no way in here that has the same error
         unbalanced = step.roughness > _ROUGH_WORK * scale and abs(step.lost) > _BALANCED_WORK * scale
         if not step.sudden and unbalanced and abs(step.width) > self.longest / 256:
             return False
         if step.width < 0:
             return True
-        if self.contact.adhesive and len(start.spots) and not len(beyond.spots):
+        if self.contact.adhesive and self.contact.spot_count(start) and not self.contact.spot_count(beyond):
             return False  # the last contact breaks: seen as sharply as can be
         if not step.pressure_jump:
             return True
         # The pressure has fallen on along its tangent until the event.
-        p, slope = mean_pressure(self.contact, start.spots), -contact_stiffness(self.contact, start)
-        lowest, deepest = min(p, p + step.width * slope), min(p, mean_pressure(self.contact, beyond.spots))
+        p, slope = self.contact.pressure(start), -self.contact.stiffness(start)
+        lowest, deepest = min(p, p + step.width * slope), min(p, self.contact.pressure(beyond))
         return lowest >= self.lowest or deepest - lowest <= _MISSED_TENSION * abs(lowest)
 
     def _largest_tension(self, start, beyond, step):
         """Where between two states without an event the tension is largest, if it is a new largest one; else None."""
-        slope, end_slope = (-contact_stiffness(self.contact, state) for state in (start, beyond))
+        slope, end_slope = (-self.contact.stiffness(state) for state in (start, beyond))
         if step.width < 0 or step.pressure_jump or not slope < 0 < end_slope:
             return None
-        p, q = (mean_pressure(self.contact, state.spots) for state in (start, beyond))
+        p, q = (self.contact.pressure(state) for state in (start, beyond))
         # The tangents meet below the curve.
         meet = (q - end_slope * step.width - p) / (slope - end_slope)
         lowest = p + slope * meet
@@ -696,7 +683,7 @@ def _under_load(contact, waypoints) -> Iterator[Waypoint]:
     level = 0.0
     for waypoint in waypoints:
         state = waypoint.state
-        pressure = mean_pressure(contact, state.spots)
+        pressure = contact.pressure(state)
         ahead = pressure >= level if waypoint.loading else pressure <= level
         # The turning point itself begins the next leg; without contact there is nothing yet to jump from.
         if visited is not None and not ahead:
@@ -711,7 +698,7 @@ def _under_load(contact, waypoints) -> Iterator[Waypoint]:
                 except InsideJump:
                     pass
             work = -level * (landed.separation - visited.separation)
-            balance = balance.after_load_jump(work, stored_energy(contact, landed) - stored_energy(contact, visited))
+            balance = balance.after_load_jump(work, contact.stored_energy(landed) - contact.stored_energy(visited))
             if landed is not state:
                 yield Waypoint(Target(BETWEEN, landed.separation), landed, waypoint.leg, balance)
             visited, hidden = landed, None
@@ -721,7 +708,7 @@ def _under_load(contact, waypoints) -> Iterator[Waypoint]:
         visited, level = state, pressure
     if hidden is not None:
         work = -level * (hidden.state.separation - visited.separation)
-        balance = balance.after_load_jump(work, stored_energy(contact, hidden.state) - stored_energy(contact, visited))
+        balance = balance.after_load_jump(work, contact.stored_energy(hidden.state) - contact.stored_energy(visited))
         yield replace(hidden, balance=balance)
 
 
@@ -749,14 +736,14 @@ def _name(target, digits=None):
 
 def _epitaph(contact, state, reached, total, failures, loading):
     """Where the path ended and why; a surface that sticks together by itself is called so."""
-    pressure = mean_pressure(contact, state.spots)
+    pressure = contact.pressure(state)
     sticky = ""
     # Without a load, adhesion alone has spread the contact, or the very first one does not come to rest.
-    lone = not len(state.spots) and not any(isinstance(failure, InsideJump) for failure in failures)
+    lone = not contact.spot_count(state) and not any(isinstance(failure, InsideJump) for failure in failures)
     if contact.adhesive and loading and (pressure < 0 or lone):
         sticky = "; the load is not yet compressive: the surface is sticky, adhesion is pulling it towards full contact"
     return (
         f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
-        f"A/A0 = {area_fraction(contact, state.spots):.3g}, after {reached} of {total} stops: "
+        f"A/A0 = {contact.area_fraction(state):.3g}, after {reached} of {total} stops: "
         f"{'; '.join(map(str, failures))}{sticky}"
     )

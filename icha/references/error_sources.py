@@ -45,7 +45,8 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.equilibrium.distributions import contact_cover
-from icha.equilibrium.equilibrium import Contact, ContactState, area_fraction
+from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.equilibrium.states import ContactState
 from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
 from icha.path.path import Path, follow
 from icha.references.boundary_elements import (
@@ -208,7 +209,7 @@ def error_sources(
     ------
     ValueError
         If an argument is out of range.
-    icha.references.boundary_elements.NotSolved, icha.equilibrium.equilibrium.NotConverged
+    icha.references.boundary_elements.NotSolved, icha.contact.failures.NotConverged
         If a variant was not solved.
     """
     surface.require_periodic("the comparison with boundary elements")
@@ -264,19 +265,19 @@ def error_sources(
 
 def _model(surface, law, path):
     """The contact problem, and the model's states at the stops of the path."""
-    contact = Contact(law, find_summits(surface), surface.rms_height)
+    contact = InteractingAsperities(law, find_summits(surface), surface.rms_height)
     modulus = law.material.contact_modulus
     met = {waypoint.target: waypoint.state for waypoint in follow(contact, path, modulus * surface.rms_slope)}
     return contact, [met[target] for target in path.targets]
 
 
-def _state_of_model(contact: Contact, state: ContactState) -> State:
-    return State(area_fraction(contact, state.spots), state.separation)
+def _state_of_model(contact: InteractingAsperities, state: ContactState) -> State:
+    return State(contact.area_fraction(state), state.separation)
 
 
 def independent_discs(summits: Asperities, law: JKR, pressure: float) -> Discs:
     """Hertz's contacts of the summits with a plane, each as if it were alone, at a nominal pressure in Pa."""
-    modulus, R = law.material.contact_modulus, summits.radius
+    modulus, R = law.material.contact_modulus, summits.radius_of_curvature
 
     def excess(separation):
         approach = np.maximum(summits.height - separation, 0.0)
@@ -319,7 +320,7 @@ def discs_apart(
     start = independent_discs(summits, law, pressure)
     separation, part = start.separation, np.arange(len(summits))
     approach = summits.height - separation
-    lift, R = np.zeros(len(summits)), summits.radius.copy()
+    lift, R = np.zeros(len(summits)), summits.radius_of_curvature.copy()
     half_space = None
     for turn in range(_MAX_ROUNDS):
         position = summits.position[part]
@@ -343,8 +344,11 @@ def discs_apart(
             return discs
         raised, sharpness = _shape_of_field(law, summits.period, discs)
         own = part[touching]
-        new_lift, new_R = np.zeros(len(lift)), summits.radius.copy()
-        new_lift[own], new_R[own] = 0.5 * summits.radius[own] * raised, 1 / (1 / summits.radius[own] + 0.5 * sharpness)
+        new_lift, new_R = np.zeros(len(lift)), summits.radius_of_curvature.copy()
+        new_lift[own], new_R[own] = (
+            0.5 * summits.radius_of_curvature[own] * raised,
+            1 / (1 / summits.radius_of_curvature[own] + 0.5 * sharpness),
+        )
         change = max(np.max(np.abs(new_R / R - 1)), np.max(np.abs(new_lift - lift)) / rms_height)
         if change < _SAME_CURVATURE:
             return discs
@@ -503,7 +507,7 @@ def _at(summits, field):
 
 def _circular(summits):
     none = np.zeros(len(summits))
-    return np.stack([-1 / summits.radius, none, -1 / summits.radius], axis=1)
+    return np.stack([-1 / summits.radius_of_curvature, none, -1 / summits.radius_of_curvature], axis=1)
 
 
 def paraboloids(summits: Asperities, curvatures: np.ndarray, grid: int) -> np.ndarray:

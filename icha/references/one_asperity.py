@@ -24,8 +24,9 @@ import xarray as xr
 from icha.asperity.cohesive_zone import is_resolved, strength_number
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
+from icha.contact.model import Control
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
-from icha.equilibrium.equilibrium import Contact, Control, area_fraction, equilibrium, mean_pressure, untouched
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.interaction import displacement_at
 from icha.references.boundary_elements import (
     REFERENCES,
@@ -157,7 +158,7 @@ def one_asperity(
     ------
     ValueError
         If an argument is out of range, or the grid does not resolve the attraction.
-    icha.references.boundary_elements.NotSolved, icha.equilibrium.equilibrium.NotConverged
+    icha.references.boundary_elements.NotSolved, icha.contact.failures.NotConverged
         If one of the two does not find a state.
     RuntimeError
         If the model is not in contact.
@@ -232,26 +233,26 @@ class _Model:
     """The model's one spot, moved from state to state."""
 
     def __init__(self, surface, material):
-        self.contact = Contact(JKR(material), find_summits(surface), surface.rms_height)
+        self.contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
         self.top = float(surface.heights.max())
-        self.state = untouched(self.contact)
+        self.state = self.contact.untouched()
 
     def at(self, approach):
         """Force (N) and area (m^2) at an approach (m), on from the last."""
-        self.state = equilibrium(self.contact, self.state, self.top - approach)
+        self.state = self.contact.equilibrium(self.state, self.top - approach)
         return self._force_and_area(self.state)
 
     def carrying(self, force):
         """Area (m^2) and approach (m) at a force (N), from where it is."""
         pressure = Control("pressure", force / self.contact.area)
-        loaded = equilibrium(self.contact, self.state, self.state.separation, pressure)
+        loaded = self.contact.equilibrium(self.state, self.state.separation, pressure)
         return self._force_and_area(loaded)[1], self.top - loaded.separation
 
     def _force_and_area(self, state):
         if len(state.spots) != 1:
             raise RuntimeError(f"one asperity: {len(state.spots)} spots instead of one")
         nominal = self.contact.area
-        return mean_pressure(self.contact, state.spots) * nominal, area_fraction(self.contact, state.spots) * nominal
+        return self.contact.pressure(state) * nominal, self.contact.area_fraction(state) * nominal
 
 
 def _comparison(

@@ -51,13 +51,13 @@ class Summits(NamedTuple):
     density : number per area, m^-2.
     mean_height : above the mean plane of the surface, m.
     deviation : standard deviation of their heights, m.
-    radius : m.
+    radius_of_curvature : m.
     """
 
     density: float
     mean_height: float
     deviation: float
-    radius: float
+    radius_of_curvature: float
 
 
 def gaussian_summits(moments: SpectralMoments) -> Summits:
@@ -78,21 +78,21 @@ def gaussian_summits(moments: SpectralMoments) -> Summits:
         density=moments.m4 / (6 * math.sqrt(3) * math.pi * moments.m2),
         mean_height=4 * math.sqrt(moments.m0 / (math.pi * alpha)),
         deviation=math.sqrt((1 - _SUMMIT_VARIANCE / alpha) * moments.m0),
-        radius=3 * math.sqrt(math.pi) / (8 * math.sqrt(moments.m4)),
+        radius_of_curvature=3 * math.sqrt(math.pi) / (8 * math.sqrt(moments.m4)),
     )
 
 
 def greenwood_williamson_area(reduced_separation, moments: SpectralMoments):
     """A/A0 = pi eta R sigma F_1(d/sigma) at separations of any shape; d is the plane's height above the mean summit."""
     summits = gaussian_summits(moments)
-    scale = np.pi * summits.density * summits.radius * summits.deviation
+    scale = np.pi * summits.density * summits.radius_of_curvature * summits.deviation
     return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1)
 
 
 def greenwood_williamson_pressure(reduced_separation, moments: SpectralMoments):
     """p* = 4/3 eta R^(1/2) sigma^(3/2) F_3/2(d/sigma)/h'_rms at separations of any shape."""
     summits = gaussian_summits(moments)
-    scale = 4 / 3 * summits.density * math.sqrt(summits.radius * summits.deviation**3) / moments.rms_slope
+    scale = 4 / 3 * summits.density * math.sqrt(summits.radius_of_curvature * summits.deviation**3) / moments.rms_slope
     return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1.5)
 
 
@@ -174,12 +174,13 @@ def _sum_over_summits(of_summit, law, reduced_separation, moments, pulled):
     """
     summits = gaussian_summits(moments)
     plane = np.asarray(reduced_separation, float)[..., None] * moments.rms_height
-    first = float(law.jump_off_approach(summits.radius)) if pulled else 0.0
+    first = float(law.jump_off_approach(summits.radius_of_curvature)) if pulled else 0.0
     above, reach = summits.mean_height - plane, _FARTHEST_SUMMIT * summits.deviation
     limits = (np.maximum(first, above - reach), np.maximum(first, above + reach))
-    start, end = (law.contact_radius(approach, summits.radius) for approach in limits)
+    start, end = (law.contact_radius(approach, summits.radius_of_curvature) for approach in limits)
     a = start + (end - start) * (_NODES + 1) / 2
-    heights = (plane + law.approach(a, summits.radius) - summits.mean_height) / summits.deviation
+    heights = (plane + law.approach(a, summits.radius_of_curvature) - summits.mean_height) / summits.deviation
     density = np.exp(-(heights**2) / 2) / (math.sqrt(2 * np.pi) * summits.deviation)
-    per_radius = density * law.approach_derivative(a, summits.radius)
-    return summits.density * np.sum(of_summit(a, summits.radius) * per_radius * (end - start) / 2 * _WEIGHTS, axis=-1)
+    per_radius = density * law.approach_derivative(a, summits.radius_of_curvature)
+    values = of_summit(a, summits.radius_of_curvature) * per_radius
+    return summits.density * np.sum(values * (end - start) / 2 * _WEIGHTS, axis=-1)

@@ -59,14 +59,14 @@ class Asperities:
 
     position : (n, 2) array, (x, y) in [0, period), m.
     height : (n,) array, above the mean plane, m.
-    radius : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
+    radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
     free : whether it is single, on a free half-space, or repeats.
     """
 
     position: np.ndarray
     height: np.ndarray
-    radius: np.ndarray
+    radius_of_curvature: np.ndarray
     period: float
     free: bool = False
 
@@ -124,7 +124,7 @@ def find_summits(surface: Surface) -> Asperities:
     return Asperities(
         position=position,
         height=height,
-        radius=spacing**2 / np.sqrt(hyy * hxx - hyx**2),
+        radius_of_curvature=spacing**2 / np.sqrt(hyy * hxx - hyx**2),
         period=surface.period,
         free=surface.free,
     )

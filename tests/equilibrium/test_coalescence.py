@@ -7,7 +7,7 @@ from half_space import all_pairs
 from icha import Material
 from icha.asperity.coalescence import covering_spot, disjoint_pairs, equivalent_spots, overlapping_pairs
 from icha.asperity.jkr import JKR
-from icha.equilibrium.equilibrium import Contact, equilibrium, untouched
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.surfaces.summits import Asperities
 
 PERIOD = 1.0
@@ -109,20 +109,20 @@ def two_bumps(energy, order=(0, 1)):
     height = np.array([1.0e-3, 0.9e-3])[list(order)]
     R = np.array([0.5, 0.8])[list(order)]
     law = JKR(Material(2.0, energy, 1e-5))
-    return Contact(law, Asperities(position, height, R, PERIOD), rms_height=1e-3)
+    return InteractingAsperities(law, Asperities(position, height, R, PERIOD), rms_height=1e-3)
 
 
 def states_around_the_union(contact):
     """The last state with two spots and the first with one, a billionth of the separation's way apart."""
-    before = equilibrium(contact, untouched(contact), 0.9e-3)
+    before = contact.equilibrium(contact.untouched(), 0.9e-3)
     separation, step = before.separation, 5e-5
     while step > 1e-13:
-        after = equilibrium(contact, before, separation - step)
+        after = contact.equilibrium(before, separation - step)
         if after.coalescences:
             step /= 2
         else:
             before, separation = after, separation - step
-    return before, equilibrium(contact, before, separation - 2 * step)
+    return before, contact.equilibrium(before, separation - 2 * step)
 
 
 @pytest.mark.parametrize("energy", [0.0, 1e-9])
@@ -154,10 +154,10 @@ def test_the_order_of_the_input_does_not_matter(energy):
     for seed in (None, 1, 2):
         order = np.arange(40) if seed is None else np.random.default_rng(seed).permutation(40)
         asperities = Asperities(position[order], height[order], R[order], PERIOD)
-        contact = Contact(JKR(Material(2.0, energy, 1e-5)), asperities, rms_height=3e-4)
-        state = untouched(contact)
+        contact = InteractingAsperities(JKR(Material(2.0, energy, 1e-5)), asperities, rms_height=3e-4)
+        state = contact.untouched()
         for separation in np.arange(0.9e-3, 0, -5e-5):
-            state = equilibrium(contact, state, separation)
+            state = contact.equilibrium(state, separation)
         assert state.coalescences >= 3
         spots = state.spots
         rank = np.argsort(spots.position[:, 0])

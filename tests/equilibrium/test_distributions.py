@@ -19,7 +19,8 @@ from icha.equilibrium.distributions import (
     gap_distribution,
     pressure_distribution,
 )
-from icha.equilibrium.equilibrium import Contact, Spots, area_fraction, equilibrium, mean_pressure, untouched
+from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.equilibrium.states import Spots
 from icha.half_space.grid_displacement import displacement_field, row_blocks
 from icha.surfaces.summits import find_summits
 
@@ -29,10 +30,10 @@ PERIOD, MODULUS = 100e-6, 25e6
 def pressed(energy, levels=(2.5, 2.0, 1.5, 1.2), grid=64, seed=1):
     surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 16, 0.8).realise(grid, seed)
     law = JKR(Material(MODULUS, energy, 2.071e-9))
-    contact = Contact(law, find_summits(surface), surface.rms_height)
-    state = untouched(contact)
+    contact = InteractingAsperities(law, find_summits(surface), surface.rms_height)
+    state = contact.untouched()
     for level in levels:
-        state = equilibrium(contact, state, level * surface.rms_height)
+        state = contact.equilibrium(state, level * surface.rms_height)
     return surface, contact, state
 
 
@@ -104,7 +105,7 @@ def test_at_every_single_summit_in_contact_the_gap_closes(case):
 def test_identity_of_the_gap_distribution(case):
     surface, contact, state = case
     gaps = gap_distribution(contact.law, surface, state)
-    area = area_fraction(contact, state.spots)
+    area = contact.area_fraction(state)
     assert np.sum(gaps.density * np.diff(gaps.edges)) + area + gaps.overlap_fraction == pytest.approx(1, abs=1e-12)
     assert 0 <= gaps.overlap_fraction < 0.1
     assert np.all(gaps.density >= 0)
@@ -203,9 +204,9 @@ def test_gap_distribution_around_one_hertz_spot():
     r2 = ((x - np.rint(x)) ** 2)[None, :] + ((x - np.rint(x)) ** 2)[:, None]
     heights = -r2 * PERIOD**2 / (2 * R)
     surface = Surface(heights, PERIOD)
-    contact = Contact(JKR(Material(MODULUS, 0.0, 1e-9)), find_summits(surface), surface.rms_height)
+    contact = InteractingAsperities(JKR(Material(MODULUS, 0.0, 1e-9)), find_summits(surface), surface.rms_height)
     top = -heights.mean()
-    state = equilibrium(contact, untouched(contact), top - 4e-7)
+    state = contact.equilibrium(contact.untouched(), top - 4e-7)
     a = state.spots.contact_radius[0]
     gaps = gap_distribution(contact.law, surface, state)
     cumulative = np.concatenate([[0.0], np.cumsum(gaps.density * np.diff(gaps.edges))]) + gaps.overlap_fraction
@@ -239,10 +240,8 @@ def test_identities_of_the_pressure_distribution(case):
     surface, contact, state = case
     pressures = pressure_distribution(contact.law, surface, state.spots)
     width = np.diff(pressures.edges)
-    assert np.sum(pressures.density * width) == pytest.approx(area_fraction(contact, state.spots), rel=1e-12)
-    assert np.sum(pressures.density * width * pressures.mean) == pytest.approx(
-        mean_pressure(contact, state.spots), rel=1e-12
-    )
+    assert np.sum(pressures.density * width) == pytest.approx(contact.area_fraction(state), rel=1e-12)
+    assert np.sum(pressures.density * width * pressures.mean) == pytest.approx(contact.pressure(state), rel=1e-12)
     filled = np.flatnonzero(pressures.density > 0)
     # A bin's mean lies in it; the first also holds the tail to minus infinity.
     inner = filled[filled > 0]

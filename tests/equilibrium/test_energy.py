@@ -38,7 +38,7 @@ from test_unloading import (
 import icha
 import icha.path.path
 from icha import Material, Path
-from icha.equilibrium.equilibrium import JUMP_IN, JUMP_OFF
+from icha.contact.events import JUMP_IN, JUMP_OFF
 
 LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
 

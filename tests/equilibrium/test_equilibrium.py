@@ -10,17 +10,10 @@ from hypothesis import strategies as st
 import icha.equilibrium.equilibrium
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
-from icha.equilibrium.equilibrium import (
-    RESIDUAL_TOLERANCE,
-    Contact,
-    Control,
-    NotConverged,
-    area_fraction,
-    contact_stiffness,
-    equilibrium,
-    mean_pressure,
-    untouched,
-)
+from icha.contact.failures import NotConverged
+from icha.contact.model import Control
+from icha.equilibrium.equilibrium import RESIDUAL_TOLERANCE
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
 from icha.surfaces.square import periodic_difference
 from icha.surfaces.summits import Asperities, find_summits
@@ -43,7 +36,7 @@ def bump_heights(n=64, centre=(0.503, 0.4963)):
 def bump(energy):
     """The contact problem of one paraboloid on a grid, and the height of its top above the mean plane."""
     surface = Surface(bump_heights(), PERIOD)
-    contact = Contact(JKR(Material(MODULUS, energy, RANGE)), find_summits(surface), surface.rms_height)
+    contact = InteractingAsperities(JKR(Material(MODULUS, energy, RANGE)), find_summits(surface), surface.rms_height)
     assert len(contact.asperities) == 1
     return contact, -bump_heights().mean()
 
@@ -65,50 +58,50 @@ def lone_spot(separation, top, energy, larger_than):
 
 def test_hertz_bump_against_a_scalar_equation():
     contact, top = bump(0.0)
-    state = untouched(contact)
+    state = contact.untouched()
     assert state.separation == pytest.approx(top, rel=1e-9)
     for depth in (1e-9, 1e-8, 1e-7):
-        state = equilibrium(contact, state, top - depth)
+        state = contact.equilibrium(state, top - depth)
         a = lone_spot(state.separation, top, 0.0, 1e-12)
         assert state.spots.contact_radius[0] == pytest.approx(a, rel=1e-6)
-        assert mean_pressure(contact, state.spots) * PERIOD**2 == pytest.approx(jkr_force(a, R, MODULUS, 0.0), rel=3e-6)
-        assert area_fraction(contact, state.spots) * PERIOD**2 == pytest.approx(np.pi * a**2, rel=2e-6)
+        assert contact.pressure(state) * PERIOD**2 == pytest.approx(jkr_force(a, R, MODULUS, 0.0), rel=3e-6)
+        assert contact.area_fraction(state) * PERIOD**2 == pytest.approx(np.pi * a**2, rel=2e-6)
     # And it lets go where it began.
-    assert len(equilibrium(contact, state, top + 1e-12).spots) == 0
+    assert len(contact.equilibrium(state, top + 1e-12).spots) == 0
 
 
 def test_jump_in_of_a_bump_happens_at_wus_gap():
     contact, top = bump(ENERGY)
     gap = -(1 - 2.641 * 3 ** (3 / 7)) * RANGE
-    assert untouched(contact).separation == pytest.approx(top + gap, rel=1e-9)
-    before = equilibrium(contact, untouched(contact), (top + gap) * (1 + 1e-8))
+    assert contact.untouched().separation == pytest.approx(top + gap, rel=1e-9)
+    before = contact.equilibrium(contact.untouched(), (top + gap) * (1 + 1e-8))
     assert len(before.spots) == 0
-    after = equilibrium(contact, before, (top + gap) * (1 - 1e-8))
+    after = contact.equilibrium(before, (top + gap) * (1 - 1e-8))
     assert len(after.spots) == 1
     assert after.jump_ins == 1
     expected = lone_spot(after.separation, top, ENERGY, contact.law.jump_off_radius(R))
     assert after.spots.contact_radius[0] == pytest.approx(expected, rel=1e-6)
     # The jump is into tension.
-    assert mean_pressure(contact, after.spots) < 0
+    assert contact.pressure(after) < 0
 
 
 def test_jump_off_of_a_bump_happens_at_the_jkr_limit():
     contact, top = bump(ENERGY)
-    state = equilibrium(contact, untouched(contact), top)
+    state = contact.equilibrium(contact.untouched(), top)
     # Rising far beyond the jump-in separation the spot holds, on the stable branch all the way.
     limit = -0.75 * (np.pi**2 * (ENERGY / MODULUS) ** 2 * R) ** (1 / 3)
     a_off = (np.pi / 8 * ENERGY / MODULUS * R**2) ** (1 / 3)
     expected = top - limit - displacement_by_own_images(a_off, ENERGY)
-    assert expected > untouched(contact).separation
+    assert expected > contact.untouched().separation
     for separation in np.linspace(top, expected, 7)[1:-1]:
-        state = equilibrium(contact, state, separation)
+        state = contact.equilibrium(state, separation)
         a = lone_spot(separation, top, ENERGY, a_off)
         assert state.spots.contact_radius[0] == pytest.approx(a, rel=1e-6)
-    attached = equilibrium(contact, state, expected + 1e-5 * limit)
+    attached = contact.equilibrium(state, expected + 1e-5 * limit)
     assert len(attached.spots) == 1
     assert attached.spots.contact_radius[0] == pytest.approx(a_off, rel=1e-3)
-    assert mean_pressure(contact, attached.spots) * PERIOD**2 == pytest.approx(-5 * np.pi / 6 * ENERGY * R, rel=5e-3)
-    detached = equilibrium(contact, state, expected - 1e-8 * limit)
+    assert contact.pressure(attached) * PERIOD**2 == pytest.approx(-5 * np.pi / 6 * ENERGY * R, rel=5e-3)
+    detached = contact.equilibrium(state, expected - 1e-8 * limit)
     assert len(detached.spots) == 0
     assert detached.jump_offs == 1
     np.testing.assert_array_equal(detached.owner, [-1])
@@ -117,11 +110,11 @@ def test_jump_off_of_a_bump_happens_at_the_jkr_limit():
 def test_strongest_pull_of_a_bump_is_that_of_jkr():
     # Under load control pull-off is at 3 pi/2 gamma R, whatever the images do.
     contact, top = bump(ENERGY)
-    state = equilibrium(contact, untouched(contact), top)
+    state = contact.equilibrium(contact.untouched(), top)
     forces = []
     for separation in np.linspace(top, top + 1.55 * np.cbrt((ENERGY / MODULUS) ** 2 * R), 60):
-        state = equilibrium(contact, state, separation)
-        forces.append(mean_pressure(contact, state.spots) * PERIOD**2)
+        state = contact.equilibrium(state, separation)
+        forces.append(contact.pressure(state) * PERIOD**2)
     assert min(forces) == pytest.approx(-1.5 * np.pi * ENERGY * R, rel=1e-3)
     assert min(forces) > -1.5 * np.pi * ENERGY * R * (1 + 1e-9)
 
@@ -134,12 +127,13 @@ def group(count, energy):
     height = np.array([1.0e-6, 0.97e-6, 1.02e-6])[:count]
     radius = np.array([0.1, 0.14, 0.07])[:count] * R
     law = JKR(Material(MODULUS, energy, RANGE))
-    return Contact(law, Asperities(position, height, radius, PERIOD), rms_height=1e-6)
+    return InteractingAsperities(law, Asperities(position, height, radius, PERIOD), rms_height=1e-6)
 
 
 def independent_solution(contact, separation, energy, guess):
     """Radii of interacting spots: own kernel by quadrature and image sums, and SciPy's hybrid method."""
-    position, radius, height = contact.asperities.position, contact.asperities.radius, contact.asperities.height
+    asperities = contact.asperities
+    position, radius, height = asperities.position, asperities.radius_of_curvature, asperities.height
     n = len(height)
 
     def error(scaled):
@@ -169,18 +163,18 @@ def independent_solution(contact, separation, energy, guess):
 @pytest.mark.parametrize("energy", [0.0, ENERGY])
 def test_interacting_spots_against_an_independent_solution(count, energy):
     contact = group(count, energy)
-    state = equilibrium(contact, untouched(contact), 0.85e-6)
+    state = contact.equilibrium(contact.untouched(), 0.85e-6)
     assert len(state.spots) == count
     spots = state.spots
     np.testing.assert_array_equal(np.sort(state.owner), np.arange(count))
     order = [int(np.argmin(np.hypot(*(spots.position - p).T))) for p in contact.asperities.position]
-    alone = contact.law.contact_radius(contact.asperities.height - 0.85e-6, contact.asperities.radius)
+    alone = contact.law.contact_radius(contact.asperities.height - 0.85e-6, contact.asperities.radius_of_curvature)
     expected = independent_solution(contact, 0.85e-6, energy, alone)
     # The interaction matters, so that agreement says something.
     assert np.max(np.abs(expected / alone - 1)) > 0.005
     np.testing.assert_allclose(spots.contact_radius[order], expected, rtol=1e-6)
-    force = np.sum(jkr_force(expected, contact.asperities.radius, MODULUS, energy))
-    assert mean_pressure(contact, spots) * PERIOD**2 == pytest.approx(force, rel=5e-6)
+    force = np.sum(jkr_force(expected, contact.asperities.radius_of_curvature, MODULUS, energy))
+    assert contact.pressure(state) * PERIOD**2 == pytest.approx(force, rel=5e-6)
 
 
 def test_two_spots_in_the_limit_of_a_large_cell():
@@ -195,8 +189,8 @@ def test_two_spots_in_the_limit_of_a_large_cell():
     constant = -3.900265 * 2 * force / (np.pi * MODULUS * cell)
     depth = a**2 / R + displacement_by_quadrature(d, a, R, MODULUS, 0.0) + constant
     position = np.array([[0.0, 0.0], [d, 0.0]])
-    contact = Contact(law, Asperities(position, np.full(2, 1e-6), np.full(2, R), cell), rms_height=1e-6)
-    state = equilibrium(contact, untouched(contact), 1e-6 - depth)
+    contact = InteractingAsperities(law, Asperities(position, np.full(2, 1e-6), np.full(2, R), cell), rms_height=1e-6)
+    state = contact.equilibrium(contact.untouched(), 1e-6 - depth)
     np.testing.assert_allclose(state.spots.contact_radius, a, rtol=1e-6)
 
 
@@ -204,12 +198,12 @@ def test_two_spots_in_the_limit_of_a_large_cell():
 def test_the_order_of_the_asperities_does_not_matter(energy):
     contact = group(3, energy)
     asperities, order = contact.asperities, [2, 0, 1]
-    shuffled = Contact(
+    shuffled = InteractingAsperities(
         contact.law,
-        Asperities(asperities.position[order], asperities.height[order], asperities.radius[order], PERIOD),
+        Asperities(asperities.position[order], asperities.height[order], asperities.radius_of_curvature[order], PERIOD),
         contact.rms_height,
     )
-    one, other = (equilibrium(c, untouched(c), 0.85e-6) for c in (contact, shuffled))
+    one, other = (c.equilibrium(c.untouched(), 0.85e-6) for c in (contact, shuffled))
     np.testing.assert_allclose(np.sort(one.spots.contact_radius), np.sort(other.spots.contact_radius), rtol=1e-9)
 
 
@@ -218,9 +212,11 @@ def test_a_shielded_asperity_does_not_touch():
     low = 1e-6 - 0.3e-6
     law = JKR(Material(MODULUS, 0.0, RANGE))
     position = np.array([[0.5, 0.5], [0.58, 0.5]]) * PERIOD
-    contact = Contact(law, Asperities(position, np.array([1e-6, low]), np.full(2, R), PERIOD), rms_height=1e-6)
+    contact = InteractingAsperities(
+        law, Asperities(position, np.array([1e-6, low]), np.full(2, R), PERIOD), rms_height=1e-6
+    )
     u = low - 0.01e-6
-    state = equilibrium(contact, untouched(contact), u)
+    state = contact.equilibrium(contact.untouched(), u)
     assert len(state.spots) == 1
     a = state.spots.contact_radius[0]
     w = periodic_displacement(0.08 * PERIOD, 0.0, a, R, MODULUS, 0.0, PERIOD)
@@ -233,53 +229,53 @@ def test_a_shielded_asperity_does_not_touch():
 def rough(energy, grid=64, seed=1, ratio=16):
     surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / ratio, 0.8).realise(grid, seed)
     material = Material(MODULUS, energy, 2.071e-9)
-    return Contact(JKR(material), find_summits(surface), surface.rms_height)
+    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
 
 
 @pytest.mark.parametrize("energy", [0.0, ENERGY])
 def test_stiffness_against_differences(energy):
     contact = rough(energy)
-    state = untouched(contact)
+    state = contact.untouched()
     for level in (2.5, 2.0, 1.5, 1.2):
-        state = equilibrium(contact, state, level * contact.rms_height)
+        state = contact.equilibrium(state, level * contact.rms_height)
     step = 1e-6 * contact.rms_height
-    ahead, behind = (equilibrium(contact, state, state.separation + s) for s in (-step, step))
+    ahead, behind = (contact.equilibrium(state, state.separation + s) for s in (-step, step))
     np.testing.assert_array_equal(ahead.owner, behind.owner)
-    difference = (mean_pressure(contact, ahead.spots) - mean_pressure(contact, behind.spots)) / (2 * step)
-    assert contact_stiffness(contact, state) == pytest.approx(difference, rel=1e-5)
+    difference = (contact.pressure(ahead) - contact.pressure(behind)) / (2 * step)
+    assert contact.stiffness(state) == pytest.approx(difference, rel=1e-5)
 
 
 @pytest.mark.parametrize("energy", [0.0, ENERGY])
 @pytest.mark.parametrize("quantity", ["pressure", "area_fraction"])
 def test_holding_a_quantity(energy, quantity):
     contact = rough(energy)
-    state = equilibrium(contact, untouched(contact), 2.0 * contact.rms_height)
-    measure = {"pressure": mean_pressure, "area_fraction": area_fraction}[quantity]
-    target = 1.02 * measure(contact, state.spots)
-    held = equilibrium(contact, state, state.separation, Control(quantity, target))
-    assert measure(contact, held.spots) == pytest.approx(target, rel=2e-11)
+    state = contact.equilibrium(contact.untouched(), 2.0 * contact.rms_height)
+    measure = getattr(contact, quantity)
+    target = 1.02 * measure(state)
+    held = contact.equilibrium(state, state.separation, Control(quantity, target))
+    assert measure(held) == pytest.approx(target, rel=2e-11)
     assert held.residual <= RESIDUAL_TOLERANCE
     # The same state at that separation, without the control.
-    again = equilibrium(contact, state, held.separation)
-    assert measure(contact, again.spots) == pytest.approx(target, rel=1e-6)
+    again = contact.equilibrium(state, held.separation)
+    assert measure(again) == pytest.approx(target, rel=1e-6)
 
 
 def test_without_adhesion_the_light_load_limit_is_greenwood_and_williamson():
     # Independent asperities: A = sum pi R d, F = sum 4/3 E* sqrt(R) d^(3/2), d = h - u. As the load vanishes the
     # interaction does, and with it the difference of A at equal load.
     contact = rough(0.0, seed=1)
-    height, radius = contact.asperities.height, contact.asperities.radius
+    height, radius = contact.asperities.height, contact.asperities.radius_of_curvature
 
     def independent(u):
         depth = np.maximum(height - u, 0)
         return np.sum(np.pi * radius * depth), np.sum(4 / 3 * MODULUS * np.sqrt(radius) * depth**1.5)
 
-    state, errors, counts = untouched(contact), [], []
+    state, errors, counts = contact.untouched(), [], []
     top, second = np.sort(height)[::-1][:2]
     for u in (top - 0.5 * (top - second), 2.6 * contact.rms_height, 2.3 * contact.rms_height):
-        state = equilibrium(contact, state, u)
-        force = mean_pressure(contact, state.spots) * contact.area
-        area = area_fraction(contact, state.spots) * contact.area
+        state = contact.equilibrium(state, u)
+        force = contact.pressure(state) * contact.area
+        area = contact.area_fraction(state) * contact.area
         matched = scipy.optimize.brentq(
             lambda v, f=force: independent(v)[1] - f, u - contact.rms_height, top, xtol=1e-20
         )
@@ -309,7 +305,7 @@ def assert_consistent(contact, state):
     assert np.max(np.abs(error), initial=0) <= 2e-7 * contact.rms_height
     first, second, r = all_pairs(spots.position, period)
     assert np.all(r >= spots.contact_radius[first] + spots.contact_radius[second])
-    assert np.all(np.isin(state.holder[state.holder >= 0], np.flatnonzero(state.radius > 0)))
+    assert np.all(np.isin(state.holder[state.holder >= 0], np.flatnonzero(state.contact_radius > 0)))
     # Every spot has an owner, and no free asperity is left beyond its jump-in but the pending ones.
     assert set(state.owner[state.owner >= 0]) == set(range(len(spots)))
     free = state.owner < 0
@@ -361,11 +357,11 @@ def test_equilibrium_always_ends(seed, noise, adhesion, tabor, first, moves):
     # Surface energy as a power of ten of what bends the summits flat: E* h_rms^2 times their mean curvature.
     strength = 0.0 if adhesion == 0 else 10.0**adhesion
     asperities = find_summits(surface)
-    radius = float(np.median(asperities.radius))
+    radius = float(np.median(asperities.radius_of_curvature))
     energy = strength * MODULUS * surface.rms_height**1.5 / radius**0.5
     range_ = np.cbrt((energy / MODULUS) ** 2 * radius) / tabor if energy else 1e-9
-    contact = Contact(JKR(Material(MODULUS, energy, range_)), asperities, surface.rms_height)
-    state, separation = untouched(contact), first * surface.rms_height
+    contact = InteractingAsperities(JKR(Material(MODULUS, energy, range_)), asperities, surface.rms_height)
+    state, separation = contact.untouched(), first * surface.rms_height
     with pytest.MonkeyPatch.context() as monkeypatch:
         # Every round but the last adds an asperity, loses one for good, or unites two spots.
         calls = counting(monkeypatch, 3 * len(asperities) + 2)
@@ -373,7 +369,7 @@ def test_equilibrium_always_ends(seed, noise, adhesion, tabor, first, moves):
             separation += move * surface.rms_height
             calls.clear()
             try:
-                state = equilibrium(contact, state, separation)
+                state = contact.equilibrium(state, separation)
             except NotConverged:
                 pass
             else:
@@ -383,19 +379,19 @@ def test_equilibrium_always_ends(seed, noise, adhesion, tabor, first, moves):
 @pytest.mark.parametrize("energy", [0.0, 1e-3, ENERGY])
 def test_states_along_a_path_are_consistent(energy):
     contact = rough(energy, seed=3)
-    state = untouched(contact)
+    state = contact.untouched()
     for level in np.arange(2.8, 0.6, -0.2):
-        state = equilibrium(contact, state, level * contact.rms_height)
+        state = contact.equilibrium(state, level * contact.rms_height)
         assert_consistent(contact, state)
     assert state.coalescences > 0
     # Back up, where contacts break.
     for level in np.arange(0.8, 3.2, 0.4):
-        state = equilibrium(contact, state, level * contact.rms_height)
+        state = contact.equilibrium(state, level * contact.rms_height)
         assert_consistent(contact, state)
     assert state.jump_offs > 0
     # And down again, where they are made anew.
     for level in np.arange(2.6, 0.6, -0.3):
-        state = equilibrium(contact, state, level * contact.rms_height)
+        state = contact.equilibrium(state, level * contact.rms_height)
         assert_consistent(contact, state)
 
 
@@ -403,4 +399,4 @@ def test_too_few_newton_steps_are_reported_not_passed_off(monkeypatch):
     contact = rough(ENERGY)
     monkeypatch.setattr(icha.equilibrium.equilibrium, "_MAX_NEWTON_STEPS", 1)
     with pytest.raises(NotConverged, match="equilibrium error"):
-        equilibrium(contact, untouched(contact), 1.5 * contact.rms_height)
+        contact.equilibrium(contact.untouched(), 1.5 * contact.rms_height)

@@ -10,8 +10,9 @@ from half_space import displacement_by_quadrature, jkr_approach, jkr_force
 
 import icha
 from icha.asperity.jkr import JKR
+from icha.contact.model import Control
 from icha.equilibrium.distributions import contact_cover, covered_nodes, displacement, gap, gap_distribution
-from icha.equilibrium.equilibrium import Contact, Control, equilibrium, mean_gap, mean_pressure, untouched
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.free_square import _image_potential
 from icha.half_space.grid_displacement import DisplacementField, displacement_field
 from icha.half_space.interaction import HalfSpace, Interaction, displacement_at, mean_displacement
@@ -110,13 +111,13 @@ def test_images_sum_to_the_madelung_constant():
 
 def contact_of(position, height, R, energy, period=1.0, free=True):
     position, height, R = np.array(position, float), np.array(height, float), np.array(R, float)
-    return Contact(law(energy), Asperities(position, height, R, period, free), rms_height=1e-3)
+    return InteractingAsperities(law(energy), Asperities(position, height, R, period, free), rms_height=1e-3)
 
 
 def pressed(contact, separation, steps=12):
-    state = untouched(contact)
+    state = contact.untouched()
     for u in np.linspace(state.separation, separation, steps + 1)[1:]:
-        state = equilibrium(contact, state, u)
+        state = contact.equilibrium(state, u)
     return state
 
 
@@ -127,10 +128,10 @@ def test_a_single_spot_is_hertz_or_jkr_exactly(energy, place):
     state = pressed(contact, -4e-3)
     (a,) = state.spots.contact_radius
     assert jkr_approach(a, 1.0, MODULUS, energy) == pytest.approx(4e-3, rel=1e-9)
-    assert mean_pressure(contact, state.spots) == pytest.approx(jkr_force(a, 1.0, MODULUS, energy), rel=1e-9)
+    assert contact.pressure(state) == pytest.approx(jkr_force(a, 1.0, MODULUS, energy), rel=1e-9)
     if energy == 0:
-        assert mean_pressure(contact, state.spots) == pytest.approx(4 / 3 * (4e-3) ** 1.5, rel=1e-9)
-    stiffness = -Control("pressure", 0.0).slope(contact, state)
+        assert contact.pressure(state) == pytest.approx(4 / 3 * (4e-3) ** 1.5, rel=1e-9)
+    stiffness = contact.stiffness(state)
     if energy == 0:
         assert stiffness == pytest.approx(2 * a * MODULUS, rel=1e-6)
 
@@ -180,7 +181,7 @@ def test_a_group_of_spots_may_be_anywhere_and_the_square_of_any_size(energy):
     loads = []
     for shift, period in (([0.0, 0.0], 1.0), ([0.7, 0.65], 1.0), ([0.1, 0.0], 0.45), ([1.7, 2.0], 5.0)):
         contact = contact_of(position + shift, height, R, energy, period)
-        loads.append(mean_pressure(contact, pressed(contact, -2e-3).spots) * period**2)
+        loads.append(contact.pressure(pressed(contact, -2e-3)) * period**2)
     np.testing.assert_allclose(loads, loads[0], rtol=1e-7)
 
 
@@ -203,9 +204,9 @@ def test_spots_far_apart_do_not_see_the_boundary():
         free, periodic = (
             contact_of(place + (period - 1) / 2, height, R, 0.0, period, is_free) for is_free in (True, False)
         )
-        held = equilibrium(free, pressed(free, -1e-3), -1e-3)
-        load = mean_pressure(free, held.spots)
-        same = equilibrium(periodic, pressed(periodic, -1e-3), -1e-3, Control("pressure", load))
+        held = free.equilibrium(pressed(free, -1e-3), -1e-3)
+        load = free.pressure(held)
+        same = periodic.equilibrium(pressed(periodic, -1e-3), -1e-3, Control("pressure", load))
         # The same spots under the same load ...
         differences.append(np.max(np.abs(same.spots.contact_radius / held.spots.contact_radius - 1)))
         # ... but for how far the half-space's mean plane has gone up.
@@ -299,7 +300,7 @@ def test_summits_of_a_part_are_those_of_the_whole():
         if np.all((position > origin + margin) & (position < origin + inner - margin)):
             same = np.argmin(np.hypot(*(expected.position - position).T))
             assert found.height[k] + mean == pytest.approx(expected.height[same], abs=1e-6 * whole.rms_height)
-            assert found.radius[k] == pytest.approx(expected.radius[same], rel=1e-3)
+            assert found.radius_of_curvature[k] == pytest.approx(expected.radius_of_curvature[same], rel=1e-3)
     # And next to them neither many more nor many fewer.
     assert abs(len(found) - np.count_nonzero(inside)) <= 0.05 * len(found) + 1
     assert np.all((found.position > 0) & (found.position < inner))
@@ -319,7 +320,7 @@ def test_edges_have_no_summits():
             find_summits(icha.Surface(heights, 1.0, boundary="free"))
     found = find_summits(icha.Surface(-2 * (y - 0.312) ** 2 - 3 * (x - 0.613) ** 2, 1.0, boundary="free"))
     np.testing.assert_allclose(found.position, [[0.613, 0.312]], atol=1e-6)
-    np.testing.assert_allclose(found.radius, 1 / np.sqrt(4 * 6), rtol=1e-4)
+    np.testing.assert_allclose(found.radius_of_curvature, 1 / np.sqrt(4 * 6), rtol=1e-4)
 
 
 def test_moments_of_a_free_square_are_means_over_it():
@@ -384,5 +385,5 @@ def test_distributions_and_fields_of_a_free_square():
     )
     # Nodes stand for the cells that follow them, too: the mean over the square by the trapezoidal rule.
     mean = 0.25 * sum(np.mean(fine[y, x]) for y in (slice(-1), slice(1, None)) for x in (slice(-1), slice(1, None)))
-    assert mean_gap(contact, state) - state.separation == pytest.approx(mean, rel=0.01)
+    assert contact.mean_gap(state) - state.separation == pytest.approx(mean, rel=0.01)
     np.testing.assert_allclose(gap(contact.law, surface, state), w + state.separation - surface.heights, atol=1e-15)

@@ -6,15 +6,9 @@ import pytest
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.analysis.checks import check_run
 from icha.asperity.jkr import JKR
-from icha.equilibrium.equilibrium import (
-    RESIDUAL_TOLERANCE,
-    Contact,
-    NotConverged,
-    area_fraction,
-    equilibrium,
-    mean_pressure,
-    untouched,
-)
+from icha.contact.failures import NotConverged
+from icha.equilibrium.equilibrium import RESIDUAL_TOLERANCE
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.path import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, follow
 from icha.surfaces.summits import find_summits
 
@@ -35,7 +29,7 @@ def large():
 
 
 def contact_of(surface, material):
-    return Contact(JKR(material), find_summits(surface), surface.rms_height)
+    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
 
 
 @pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
@@ -126,9 +120,9 @@ def test_stops_are_met_in_the_order_of_the_path(surface):
 def test_a_stop_inside_a_jump_is_met_exactly_all_the_same(surface):
     # The first contact with adhesion jumps to a finite area; a smaller area is asked for.
     contact = contact_of(surface, ADHESIVE)
-    first = equilibrium(contact, untouched(contact), untouched(contact).separation * (1 - 1e-9))
-    jumped = area_fraction(contact, first.spots)
-    assert mean_pressure(contact, first.spots) < 0
+    first = contact.equilibrium(contact.untouched(), contact.untouched().separation * (1 - 1e-9))
+    jumped = contact.area_fraction(first)
+    assert contact.pressure(first) < 0
     try:
         run = simulate(surface, ADHESIVE, Path(area_fractions=[0.9 * jumped]))
     except ConvergenceError as error:
@@ -139,46 +133,39 @@ def test_a_stop_inside_a_jump_is_met_exactly_all_the_same(surface):
 
 def test_the_path_starts_where_the_first_asperity_makes_contact(surface):
     contact = contact_of(surface, ADHESIVE)
-    first = np.max(contact.asperities.height - contact.law.jump_in_approach(contact.asperities.radius))
-    assert untouched(contact).separation == pytest.approx(first, rel=1e-14)
+    first = np.max(contact.asperities.height - contact.law.jump_in_approach(contact.asperities.radius_of_curvature))
+    assert contact.untouched().separation == pytest.approx(first, rel=1e-14)
     run = simulate(surface, ADHESIVE, Path(mean_separations=[first * (1 + 1e-6), first * (1 - 1e-6)]))
     assert run.spot_count.values.tolist() == [0, 1]
 
 
-def test_no_step_is_longer_than_asked(surface, monkeypatch):
-    import icha.path.path
-
+def test_no_step_is_longer_than_asked(surface):
     seen = []
-    original = icha.path.path.equilibrium
 
-    def spy(contact, state, *arguments):
-        reached = original(contact, state, *arguments)
-        seen.append((state.separation - reached.separation) / contact.rms_height)
-        return reached
+    class Spy(InteractingAsperities):
+        def equilibrium(self, state, *arguments):
+            reached = super().equilibrium(state, *arguments)
+            seen.append((state.separation - reached.separation) / self.rms_height)
+            return reached
 
-    monkeypatch.setattr(icha.path.path, "equilibrium", spy)
-    contact = contact_of(surface, BARE)
+    contact = Spy(JKR(BARE), find_summits(surface), surface.rms_height)
     for _ in follow(contact, Path(reduced_pressures=[1e-2], max_step=0.07), MODULUS):
         pass
     assert 0.069 < max(seen) <= 0.07 * (1 + 1e-9)
 
 
-def test_steps_that_fail_are_halved_and_then_given_up(surface, monkeypatch):
-    import icha.path.path
-
-    contact = contact_of(surface, BARE)
-    limit = 1.5 * contact.rms_height
+def test_steps_that_fail_are_halved_and_then_given_up(surface):
     widths = []
-    original = icha.path.path.equilibrium
 
-    def failing(contact, state, separation, control=None):
-        if separation < limit:
-            if control is None:
-                widths.append(state.separation - separation)
-            raise NotConverged("on purpose")
-        return original(contact, state, separation, control)
+    class Failing(InteractingAsperities):
+        def equilibrium(self, state, separation, control=None):
+            if separation < 1.5 * self.rms_height:
+                if control is None:
+                    widths.append(state.separation - separation)
+                raise NotConverged("on purpose")
+            return super().equilibrium(state, separation, control)
 
-    monkeypatch.setattr(icha.path.path, "equilibrium", failing)
+    contact = Failing(JKR(BARE), find_summits(surface), surface.rms_height)
     stops = follow(contact, Path(reduced_pressures=[1e-3, 1e-1]), MODULUS * surface.rms_slope)
     assert next(stops).target.value == 1e-3
     with pytest.raises(NotConverged, match=r"after 1 of 2 stops: on purpose"):
@@ -256,7 +243,7 @@ def egg_box(waves=4, grid=64):
 
 def test_stops_inside_a_jump_are_left_out_and_the_others_kept():
     surface = egg_box()
-    first_contact = untouched(contact_of(surface, ADHESIVE)).separation
+    first_contact = contact_of(surface, ADHESIVE).untouched().separation
     jumped = simulate(surface, ADHESIVE, Path(mean_separations=[first_contact * (1 - 1e-9)]))
     first = float(jumped.contact_area_fraction[0])
     assert first > 5e-3

@@ -16,17 +16,9 @@ from scipy.optimize import brentq, minimize_scalar
 import icha
 from icha import Material, Path
 from icha.asperity.jkr import JKR
-from icha.equilibrium.equilibrium import (
-    COALESCENCE,
-    JUMP_IN,
-    JUMP_OFF,
-    SPLIT,
-    Contact,
-    Events,
-    NotConverged,
-    area_fraction,
-    mean_pressure,
-)
+from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
+from icha.contact.failures import NotConverged
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.path import LOAD_CONTROL, MAX_REDUCED_PRESSURE, follow
 from icha.references.one_asperity import paraboloid
 from icha.surfaces.summits import Asperities, find_summits
@@ -65,7 +57,7 @@ def contact_of(heights, positions=((0.5, 0.5),), radii=None, *, period=FAR, mate
     heights = np.array(heights, float)
     positions = np.array(positions, float) + period / 2
     radii = np.ones(len(heights)) if radii is None else np.array(radii, float)
-    return Contact(JKR(material), Asperities(positions, heights, radii, period), RMS_HEIGHT, until)
+    return InteractingAsperities(JKR(material), Asperities(positions, heights, radii, period), RMS_HEIGHT, until)
 
 
 def travelled(contact, stops, **settings):
@@ -74,7 +66,7 @@ def travelled(contact, stops, **settings):
 
 
 def load(contact, waypoint):
-    return mean_pressure(contact, waypoint.state.spots) * contact.area
+    return contact.pressure(waypoint.state) * contact.area
 
 
 def history(waypoints):
@@ -105,7 +97,7 @@ def test_one_asperity_is_on_its_stable_branch_from_jump_in_to_jump_off():
         a = np.array([state.spots.contact_radius[0] for state in touching])
         assert np.all(a >= JUMP_OFF_RADIUS)
         np.testing.assert_allclose(approach(a), d, atol=1e-6)
-        forces = [mean_pressure(contact, state.spots) * contact.area for state in touching]
+        forces = [contact.pressure(state) * contact.area for state in touching]
         np.testing.assert_allclose(forces, force(a), rtol=1e-10, atol=1e-10)
         assert np.all(np.diff(d) * (1 if leg == 0 else -1) > 0)
         if first:
@@ -229,8 +221,8 @@ def value_of(kind, contact, waypoint):
     if kind == "mean_separation":
         return waypoint.state.separation
     if kind == "area_fraction":
-        return area_fraction(contact, waypoint.state.spots)
-    return mean_pressure(contact, waypoint.state.spots) * (contact.area / 1e3 if kind == "reduced_pressure" else 1.0)
+        return contact.area_fraction(waypoint.state)
+    return contact.pressure(waypoint.state) * (contact.area / 1e3 if kind == "reduced_pressure" else 1.0)
 
 
 @pytest.mark.parametrize(
@@ -429,7 +421,7 @@ def test_an_edge_of_contact_within_the_accuracy_of_the_solver_is_passed():
     sticky = icha.Material(contact_modulus=0.24e6, surface_energy=0.05, interaction_range=2e-9)
     run = icha.simulate(surface, sticky, icha.Path(mean_separations=[5e-7, 2e-7], unload=True))
     assert run.sizes["step"] < 400
-    (radius,) = find_summits(surface).radius
+    (radius,) = find_summits(surface).radius_of_curvature
     most = 1.5 * np.pi * 0.05 * radius / period**2
     assert float(run.pull_off_pressure) == pytest.approx(most, rel=1e-6)
     assert float(run.detachment_pressure) == pytest.approx(-5 / 9 * most, rel=1e-3)

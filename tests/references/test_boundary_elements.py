@@ -44,7 +44,7 @@ def displacement(state, contact_modulus):
 def test_the_bump_is_one_asperity_of_radius_one():
     summits = find_summits(paraboloid(128, 10.0))
     assert len(summits) == 1
-    assert summits.radius == pytest.approx(1.0, rel=1e-9)
+    assert summits.radius_of_curvature == pytest.approx(1.0, rel=1e-9)
 
 
 @pytest.fixture(scope="module")

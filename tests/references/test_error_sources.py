@@ -7,7 +7,7 @@ from pages.error_sources import page, ratios, split
 
 import icha
 from icha.asperity.jkr import JKR
-from icha.equilibrium.equilibrium import Contact, area_fraction
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.figures import fig12_error_sources
 from icha.path.path import follow
 from icha.references.boundary_elements import NodalState, contact_state, perimeter_correction
@@ -71,7 +71,7 @@ def test_curvatures_have_the_summits_geometric_mean(surface):
     summits = find_summits(surface)
     xx, xy, yy = summit_curvatures(surface, summits).T
     # The model takes a spline's curvatures, these are the spectrum's.
-    assert np.sqrt(xx * yy - xy**2) * summits.radius == pytest.approx(np.ones(len(summits)), rel=2e-2)
+    assert np.sqrt(xx * yy - xy**2) * summits.radius_of_curvature == pytest.approx(np.ones(len(summits)), rel=2e-2)
 
 
 def test_envelope_has_the_summits_with_their_heights_and_curvatures():
@@ -120,7 +120,7 @@ def test_unequal_summits_without_interaction_carry_the_load(surface):
     summits = find_summits(surface)
     discs = independent_discs(summits, LAW, 0.01)
     approach = np.maximum(summits.height - discs.separation, 0)
-    assert np.sum(8 / 3 * np.sqrt(summits.radius) * approach**1.5) == pytest.approx(0.01, rel=1e-9)
+    assert np.sum(8 / 3 * np.sqrt(summits.radius_of_curvature) * approach**1.5) == pytest.approx(0.01, rel=1e-9)
 
 
 @pytest.mark.parametrize("switch", [{}, {"point_forces": True}, {"field_shape": True}])
@@ -137,7 +137,7 @@ def test_a_lone_summit_is_hertz_and_its_images(switch):
 
 
 def test_without_overlaps_it_is_the_model(surface):
-    contact = Contact(LAW, find_summits(surface), surface.rms_height)
+    contact = InteractingAsperities(LAW, find_summits(surface), surface.rms_height)
     unit = 2.0 * surface.rms_slope
     (waypoint,) = follow(contact, icha.Path(reduced_pressures=[5e-4]), unit)
     state = waypoint.state
@@ -146,7 +146,7 @@ def test_without_overlaps_it_is_the_model(surface):
     assert discs.separation == pytest.approx(state.separation, rel=1e-7)
     assert np.sort(discs.contact_radius) == pytest.approx(np.sort(state.spots.contact_radius), rel=1e-6)
     area = np.pi * np.sum(discs.contact_radius**2) / surface.period**2
-    assert area == pytest.approx(area_fraction(contact, state.spots), rel=1e-6)
+    assert area == pytest.approx(contact.area_fraction(state), rel=1e-6)
 
 
 def test_the_field_of_a_distant_spot_raises_and_sharpens():

@@ -42,7 +42,7 @@ def test_summit_statistics_are_those_of_the_random_field():
     assert found.density == pytest.approx(density, rel=3e-3)
     assert found.mean_height == pytest.approx(height, rel=3e-3)
     assert found.deviation**2 == pytest.approx(variance, rel=3e-3)
-    assert 1 / found.radius == pytest.approx(curvature, rel=3e-3)
+    assert 1 / found.radius_of_curvature == pytest.approx(curvature, rel=3e-3)
 
 
 def test_mccools_rounded_constant():
@@ -87,8 +87,8 @@ def test_greenwood_williamson_is_the_sum_over_random_summits():
         depth = heights - u * MOMENTS.rms_height
         depth = depth[depth > 0]
         per_area = theory.density / len(heights)
-        area = np.pi * theory.radius * depth.sum() * per_area
-        force = 4 / 3 * math.sqrt(theory.radius) * np.sum(depth**1.5) * per_area / MOMENTS.rms_slope
+        area = np.pi * theory.radius_of_curvature * depth.sum() * per_area
+        force = 4 / 3 * math.sqrt(theory.radius_of_curvature) * np.sum(depth**1.5) * per_area / MOMENTS.rms_slope
         noise = 5 / math.sqrt(len(depth))
         assert float(summits.greenwood_williamson_area(u, MOMENTS)) == pytest.approx(area, rel=noise)
         assert float(summits.greenwood_williamson_pressure(u, MOMENTS)) == pytest.approx(force, rel=noise)
@@ -98,7 +98,7 @@ def test_greenwood_williamson_area_in_closed_form():
     theory = summits.gaussian_summits(MOMENTS)
     t = (SEPARATIONS * MOMENTS.rms_height - theory.mean_height) / theory.deviation
     first = np.exp(-(t**2) / 2) / math.sqrt(2 * np.pi) - t * erfc(t / math.sqrt(2)) / 2
-    expected = np.pi * theory.density * theory.radius * theory.deviation * first
+    expected = np.pi * theory.density * theory.radius_of_curvature * theory.deviation * first
     np.testing.assert_allclose(summits.greenwood_williamson_area(SEPARATIONS, MOMENTS), expected, rtol=1e-12)
 
 
@@ -109,7 +109,7 @@ def test_high_planes_see_an_exponential_of_heights():
     t = 9.0
     u = (theory.mean_height + t * theory.deviation) / MOMENTS.rms_height
     area, p = summits.greenwood_williamson_area(u, MOMENTS), summits.greenwood_williamson_pressure(u, MOMENTS)
-    expected = math.sqrt(math.pi * theory.radius * t / theory.deviation) * MOMENTS.rms_slope
+    expected = math.sqrt(math.pi * theory.radius_of_curvature * t / theory.deviation) * MOMENTS.rms_slope
     assert float(area / p) == pytest.approx(expected, rel=0.02)
 
 
@@ -163,7 +163,7 @@ def test_weak_adhesion_changes_little(pulled):
 @PULLED
 def test_it_is_the_sum_over_random_summits(pulled):
     theory, heights = random_heights()
-    law, R = JKR(SOFT), theory.radius
+    law, R = JKR(SOFT), theory.radius_of_curvature
     first = float(law.jump_off_approach(R)) if pulled else 0.0
     per_area = theory.density / len(heights)
     for u in SEPARATIONS:
@@ -179,7 +179,7 @@ def test_it_is_the_sum_over_random_summits(pulled):
 @PULLED
 def test_it_is_the_integral_over_the_heights(pulled):
     theory = summits.gaussian_summits(MOMENTS)
-    law, R = JKR(SOFT), theory.radius
+    law, R = JKR(SOFT), theory.radius_of_curvature
     first = float(law.jump_off_approach(R)) if pulled else 0.0
 
     def integrand(approach, u):
@@ -216,8 +216,10 @@ def test_summits_of_one_height_are_pulled_off_at_jkrs_force():
     theory = summits.gaussian_summits(moments)
     material = Material(1.0, energy, 1e-9)  # so soft that jump-off lies far beyond the spread
     law = JKR(material)
-    assert -law.jump_off_approach(theory.radius) > 1e3 * theory.deviation
-    approach = float(law.approach(np.cbrt(9 * np.pi * energy * theory.radius**2 / 8), theory.radius))
+    assert -law.jump_off_approach(theory.radius_of_curvature) > 1e3 * theory.deviation
+    approach = float(
+        law.approach(np.cbrt(9 * np.pi * energy * theory.radius_of_curvature**2 / 8), theory.radius_of_curvature)
+    )
     u = (theory.mean_height - approach) / moments.rms_height
     tension = float(summits.fuller_tabor_pressure(u, moments, material, pulled=True)) * moments.rms_slope
-    assert tension == pytest.approx(-theory.density * 1.5 * np.pi * energy * theory.radius, rel=1e-3)
+    assert tension == pytest.approx(-theory.density * 1.5 * np.pi * energy * theory.radius_of_curvature, rel=1e-3)

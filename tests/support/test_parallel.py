@@ -45,7 +45,7 @@ def test_surfaces_and_summits_have_the_same_bits_on_any_number_of_cores(monkeypa
             surface = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 100, 0.8).realise(grid, 1)
             summits = find_summits(surface)
             bits += surface.heights.tobytes() + np.array(surface.spectral_moments).tobytes()
-            bits += summits.position.tobytes() + summits.height.tobytes() + summits.radius.tobytes()
+            bits += summits.position.tobytes() + summits.height.tobytes() + summits.radius_of_curvature.tobytes()
         results.append(bits)
     assert results[0] == results[1] == results[2]
 
@@ -56,4 +56,4 @@ def test_blocks_leave_no_seam():
     x = 2 * np.pi * np.arange(n) / n
     summits = find_summits(Surface(np.cos(20 * x)[None, :] + np.cos(20 * x)[:, None], PERIOD))
     assert len(summits) == 400
-    np.testing.assert_allclose(summits.radius, summits.radius[0], rtol=1e-9)
+    np.testing.assert_allclose(summits.radius_of_curvature, summits.radius_of_curvature[0], rtol=1e-9)

@@ -75,7 +75,7 @@ def test_all_maxima_of_a_rough_surface_are_found(grid, height_error, radius_erro
     np.testing.assert_allclose(summits.height, height[index], atol=height_error * surface.rms_height)
     # Where one of the curvatures nearly vanishes, its relative error is amplified: the others must be as good as
     # the spline, the worst may be ten times worse.
-    error = np.abs(summits.radius / radius[index] - 1)
+    error = np.abs(summits.radius_of_curvature / radius[index] - 1)
     assert np.quantile(error, 0.9) < radius_error
     assert error.max() < 10 * radius_error
     assert np.quantile(distance, 0.9) < 0.05 * surface.spacing
@@ -93,7 +93,7 @@ def test_one_paraboloid_is_found_below_the_grid(centre):
     offset = summits.position[0] / PERIOD - centre
     np.testing.assert_allclose(offset - np.rint(offset), 0, atol=1e-9)
     assert summits.height[0] == pytest.approx(-heights.mean(), rel=1e-9)
-    assert summits.radius[0] == pytest.approx(curvature_radius, rel=1e-8)
+    assert summits.radius_of_curvature[0] == pytest.approx(curvature_radius, rel=1e-8)
 
 
 def test_the_radius_is_the_geometric_mean_of_an_ellipsoidal_summit():
@@ -105,7 +105,7 @@ def test_the_radius_is_the_geometric_mean_of_an_ellipsoidal_summit():
     assert len(summits) == 1
     # The quintic spline has the curvature of a wave to (q dx)^4/720.
     error = (2 * np.pi / n) ** 4 / 720
-    assert summits.radius[0] == pytest.approx(1 / np.sqrt(3e-7 * q2 * 2e-7 * q2), rel=1.1 * error)
+    assert summits.radius_of_curvature[0] == pytest.approx(1 / np.sqrt(3e-7 * q2 * 2e-7 * q2), rel=1.1 * error)
 
 
 def test_a_summit_between_equal_nodes_is_found_once():
@@ -131,7 +131,7 @@ def test_oblique_elongated_summits_do_not_depend_on_the_grid(grid):
     exact = 1 / (1e-6 * np.sqrt(0.1) * 7 * (2 * np.pi / PERIOD) ** 2)
     # The spline's error of the large curvature, (q dx)^4/720, is that much larger beside the small one.
     error = 0.5 * 125 * (5 * 2 * np.pi / grid) ** 4 / 720
-    np.testing.assert_allclose(summits.radius, exact, rtol=error)
+    np.testing.assert_allclose(summits.radius_of_curvature, exact, rtol=error)
     np.testing.assert_allclose(summits.height, 1.1e-6, rtol=error / 125)
 
 
@@ -155,7 +155,7 @@ def test_turning_and_shifting_the_surface_turns_and_shifts_the_summits():
         distance, index = tree.query(reference.position)
         assert distance.max() < 1e-6 * surface.spacing
         np.testing.assert_allclose(summits.height[index], reference.height, rtol=1e-10)
-        np.testing.assert_allclose(summits.radius[index], reference.radius, rtol=1e-7)
+        np.testing.assert_allclose(summits.radius_of_curvature[index], reference.radius_of_curvature, rtol=1e-7)
 
     matched(np.roll(surface.heights, (17, -40), axis=(0, 1)), lambda p: p - np.array([-40, 17]) * surface.spacing)
     # rot90 takes node (row, column) to (n - 1 - column, row).
@@ -170,7 +170,7 @@ def test_positions_lie_in_the_cell_and_values_are_finite():
         summits = find_summits(SPECTRUM.realise(64, seed))
         assert np.all((summits.position >= 0) & (summits.position < PERIOD))
         assert np.all(np.isfinite(summits.height))
-        assert np.all((summits.radius > 0) & np.isfinite(summits.radius))
+        assert np.all((summits.radius_of_curvature > 0) & np.isfinite(summits.radius_of_curvature))
 
 
 def test_no_summit_lies_above_the_surface_around_it():
@@ -186,7 +186,7 @@ def test_noise_on_every_node_is_no_obstacle():
     heights = np.random.default_rng(8).normal(size=(64, 64))
     summits = find_summits(Surface(heights, 1.0))
     assert len(summits) > 0.1 * 64**2
-    assert np.all(np.isfinite(summits.radius))
+    assert np.all(np.isfinite(summits.radius_of_curvature))
 
 
 def test_a_ridge_without_summits_is_refused():

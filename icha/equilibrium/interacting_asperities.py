@@ -1,0 +1,94 @@
+"""Interacting asperities: the model of contact of Violano & Afferrante, which a path is followed with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from icha.contact.events import Events
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control
+from icha.equilibrium import equilibrium as search
+from icha.equilibrium.control import derivative, held_value
+from icha.equilibrium.energy import stored_energy
+from icha.equilibrium.problem import Problem
+from icha.equilibrium.states import ContactState, untouched
+from icha.half_space.interaction import mean_displacement
+
+# At such a rate to the separation the approach of a spot rises, as the surfaces part, on an unstable branch only.
+_RUNAWAY = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class InteractingAsperities(Problem):
+    """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`.
+
+    Quantities of a state are those of its spots (`ContactState.spots`).
+    """
+
+    def untouched(self) -> ContactState:
+        """The state at which the first asperity is about to make contact."""
+        return untouched(self)
+
+    def equilibrium(
+        self, state: ContactState, separation: float, control: Control | None = None, *, let_go: int = 0
+    ) -> ContactState:
+        """Bring the contact from one state to another mean separation (m), or to a given load or area.
+
+        Parameters
+        ----------
+        separation : a first guess if there is a `control`.
+        control : a load or an area to hold instead of the separation.
+        let_go : so many spots break contact at once, those that would reach jump-off first.
+
+        Raises
+        ------
+        NotConverged
+            If the equilibrium is not found.
+        FullContact
+            If the contact spreads over the whole surface.
+        """
+        return search.equilibrium(self, state, separation, control, let_go=let_go)
+
+    def pressure(self, state: ContactState) -> float:
+        """Total force over nominal area, Pa."""
+        return held_value(self, PRESSURE, state.spots.contact_radius, state.spots.radius_of_curvature)
+
+    def area_fraction(self, state: ContactState) -> float:
+        """Total contact area over nominal area."""
+        return held_value(self, AREA_FRACTION, state.spots.contact_radius, state.spots.radius_of_curvature)
+
+    def mean_gap(self, state: ContactState) -> float:
+        """Mean over the square of separation and displacement, m; of a periodic surface the mean separation.
+
+        Of a free square the spots act as forces at their centres.
+        """
+        if not self.asperities.free:
+            return state.separation
+        spots = state.spots
+        force = self.law.force(spots.contact_radius, spots.radius_of_curvature)
+        return state.separation + mean_displacement(self.asperities.period, self.contact_modulus, spots.position, force)
+
+    def spot_count(self, state: ContactState) -> int:
+        """Number of contact spots."""
+        return len(state.spots)
+
+    def stiffness(self, state: ContactState) -> float:
+        """-dp/du of the present spots, Pa/m, from the tangent of the equilibrium."""
+        return 0.0 - self.slope(PRESSURE, state)
+
+    def slope(self, quantity: str, state: ContactState) -> float:
+        """Derivative of a quantity that can be held with respect to the mean separation, at unchanged contacts."""
+        return derivative(self, quantity, state)
+
+    def stored_energy(self, state: ContactState) -> float:
+        """Elastic energy less that of adhesion over nominal area, J/m^2 (`icha.equilibrium.energy`)."""
+        return stored_energy(self, state)
+
+    def is_unstable(self, state: ContactState) -> bool:
+        """Whether a spot would come closer as the surfaces part."""
+        return bool(np.max(state.responses, initial=0.0) > _RUNAWAY)
+
+    def events_between(self, before: ContactState, after: ContactState) -> Events:
+        """The events on the path from one state to a later one."""
+        return Events.joined(after.history[len(before.history) :])

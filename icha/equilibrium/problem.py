@@ -1,0 +1,48 @@
+"""The problem: a law of one spot, the summits of one surface, and until when united spots stay united."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from icha.asperity.jkr import JKR
+from icha.surfaces.summits import Asperities
+
+# Until when united spots stay united.
+DETACHMENT, OVERLAP = "detachment", "overlap"
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Asperities in contact with a half-space.
+
+    law: of one spot. rms_height: the length that makes errors of an equilibrium dimensionless, m. united_until:
+    DETACHMENT, where united spots let go as a whole, or OVERLAP, where the two they were made of would just touch.
+    jump_in: the asperities' jump-in approaches (n,), m.
+    """
+
+    law: JKR
+    asperities: Asperities
+    rms_height: float
+    united_until: str = DETACHMENT
+    jump_in: np.ndarray = field(init=False)
+
+    def __post_init__(self):
+        """Evaluate the asperities' jump-in approaches once."""
+        object.__setattr__(self, "jump_in", self.law.jump_in_approach(self.asperities.radius_of_curvature))
+
+    @property
+    def area(self) -> float:
+        """Nominal contact area A0, m^2."""
+        return self.asperities.period**2
+
+    @property
+    def adhesive(self) -> bool:
+        """Whether contact forms and breaks in jumps."""
+        return self.law.material.surface_energy > 0
+
+    @property
+    def contact_modulus(self) -> float:
+        """E*, Pa."""
+        return self.law.material.contact_modulus
