@@ -1,8 +1,13 @@
-"""What a run of a campaign is called."""
+"""Names of the runs of a campaign, and of what is computed beside them."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
+
+# Where their files stand among others of their kind, without the ending; in braces what differs from one to the next.
+RUN = "{study}/{surface}/seed{seed}/slope{slope}/{material}"
+CONTACT = "{entry}/{surface}/seed{seed}/slope{slope}/{material}"
+SOLUTION = CONTACT + "/p{pressure}"
 
 
 class RunLabels(NamedTuple):
@@ -17,8 +22,7 @@ class RunLabels(NamedTuple):
     @property
     def path(self) -> str:
         """Where the run's dataset stands among the runs, without the ending."""
-        slope = number_label(self.rms_slope)
-        return f"{self.study}/{self.surface}/seed{self.seed}/slope{slope}/{self.material}"
+        return RUN.format(**parts(self))
 
     def __str__(self):
         """The run's place among the runs."""
@@ -37,7 +41,7 @@ class ContactLabels(NamedTuple):
     @property
     def path(self) -> str:
         """Where its file stands among the others, without the ending."""
-        return f"{self.entry}/{self.surface}/seed{self.seed}/slope{number_label(self.rms_slope)}/{self.material}"
+        return CONTACT.format(**parts(self))
 
 
 class SolutionLabels(NamedTuple):
@@ -59,12 +63,22 @@ class SolutionLabels(NamedTuple):
     @property
     def path(self) -> str:
         """Where its file stands among the solutions, without the ending."""
-        slope, pressure = number_label(self.rms_slope), number_label(self.reduced_pressure)
-        return f"{self.entry}/{self.surface}/seed{self.seed}/slope{slope}/{self.material}/p{pressure}"
+        return SOLUTION.format(**parts(self))
 
     def __str__(self):
         """The solution's place among the solutions."""
         return self.path
+
+
+_NUMBERS = {"rms_slope": "slope", "reduced_pressure": "pressure"}
+
+
+def parts(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
+    """What stands in the braces of a path."""
+    return {
+        _NUMBERS.get(name, name): number_label(value) if name in _NUMBERS else str(value)
+        for name, value in labels._asdict().items()
+    }
 
 
 def number_label(value: float) -> str:

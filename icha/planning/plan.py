@@ -9,18 +9,11 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
-from icha.configuration.expansion import (
-    asperity_cases,
-    loop_cases,
-    run_cases,
-    run_settings,
-    run_sha256,
-    solution_cases,
-    source_cases,
-    surface_cases,
-)
+from icha.configuration.expansion import run_settings, run_sha256
 from icha.configuration.model import Campaign, SelfAffineSurface
+from icha.datasets.results import job_file
 from icha.planning import costs
+from icha.planning.results import campaign_files
 from icha.support.checksums import is_whole
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
@@ -32,7 +25,7 @@ _SAMPLE = 200
 class Item:
     """One file: the part of the campaign that it belongs to, its path in the results, its state and its cost.
 
-    `job_files` are the places of log and benchmark, without their endings; `threads` are the cores that its job takes.
+    `threads` are the cores that its job takes.
     """
 
     part: str
@@ -82,45 +75,50 @@ def _items(campaign, results) -> Iterator[Item]:
     def threads(surface):
         return costs.job_threads(grid(surface))
 
-    for name, seed in surface_cases(campaign):
-        yield there("surfaces", f"surfaces/{name}/seed{seed}.nc", costs.surface_cost(grid(name)), threads(name))
+    def beside(part, entries, cases, cost, asked):
+        for path, case in cases.items():
+            entry = entries[case.entry]
+            adhesive = campaign.materials[case.material].surface_energy > 0
+            nodes = grid(case.surface) * entry.refinement
+            yield there(f"{part} {case.entry}", path, cost(nodes, asked(entry, case), adhesive=adhesive))
+
+    files = campaign_files(campaign)
+    for path, (name, _) in files.surfaces.items():
+        yield there("surfaces", path, costs.surface_cost(grid(name)), threads(name))
     sweep_cost = cache(costs.sweep_cost)
-    for case in run_cases(campaign):
-        path = f"runs/{case.path}.nc"
+    for path, case in files.runs.items():
         state, reason = run_state(results / path, run_sha256(campaign, case))
         if not is_whole(results, path):
             state, reason = DAMAGED, ""
         settings = _described(run_settings(campaign, case), case.rms_slope)
         cost = sweep_cost(grid(case.surface), asperities(case.surface), settings)
         yield Item(f"study {case.study}", path, state, cost, threads(case.surface), reason)
-    for case in solution_cases(campaign):
-        entry = campaign.boundary_elements[case.entry]
-        cost = costs.solution_cost(
-            grid(case.surface) * entry.refinement,
-            case.reduced_pressure,
-            adhesive=campaign.materials[case.material].surface_energy > 0,
-        )
-        yield there(f"boundary elements {case.entry}", f"references/boundary_elements/{case.path}.nc", cost)
-    for case in loop_cases(campaign):
-        entry = campaign.boundary_element_loops[case.entry]
-        cost = costs.loop_cost(
-            grid(case.surface) * entry.refinement,
-            entry.separation_step,
-            adhesive=campaign.materials[case.material].surface_energy > 0,
-        )
-        yield there(f"boundary elements both ways {case.entry}", f"references/loops/{case.path}.nc", cost)
-    for case in source_cases(campaign):
-        entry = campaign.error_sources[case.entry]
-        cost = costs.sources_cost(
-            grid(case.surface) * entry.refinement,
-            tuple(entry.reduced_pressures),
-            adhesive=campaign.materials[case.material].surface_energy > 0,
-        )
-        yield there(f"error sources {case.entry}", f"references/error_sources/{case.path}.nc", cost)
-    for name, tabor_parameter in asperity_cases(campaign).items():
-        yield there("one asperity", f"references/one_asperity/{name}.nc", costs.one_asperity_cost(tabor_parameter))
-    for name in campaign.figures.drawn():
-        yield there("figures", f"figures/{name}.png", costs.FIGURE)
+    yield from beside(
+        "boundary elements",
+        campaign.boundary_elements,
+        files.solutions,
+        costs.solution_cost,
+        lambda entry, case: case.reduced_pressure,
+    )
+    yield from beside(
+        "boundary elements both ways",
+        campaign.boundary_element_loops,
+        files.loops,
+        costs.loop_cost,
+        lambda entry, case: entry.separation_step,
+    )
+    yield from beside(
+        "error sources",
+        campaign.error_sources,
+        files.error_sources,
+        costs.sources_cost,
+        lambda entry, case: tuple(entry.reduced_pressures),
+    )
+    for path, tabor_parameter in files.one_asperity.items():
+        yield there("one asperity", path, costs.one_asperity_cost(tabor_parameter))
+    for path in files.figures:
+        if path.endswith(".png"):  # the same job makes the other
+            yield there("figures", path, costs.FIGURE)
 
 
 def _described(settings, rms_slope) -> costs.Sweep:
@@ -216,8 +214,8 @@ def _text(attribute) -> str:
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
     """Paths of the runs that did not reach the end of their path with the present settings, with their reasons."""
     states = {
-        case.path: run_state(results / f"runs/{case.path}.nc", run_sha256(campaign, case))
-        for case in run_cases(campaign)
+        case.path: run_state(results / path, run_sha256(campaign, case))
+        for path, case in campaign_files(campaign).runs.items()
     }
     return {path: reason for path, (state, reason) in states.items() if state == FAILED}
 
@@ -263,9 +261,8 @@ def _kind(item):
 
 def _benchmark(results: Path, item: Item) -> float | None:
     """Seconds that the job of a file took when it last ran."""
-    path = item.path.removeprefix("references/") if item.path.startswith("references/") else item.path
     try:
-        lines = (results / "benchmarks" / path).with_suffix(".jsonl").read_text(encoding="utf-8").splitlines()
+        lines = (results / job_file(item.path, "benchmarks", ".jsonl")).read_text(encoding="utf-8").splitlines()
         return float(json.loads(lines[-1])["s"])
     except (OSError, ValueError, KeyError, IndexError, TypeError):
         return None

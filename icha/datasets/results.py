@@ -1,0 +1,37 @@
+"""Paths of the files of a campaign below its folder of results; in braces what differs from one to the next."""
+
+from __future__ import annotations
+
+from icha.datasets import labels
+
+SURFACE = "surfaces/{surface}/seed{seed}.nc"
+RUN = f"runs/{labels.RUN}.nc"
+THEORIES = "references/{surface}.nc"
+SOLUTION = f"references/boundary_elements/{labels.SOLUTION}.nc"
+LOOP = f"references/loops/{labels.CONTACT}.nc"
+ERROR_SOURCES = f"references/error_sources/{labels.CONTACT}.nc"
+ONE_ASPERITY = "references/one_asperity/{asperity}.nc"
+DATASET = "dataset/{campaign}.nc"
+COMPARISON = "aggregated/{campaign}.nc"
+MODEL_ERROR = "aggregated/model_error.nc"
+CHECKS = "checks.json"
+VERDICT = "verdict.txt"
+FIGURE = "figures/{name}.{ending}"
+REPORT = "report.html"
+RUN_TIMES = "run_times.tsv"
+CONFIGURATION = "config.used.yaml"
+DEPOSIT = "publish/{campaign}-{version}"
+
+
+def job_file(path: str, kind: str, ending: str) -> str:
+    """Path of what is kept of the job of a file (or of the files of a pattern).
+
+    Parameters
+    ----------
+    path : the file, below the folder of results.
+    kind, ending : what is kept: `logs` and `.log`, or `benchmarks` and `.jsonl`.
+    """
+    folder, _, rest = path.partition("/")
+    # Kinds of references have their own folders; the theories of the surfaces have none.
+    job = rest if folder == "references" and "/" in rest else path
+    return f"{kind}/{job.rpartition('.')[0]}{ending}"

@@ -1,0 +1,86 @@
+"""All files that a campaign consists of, and what each of them holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from icha.configuration.expansion import (
+    asperity_cases,
+    loop_cases,
+    run_cases,
+    solution_cases,
+    source_cases,
+    surface_cases,
+)
+from icha.configuration.model import Campaign
+from icha.datasets import results
+from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, parts
+
+
+@dataclass(frozen=True)
+class CampaignFiles:
+    """Paths of the files of a campaign, in the order of its configuration.
+
+    Where there are many of a kind, each has what it holds beside it: labels, name and seed of a surface, name of the
+    surface of theories, Tabor parameter of one asperity (None for Hertz's contact).
+    """
+
+    surfaces: dict[str, tuple[str, int]]
+    runs: dict[str, RunLabels]
+    theories: dict[str, str]
+    solutions: dict[str, SolutionLabels]
+    loops: dict[str, ContactLabels]
+    error_sources: dict[str, ContactLabels]
+    one_asperity: dict[str, float | None]
+    dataset: str
+    comparison: str
+    model_error: list[str]
+    """One file; none without boundary elements, for then there is no error to tell."""
+    checks: str
+    verdict: str
+    figures: list[str]
+    report: str
+    run_times: str
+    configuration: str
+    deposit: str
+
+    @property
+    def references(self) -> list[str]:
+        """What runs are compared with."""
+        return [*self.theories, *self.solutions, *self.loops, *self.error_sources, *self.one_asperity]
+
+
+def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
+    """All files of a campaign, as paths below its folder of results, or with that folder before them."""
+
+    def path(pattern, **names):
+        return "/".join(filter(None, (folder, pattern.format(campaign=campaign.name, **names))))
+
+    def each(pattern, cases):
+        return {path(pattern, **parts(case)): case for case in cases}
+
+    surfaces = surface_cases(campaign)
+    solutions = each(results.SOLUTION, solution_cases(campaign))
+    return CampaignFiles(
+        surfaces={path(results.SURFACE, surface=name, seed=seed): (name, seed) for name, seed in surfaces},
+        runs=each(results.RUN, run_cases(campaign)),
+        theories={path(results.THEORIES, surface=name): name for name, _ in surfaces},
+        solutions=solutions,
+        loops=each(results.LOOP, loop_cases(campaign)),
+        error_sources=each(results.ERROR_SOURCES, source_cases(campaign)),
+        one_asperity={path(results.ONE_ASPERITY, asperity=n): mu for n, mu in asperity_cases(campaign).items()},
+        dataset=path(results.DATASET),
+        comparison=path(results.COMPARISON),
+        model_error=[path(results.MODEL_ERROR)] if solutions else [],
+        checks=path(results.CHECKS),
+        verdict=path(results.VERDICT),
+        figures=[
+            path(results.FIGURE, name=name, ending=ending)
+            for name in campaign.figures.drawn()
+            for ending in ("png", "pdf")
+        ],
+        report=path(results.REPORT),
+        run_times=path(results.RUN_TIMES),
+        configuration=path(results.CONFIGURATION),
+        deposit=path(results.DEPOSIT, version=campaign.published().version or "without_version"),
+    )

@@ -1,0 +1,54 @@
+"""Paths of results: the same for whoever names them by their parts and for whoever takes those of a campaign."""
+
+from pathlib import Path
+
+import pytest
+
+from icha.configuration.load import load_configuration
+from icha.datasets import results
+from icha.datasets.labels import parts
+from icha.planning.results import campaign_files
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return load_configuration(ROOT / "config/campaigns/smoke.yaml").campaign
+
+
+@pytest.mark.parametrize(
+    ("kind", "pattern"),
+    [
+        ("runs", results.RUN),
+        ("solutions", results.SOLUTION),
+        ("loops", results.LOOP),
+        ("error_sources", results.ERROR_SOURCES),
+    ],
+)
+def test_every_path_is_its_pattern_with_the_parts_of_its_labels(campaign, kind, pattern):
+    files = getattr(campaign_files(campaign), kind)
+    assert files
+    for path, labels in files.items():
+        assert path == pattern.format(**parts(labels))
+        assert path.endswith(f"/{labels.path}.nc")
+
+
+def test_a_folder_stands_before_every_path(campaign):
+    bare, below = campaign_files(campaign), campaign_files(campaign, "results/smoke")
+    assert below.references == [f"results/smoke/{path}" for path in bare.references]
+    assert below.dataset == "results/smoke/dataset/smoke.nc"
+    assert below.figures[:2] == ["results/smoke/figures/fig1_jkr.png", "results/smoke/figures/fig1_jkr.pdf"]
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("runs/load/rough/seed1/slope0.5/soft.nc", "logs/runs/load/rough/seed1/slope0.5/soft.log"),
+        ("references/rough.nc", "logs/references/rough.log"),
+        ("references/loops/e/rough/seed1/slope0.5/soft.nc", "logs/loops/e/rough/seed1/slope0.5/soft.log"),
+        (results.ONE_ASPERITY, "logs/one_asperity/{asperity}.log"),
+    ],
+)
+def test_logs_of_jobs_lie_apart_from_their_files(path, expected):
+    assert results.job_file(path, "logs", ".log") == expected
