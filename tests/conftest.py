@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -14,6 +15,10 @@ REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
 PARTS += ("pyproject.toml", "uv.lock", "README.md")
 SMOKE = "config/campaigns/smoke.yaml"
+# Of its figures, one for each kind of input; and what else may be less for every rule to run all the same.
+FIGURES = ("fig1_jkr", "fig2_area_and_gap", "fig3_distributions", "fig5_multi_slope")
+FIGURES += ("fig10_model_error", "fig12_error_sources", "fig13_loops")
+LESS = {"separation_step: 0.3": "separation_step: 0.5", "[1.0e-2, 3.16e-2]\n    unload": "[1.0e-2]\n    unload"}
 # How many random cases a test tries: as many as one waits for, unless --hypothesis-profile asks for thorough ones. They
 # are the same ones each time, so that no change fails by chance.
 settings.register_profile("fast", max_examples=40, deadline=None, derandomize=True, database=None)
@@ -46,14 +51,26 @@ def snakemake(project, *arguments, configuration=SMOKE):
     )
 
 
-def copy_project(source, target):
-    """Copy the program's files, and commit them, as a clone has them."""
+def smaller_smoke():
+    """The text of the campaign smoke with less of everything."""
+    text = (REPOSITORY / SMOKE).read_text(encoding="utf-8")
+    for much, little in LESS.items():
+        assert much in text
+        text = text.replace(much, little)
+    figures = "|".join(FIGURES)
+    return re.sub(rf"^  (?!({figures}):)fig\w+:\n(    .*\n)+", "", text, flags=re.MULTILINE)
+
+
+def copy_project(source, target, changed=()):
+    """Copy the program's files, some with another text, and commit them, as a clone has them."""
     target.mkdir(parents=True)
     for part in PARTS:
         if (source / part).is_dir():
             shutil.copytree(source / part, target / part, ignore=shutil.ignore_patterns("__pycache__"))
         else:
             shutil.copyfile(source / part, target / part)
+    for file, text in dict(changed).items():
+        (target / file).write_text(text, encoding="utf-8")
     who = {"NAME": "nobody", "EMAIL": "nobody@example.org", "DATE": "2000-01-01T00:00:00Z"}
     told = {f"GIT_{role}_{key}": value for role in ("AUTHOR", "COMMITTER") for key, value in who.items()}
     for command in (["init", "--quiet"], ["add", "."], ["commit", "--quiet", "--message", "A copy"]):
@@ -63,7 +80,7 @@ def copy_project(source, target):
 
 @pytest.fixture(scope="session")
 def smoke(tmp_path_factory):
-    """A copy of the project in which the smoke campaign has been run to the end; not to be changed."""
+    """A copy of the project in which a small campaign smoke has been run to the end; not to be changed."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent  # one for all processes that share the tests
@@ -71,7 +88,7 @@ def smoke(tmp_path_factory):
     with (folder / "smoke.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not project.exists():
-            copy_project(REPOSITORY, project)
+            copy_project(REPOSITORY, project, {SMOKE: smaller_smoke()})
             run = snakemake(project, "all", "references", "publish")
             assert run.returncode == 0, run.stdout
     return project
@@ -79,5 +96,5 @@ def smoke(tmp_path_factory):
 
 @pytest.fixture
 def project(smoke, tmp_path):
-    """A finished smoke campaign of one's own."""
+    """A finished campaign of one's own."""
     return shutil.copytree(smoke, tmp_path / "project")

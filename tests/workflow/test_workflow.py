@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
-from conftest import REPOSITORY, SMOKE, snakemake, snakemake_command
+from conftest import FIGURES, REPOSITORY, SMOKE, copy_project, snakemake, snakemake_command
 from traces import traces
 
 from icha.configuration.expansion import campaign_sha256
@@ -60,15 +60,23 @@ def test_everything_that_was_promised_is_there(smoke):
         "publish/smoke-0.0.1.zip",
     ):
         assert name in files
-    figures = sorted(file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py"))
-    assert len(figures) == 16
-    for figure in figures:
+    for figure in FIGURES:
         assert f"figures/{figure}.png" in files and f"figures/{figure}.pdf" in files
     jobs = [file for file in files if file.startswith(("surfaces", "runs"))]
     for job in jobs:
         assert (smoke / "results/smoke/logs" / job).with_suffix(".log").is_file()
         benchmark = (smoke / "results/smoke/benchmarks" / job).with_suffix(".jsonl")
         assert json.loads(benchmark.read_text().splitlines()[0])["s"] > 0
+
+
+@pytest.mark.slow
+def test_the_campaign_as_shipped_has_every_figure(tmp_path):
+    project = copy_project(REPOSITORY, tmp_path / "project")
+    run = snakemake(project)
+    assert run.returncode == 0, run.stdout
+    figures = {file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py")}
+    assert len(figures) == 16
+    assert {file.stem for file in (project / "results/smoke/figures").iterdir()} == figures
 
 
 def test_sweeps_report_progress(smoke):
@@ -98,7 +106,7 @@ def test_the_dataset_tells_where_it_comes_from(smoke):
 
 def test_the_configuration_as_used_is_the_campaign(smoke):
     used = yaml.safe_load((smoke / "results/smoke/config.used.yaml").read_text())
-    assert used == yaml.safe_load((REPOSITORY / SMOKE).read_text())
+    assert used == yaml.safe_load((smoke / SMOKE).read_text())
 
 
 def test_all_checks_passed(smoke):
