@@ -359,7 +359,7 @@ to the last stop. *Time / ICHA's* is the ratio of processor times of whole proce
 time of a quiet machine, and that of the computations alone (wall time); *memory* is the largest resident memory. ICHA
 and `aspher` had the machine to themselves; where the wall time of another code is longer than its processor time, it
 had not, and the ratio of the computations flatters ICHA by as much. ICHA is asked for bare numbers, as the others are
-(`icha.path.path.follow`); the labelled dataset of `icha.simulate` costs another 1.5 s, nearly all of it the import of
+(`icha.path.follow`); the labelled dataset of `icha.simulate` costs another 1.5 s, nearly all of it the import of
 xarray. At 256² and 512² ICHA's time is mostly that of its imports. The loads are 20 reduced pressures
 p\\* = p/(E\\* h'_rms) from 5e-4 to 8e-2 in geometric progression. The surfaces have
 the challenge's spectrum (period 100 µm, roll-off 20 µm, Hurst exponent 0.8, rms slope 1) down to waves of eight grid

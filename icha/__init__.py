@@ -6,7 +6,7 @@ _HOME = {
     "SelfAffineSpectrum": "surfaces.spectrum",
     "Surface": "surfaces.surface",
     "Material": "asperity.material",
-    "Path": "path.path",
+    "Path": "path.targets",
     "simulate": "simulation",
     "ConvergenceError": "simulation",
 }

@@ -18,8 +18,9 @@ from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.bins import bin_table, bin_values, with_bounds
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.path.follow import follow
 from icha.path.limits import MAX_REDUCED_PRESSURE
-from icha.path.path import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target, follow
+from icha.path.targets import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
 from icha.support.validation import integer
 from icha.surfaces.moments import spectral_moments
 from icha.surfaces.summits import find_summits

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 import icha
 from icha.asperity.jkr import JKR
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.path.path import follow
+from icha.path.follow import follow
 from icha.surfaces.summits import Asperities
 
 REDUCED_PRESSURES = np.geomspace(5e-4, 8e-2, 20)

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 import icha
 from icha.asperity.jkr import JKR
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.path.path import follow
+from icha.path.follow import follow
 from icha.surfaces.summits import find_summits
 
 
@@ -20,7 +20,7 @@ def main():
         path = icha.Path(mean_separations=task.mean_gaps, snapshots=[])
     else:
         path = icha.Path(reduced_pressures=[pressure / unit for pressure in task.pressures], snapshots=[])
-    task.start("icha", "icha.path.path.follow")
+    task.start("icha", "icha.path.follow")
     surface = icha.Surface(task.heights, task.period)
     material = icha.Material(task.contact_modulus, task.surface_energy, task.interaction_range)
     with threadpool_limits(1):

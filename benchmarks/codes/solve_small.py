@@ -10,7 +10,7 @@ from icha.asperity.material import Material
 from icha.configuration.expansion import run_cases, run_settings
 from icha.configuration.load import load_configuration
 from icha.datasets.files import read_surface
-from icha.path.path import Path as LoadingPath
+from icha.path.targets import Path as LoadingPath
 from icha.simulation import simulate
 
 

@@ -18,7 +18,7 @@ import xarray as xr
 from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.datasets.campaign import RunLabels, loading_stops, run_labels, select_run
 from icha.datasets.files import MISSING
-from icha.path.path import BETWEEN
+from icha.path.targets import BETWEEN
 from icha.support.atomic_files import whole_file
 
 RESIDUAL_LIMIT = 1e-8

@@ -18,7 +18,7 @@ from icha.datasets.campaign import LABELS, RAGGED, find_snapshot, select_run, sp
 from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, status_variable
 from icha.datasets.labels import RunLabels, SolutionLabels
 from icha.equilibrium.distributions import nodes_in_discs
-from icha.path.path import REDUCED_PRESSURE
+from icha.path.targets import REDUCED_PRESSURE
 
 _TITLE = "Error of the model against boundary elements"
 _SUMMARY = "The same topographies, loads and ranges of attraction by the model and by boundary elements."

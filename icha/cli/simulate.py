@@ -85,7 +85,7 @@ def simulate(
     from icha.asperity.material import Material
     from icha.cli.show import show_run
     from icha.datasets.files import write_dataset
-    from icha.path.path import Path as LoadingPath
+    from icha.path.targets import Path as LoadingPath
     from icha.simulation import ConvergenceError
     from icha.simulation import simulate as press
 

@@ -27,6 +27,7 @@ from icha.configuration.topography import MeasuredSurface
 from icha.configuration.values import MAX_GRID, MEASURED, Slope, Slopes, Values
 from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
+from icha.path.targets import Path
 from icha.support.units import conversion_factor
 from icha.support.values import (
     ROUNDING,
@@ -298,8 +299,6 @@ class Study(Section):
 
     def check_path(self, snapshots: list[tuple[str, float]] | None) -> None:
         """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
-        from icha.path.path import Path  # the solver, which others who read configurations need not wait for
-
         Path(**self.path_settings(snapshots))
 
     def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:

@@ -13,7 +13,7 @@ import xarray as xr
 from icha.datasets.campaign_file import LABELS, RAGGED, write_campaign
 from icha.datasets.files import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, read_campaign
 from icha.datasets.labels import RunLabels
-from icha.path.path import BETWEEN
+from icha.path.targets import BETWEEN
 
 
 def campaign_tree(

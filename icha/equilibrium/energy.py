@@ -1,24 +1,15 @@
-"""What becomes of the work done on a contact: part of it is stored, the rest is lost in jumps.
-
-Between two events the stored energy changes by the work done. An event, at a given separation, changes the energy at
-once; what it sets free is lost. Over a closed path the losses of all events make up the area of the loop, the integral
-of p over u.
-"""
+"""Stored energy of a state."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
-from icha.contact.model import ContactModel, State
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.states import ContactState
 
 
 def stored_energy(problem: Problem, state: ContactState) -> float:
-    """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of problem.
+    """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact.
 
     Every spot has the work that would make it alone, and half that of its force against the displacement by the
     others. Force and displacement are those of the spots' centres, as in eq. (4), which makes the interaction of
@@ -29,118 +20,3 @@ def stored_energy(problem: Problem, state: ContactState) -> float:
     a, R = spots.contact_radius, spots.radius_of_curvature
     displaced = spots.height - state.separation - spots.approach
     return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / problem.area
-
-
-# Of the work of a step, the part from which on its loss is that of its jumps, and not what is not reciprocal.
-_PLAIN_LOSS = 0.1
-
-
-@dataclass(frozen=True)
-class Step:
-    """From one equilibrium of a path to the next: work, change of energy and events.
-
-    width: change of the mean separation, m. work: done on the contact, -(integral of p du), J/m^2. gained: stored
-    energy, J/m^2. pressure_jump: by which events changed the pressure, Pa. roughness: bound of the error of the
-    integral where it is smooth, J/m^2. sudden: whether there are events that may change the pressure.
-    """
-
-    width: float
-    work: float
-    gained: float
-    pressure_jump: float
-    roughness: float
-    sudden: bool
-    events: Events
-
-    @classmethod
-    def between(cls, contact: ContactModel, before: State, after: State) -> Step:
-        """The step from one state to the next.
-
-        The integral is that of the cubic with the pressures and stiffnesses at both ends; what jumps, jumps half way.
-        """
-        events = contact.events_between(before, after)
-        width = after.separation - before.separation
-        p, q = contact.pressure(before), contact.pressure(after)
-        slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
-        # Without adhesion contact forms and breaks without a jump of the pressure.
-        jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
-        bend = width**2 * (slope - end_slope)
-        return cls(
-            width=width,
-            work=-(0.5 * width * (p + q) + bend / 12),
-            gained=contact.stored_energy(after) - contact.stored_energy(before),
-            pressure_jump=q - p - 0.5 * width * (slope + end_slope) if jumps else 0.0,
-            roughness=abs(bend) / 24,
-            sudden=bool(jumps),
-            events=events,
-        )
-
-    @property
-    def unites(self) -> bool:
-        """Whether spots have united or unions have been undone."""
-        return self.events.count(COALESCENCE) + self.events.count(SPLIT) > 0
-
-    @property
-    def lost(self) -> float:
-        """Work that is not stored, J/m^2."""
-        return self.work - self.gained
-
-    def set_free(self, contact: ContactModel) -> float:
-        """Energy that the jumps of the step set free, as if every spot were alone, J/m^2."""
-        return float(np.abs(self.events.energy).sum()) / contact.area
-
-    @property
-    def unresolved(self) -> float:
-        """Bound of what is not known of the work, for not knowing where in the step its events happen, J/m^2."""
-        return 0.5 * abs(self.pressure_jump * self.width)
-
-
-@dataclass(frozen=True)
-class EnergyBalance:
-    """Work done on a contact since first contact and what has been lost of it, by the kind of event, J/m^2.
-
-    unattributed: lost in steps without any event: errors of the integration, and what is not reciprocal in the model's
-    interaction (`icha.equilibrium.energy.stored_energy`).
-    """
-
-    work: float = 0.0
-    jump_in: float = 0.0
-    jump_off: float = 0.0
-    coalescence: float = 0.0
-    load_jump: float = 0.0
-    unattributed: float = 0.0
-
-    @property
-    def lost(self) -> float:
-        """Sum of all losses, J/m^2."""
-        return self.jump_in + self.jump_off + self.coalescence + self.load_jump + self.unattributed
-
-    def after(self, contact: ContactModel, step: Step) -> EnergyBalance:
-        """The balance after one more step.
-
-        A step with jumps alone has lost its energy in them, if it is about what they would lose, were their spots
-        alone, or not small beside the work; those of both kinds share it as if every spot were alone. Otherwise, and
-        where spots also united, they have lost just what their spots would alone. The rest is that of unions and their
-        undoing, where there were any, and else unattributed.
-        """
-        events, united = step.events, step.unites
-        jump_in, jump_off = (
-            float(events.energy[events.kind == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF)
-        )
-        ratio = step.lost / ((jump_in + jump_off) or np.inf)
-        if not united and ratio and (0.5 < ratio < 2 or abs(step.lost) > _PLAIN_LOSS * abs(step.work)):
-            scale = step.lost / (jump_in + jump_off)
-            jump_in, jump_off = scale * jump_in, scale * jump_off
-        rest = step.lost - jump_in - jump_off
-        return replace(
-            self,
-            work=self.work + step.work,
-            jump_in=self.jump_in + jump_in,
-            jump_off=self.jump_off + jump_off,
-            coalescence=self.coalescence + (rest if united else 0.0),
-            unattributed=self.unattributed + (0.0 if united else rest),
-        )
-
-    def after_load_jump(self, work: float, gained: float) -> EnergyBalance:
-        """The balance after a jump under load control, in which a constant pressure does work."""
-        return replace(self, work=self.work + work, load_jump=self.load_jump + work - gained)

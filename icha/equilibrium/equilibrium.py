@@ -31,8 +31,9 @@ from icha.asperity.coalescence import covering_spot, disjoint_pairs, equivalent_
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 from icha.contact.failures import FullContact, NotConverged
 from icha.contact.model import PRESSURE, Control
+from icha.contact.unions import OVERLAP
 from icha.equilibrium.control import gradient_by_radius, held_value, radius_response
-from icha.equilibrium.problem import OVERLAP, Problem
+from icha.equilibrium.problem import Problem
 from icha.equilibrium.states import CONTACT, GONE, TRIAL, ContactState, Union
 from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.square import periodic_difference

@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from icha.asperity.jkr import JKR
+from icha.contact.unions import DETACHMENT
 from icha.surfaces.summits import Asperities
-
-# Until when united spots stay united.
-DETACHMENT, OVERLAP = "detachment", "overlap"
 
 
 @dataclass(frozen=True, eq=False)

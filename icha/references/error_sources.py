@@ -48,7 +48,8 @@ from icha.equilibrium.distributions import contact_cover
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import ContactState
 from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
-from icha.path.path import Path, follow
+from icha.path.follow import follow
+from icha.path.targets import Path
 from icha.references.boundary_elements import (
     DEFAULT_TOLERANCE,
     REFERENCES,

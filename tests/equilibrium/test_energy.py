@@ -5,6 +5,7 @@ Asperities as in the tests of unloading: of radius 1 in units in which modulus a
 
 from functools import cache
 
+import icha.path.path
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -36,7 +37,6 @@ from test_unloading import (
 )
 
 import icha
-import icha.path.path
 from icha import Material, Path
 from icha.contact.events import JUMP_IN, JUMP_OFF
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from icha.path.path import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, follow
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.analysis.checks import check_run
@@ -9,7 +10,6 @@ from icha.asperity.jkr import JKR
 from icha.contact.failures import NotConverged
 from icha.equilibrium.equilibrium import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.path.path import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, follow
 from icha.surfaces.summits import find_summits
 
 PERIOD, MODULUS = 100e-6, 25e6

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from half_space import displacement_by_quadrature, jkr_approach, jkr_force, periodic_point_load
+from icha.path.path import LOAD_CONTROL, MAX_REDUCED_PRESSURE, follow
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
@@ -19,7 +20,6 @@ from icha.asperity.jkr import JKR
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 from icha.contact.failures import NotConverged
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.path.path import LOAD_CONTROL, MAX_REDUCED_PRESSURE, follow
 from icha.references.one_asperity import paraboloid
 from icha.surfaces.summits import Asperities, find_summits
 

@@ -50,7 +50,7 @@ JOBS = (
     ),
 )
 OTHERS = ("README.md", "LICENSE.txt", "CITATION.cff", "source/Snakefile", "source/uv.lock", "source/LICENSE")
-OTHERS += ("source/icha/path/path.py",)
+OTHERS += ("source/icha/path/follow.py",)
 
 
 def checksums_of(folder):

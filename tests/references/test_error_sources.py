@@ -9,7 +9,7 @@ import icha
 from icha.asperity.jkr import JKR
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.figures import fig12_error_sources
-from icha.path.path import follow
+from icha.path.follow import follow
 from icha.references.boundary_elements import NodalState, contact_state, perimeter_correction
 from icha.references.error_sources import (
     ADHESIVE_CHAIN,

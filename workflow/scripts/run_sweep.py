@@ -4,7 +4,7 @@ from job import attributes, guarded
 
 from icha.asperity.material import Material
 from icha.datasets.files import read_surface, write_dataset
-from icha.path.path import Path
+from icha.path.targets import Path
 from icha.simulation import ConvergenceError, simulate
 
 

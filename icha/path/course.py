@@ -1,0 +1,85 @@
+"""How far a path has come: for those who wait for it, and for the reason why it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from icha.contact.failures import NotConverged
+from icha.contact.model import ContactModel, State
+from icha.path.bracketing import InsideJump
+from icha.path.limits import MAX_AREA_FRACTION
+from icha.path.stops import Stop
+from icha.path.targets import Target
+
+# How far past the covered area the path looks for a target before it gives up.
+_AREA_MARGIN = 1.5
+# A step that does not converge is halved down to this fraction of the longest one.
+_SMALLEST_STEP = 2.0**-14
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Stops met so far, of how many; those that were missed, as they lie inside jumps."""
+
+    contact: ContactModel
+    total: int
+    progress: Callable[[str], None] | None = None
+    reached: int = 0
+    missed: tuple[InsideJump, ...] = ()
+
+    def met(self, target: Target, state: State) -> Course:
+        """After one more stop."""
+        after = replace(self, reached=self.reached + 1)
+        after.tell(f"stop {after.reached} of {self.total}: {target.named(6)}", state)
+        return after
+
+    def without(self, jump: InsideJump) -> Course:
+        """After a stop that is left out."""
+        return replace(self, missed=(*self.missed, jump))
+
+    def tell(self, name: str, state: State) -> None:
+        """Tell where the path is."""
+        if self.progress is not None:
+            contact = self.contact
+            self.progress(
+                f"{name}, separation {state.separation / contact.rms_height:.4f} h_rms, "
+                f"A/A0 {contact.area_fraction(state):.4e}, {contact.spot_count(state)} spots"
+            )
+
+    def require_covered(
+        self, before: State, after: State, stop: Stop | None, waiting: list[Stop], loading: bool
+    ) -> None:
+        """Refuse a state, at a stop or before those that wait, that the model does not cover."""
+        contact = self.contact
+        what = (stop or waiting[0]).target.named() if stop or waiting else "separation"
+        area = contact.area_fraction(after)
+        if area > _AREA_MARGIN * MAX_AREA_FRACTION:
+            reason = f"the contact area runs to {area:.2f} of the nominal one, beyond what the model covers,"
+            raise self.ended(before, loading, NotConverged(f"{reason} before {what}"))
+        if stop is None and contact.mean_gap(after) <= 0:
+            reason = f"the mean planes met before {what}, beyond what the model covers"
+            raise self.ended(after, loading, NotConverged(reason))
+
+    def ended(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
+        """Where the path ended and why; a surface that sticks together by itself is called so."""
+        contact, failures = self.contact, (*self.missed, *failures)
+        sticky = ""
+        # Without a load, adhesion alone has spread the contact, or the very first one does not come to rest.
+        lone = contact.spot_count(state) == 0 and not any(isinstance(failure, InsideJump) for failure in failures)
+        if contact.adhesive and loading and (contact.pressure(state) < 0 or lone):
+            sticky = (
+                "; the load is not yet compressive: the surface is sticky, adhesion is pulling it towards full contact"
+            )
+        return NotConverged(
+            f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
+            f"A/A0 = {contact.area_fraction(state):.3g}, after {self.reached} of {self.total} stops: "
+            f"{'; '.join(map(str, failures))}{sticky}"
+        )
+
+
+def halved(step: float, longest: float, failure: NotConverged) -> float:
+    """Half the step after an equilibrium that was not found; the failure is raised where no step helps."""
+    if step / 2 < _SMALLEST_STEP * longest:
+        raise failure
+    return step / 2

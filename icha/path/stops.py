@@ -1,0 +1,56 @@
+"""A target as a function of the state of the contact, and the equilibrium that meets it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from icha.contact.model import AREA_FRACTION as AREA
+from icha.contact.model import PRESSURE, ContactModel, Control, State
+from icha.path.targets import AREA_FRACTION, MEAN_SEPARATION, Target
+
+# Relative excess over a target that is rounding.
+SAME_EXCESS = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """A target turned into a function of the state that is zero at the target and rises on loading.
+
+    pressure_scale: of a load, the pressure (Pa) that is its unit.
+    """
+
+    target: Target
+    contact: ContactModel
+    pressure_scale: float
+
+    def excess(self, state: State) -> float:
+        """Relative excess of the state over the target; of a load that is zero in units of its scale."""
+        kind, value = self.target.kind, self.target.value
+        if kind == MEAN_SEPARATION:
+            return (value - state.separation) / self.contact.rms_height
+        if kind == AREA_FRACTION:
+            return self.contact.area_fraction(state) / value - 1
+        pressure = self.contact.pressure(state) / self.pressure_scale
+        return (pressure - value) / (abs(value) or 1.0)
+
+    @property
+    def control(self) -> Control | None:
+        """What a solve has to hold to meet the target; None for a separation."""
+        if self.target.kind == MEAN_SEPARATION:
+            return None
+        if self.target.kind == AREA_FRACTION:
+            return Control(AREA, self.target.value)
+        return Control(PRESSURE, self.target.value * self.pressure_scale)
+
+    def expected_separation(self, state: State) -> float:
+        """The separation at which the target may be met: load and area grow about exponentially; -inf if unknown."""
+        if self.target.kind == MEAN_SEPARATION:
+            return self.target.value
+        value, slope = 1 + self.excess(state), self.contact.slope(self.control.quantity, state) / self.control.target
+        return state.separation - np.log(value) / (slope / value) if value > 0 and slope < 0 else -np.inf
+
+    def meet(self, state: State, separation: float) -> State:
+        """The equilibrium at the target, from a state not far away; the separation is a first guess."""
+        return self.contact.equilibrium(state, separation, self.control)

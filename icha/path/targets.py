@@ -1,0 +1,215 @@
+"""What a path is asked to meet: given separations, loads or areas, and the turning points between them."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+from icha.contact.unions import DETACHMENT, UNITED_UNTIL
+from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.support.validation import number, positive
+
+REDUCED_PRESSURE = "reduced_pressure"
+RELATIVE_LOAD = "relative_load"
+AREA_FRACTION = "area_fraction"
+MEAN_SEPARATION = "mean_separation"
+KINDS = (REDUCED_PRESSURE, RELATIVE_LOAD, AREA_FRACTION, MEAN_SEPARATION)
+LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
+# The arguments that list the stops of a path.
+LISTS = {
+    REDUCED_PRESSURE: "reduced_pressures",
+    AREA_FRACTION: "area_fractions",
+    MEAN_SEPARATION: "mean_separations",
+}
+# What an equilibrium between the stops of a path is asked to reach: its mean separation.
+BETWEEN = "path"
+
+SEPARATION_CONTROL, LOAD_CONTROL = "separation", "load"
+CONTROLS = (SEPARATION_CONTROL, LOAD_CONTROL)
+
+
+@dataclass(frozen=True)
+class Target:
+    """One stop of a path: the kind of quantity, its value (SI units), and whether it is a snapshot."""
+
+    kind: str
+    value: float
+    snapshot: bool = False
+
+    def named(self, digits: int | None = None) -> str:
+        """Kind and value in words."""
+        return f"{self.kind} = {self.value:{f'.{digits}' if digits else ''}g}"
+
+
+@dataclass(frozen=True, init=False)
+class Path:
+    """Stops of a path, and the longest step between them.
+
+    Parameters
+    ----------
+    reduced_pressures : p/(E* h'_rms), increasing, in (0, 0.15].
+    area_fractions : A/A0, increasing, in (0, 0.25].
+    mean_separations : u in m, decreasing, positive. Exactly one of these three lists is given.
+    snapshots : pairs (kind, value), in any order, of states whose fields and spots are kept, with kind one of
+        "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" and "mean_separation" (m). A snapshot is a stop
+        of its own, unless the list holds the same kind and value; the dataset has them in the order in which they are
+        met. None: the last stop of the list.
+    turning_points : pairs (kind, value) at which the path turns after its last stop: the first ends unloading, the
+        second loading, and so on. Kinds as for snapshots; loads may be tensile (negative) or zero.
+    unload : whether the path ends with complete separation, met by the stops once more on the way.
+    control : "separation": the mean separation is imposed. "load": the load is; the state runs along the same curve
+        and jumps, at constant load, where it would have to turn back. Then all stops and turning points are loads.
+    united_until : until when united spots stay united on the way back: "detachment", where they let go as a whole and
+        fall back into their asperities, or "overlap", where the two spots that they were made of would just touch.
+    max_step : longest change of the mean separation between two equilibria, in units of h_rms, in (0, 0.5].
+
+    Raises
+    ------
+    ValueError
+        Naming the argument whose value is not allowed.
+    """
+
+    targets: tuple[Target, ...]
+    turning_points: tuple[Target, ...]
+    unload: bool
+    control: str
+    united_until: str
+    max_step: float
+
+    def __init__(
+        self,
+        reduced_pressures=None,
+        area_fractions=None,
+        mean_separations=None,
+        *,
+        snapshots=None,
+        turning_points=(),
+        unload=False,
+        control=SEPARATION_CONTROL,
+        united_until=DETACHMENT,
+        max_step=DEFAULT_STEP,
+    ):
+        """Check the values and build the list of stops."""
+        kind, values = _one_list(reduced_pressures, area_fractions, mean_separations)
+        if not isinstance(unload, bool):
+            raise ValueError(f"unload: {unload!r} is neither True nor False")
+        if control not in CONTROLS:
+            raise ValueError(f"control: {control!r} must be one of {', '.join(CONTROLS)}")
+        if united_until not in UNITED_UNTIL:
+            raise ValueError(f"united_until: {united_until!r} must be one of {', '.join(UNITED_UNTIL)}")
+        max_step = positive("max_step", max_step, "h_rms")
+        if max_step > MAX_STEP:
+            raise ValueError(f"max_step: {max_step!r} must not exceed {MAX_STEP} (in h_rms)")
+        values = _stops(LISTS[kind], kind, values)
+        wanted = _wanted([(kind, values[-1])] if snapshots is None else snapshots)
+        targets = [Target(kind, value, (kind, value) in wanted) for value in values]
+        targets += [Target(k, v, True) for k, v in wanted if k != kind or v not in values]
+        turns = _turns(turning_points, targets[len(values) - 1])
+        if control == LOAD_CONTROL:
+            _require_loads((*targets, *turns), unload or bool(turns))
+        object.__setattr__(self, "targets", tuple(targets))
+        object.__setattr__(self, "turning_points", turns)
+        object.__setattr__(self, "unload", unload)
+        object.__setattr__(self, "control", control)
+        object.__setattr__(self, "united_until", united_until)
+        object.__setattr__(self, "max_step", max_step)
+
+    @property
+    def cyclic(self) -> bool:
+        """Whether the path goes on after the first loading."""
+        return self.unload or bool(self.turning_points)
+
+
+def _one_list(*lists):
+    """Kind and values of the one list that is given."""
+    given = {kind: values for kind, values in zip(LISTS, lists, strict=True) if values is not None}
+    if len(given) != 1:
+        raise ValueError(
+            f"{', '.join(LISTS.values())}: exactly one must be given, "
+            f"not {', '.join(LISTS[kind] for kind in given) or 'none'}"
+        )
+    ((kind, values),) = given.items()
+    return kind, values
+
+
+def _wanted(snapshots):
+    """Kinds and values of the snapshots."""
+    wanted = []
+    for label, kind, value in _pairs("snapshots", snapshots):
+        value = _covered(label, kind, value)
+        if (kind, value) in wanted:
+            raise ValueError(f"{label}: {kind} {value!r} is given twice")
+        wanted.append((kind, value))
+    return wanted
+
+
+def _require_loads(targets, goes_back):
+    """Refuse what has no meaning where the load is imposed."""
+    for target in targets:
+        if target.kind not in LOADS:
+            raise ValueError(
+                f"control: {LOAD_CONTROL!r} with the stop {target.kind} = {target.value:g}; allowed: stops and "
+                "turning points that are loads"
+            )
+    if not goes_back:
+        raise ValueError(
+            f"control: {LOAD_CONTROL!r} without a way back; allowed: {SEPARATION_CONTROL!r}, or a path that unloads "
+            "or has turning points"
+        )
+
+
+def _pairs(name, pairs):
+    """Label, kind and value of every pair of a list."""
+    if not isinstance(pairs, list | tuple):
+        raise ValueError(f"{name}: {pairs!r} is not a list of pairs (kind, value)")
+    for index, pair in enumerate(pairs):
+        label = f"{name}[{index}]"
+        try:
+            kind, value = pair
+        except (TypeError, ValueError):
+            raise ValueError(f"{label}: {pair!r} is not a pair (kind, value)") from None
+        if kind not in KINDS:
+            raise ValueError(f"{label}: kind {kind!r} must be one of {', '.join(KINDS)}")
+        yield label, kind, value
+
+
+def _turns(turning_points, last):
+    """The turning points, which lie before and beyond each other in turn, as far as they are of one kind."""
+    turns, before = [], last
+    for k, (label, kind, value) in enumerate(_pairs("turning_points", turning_points)):
+        tensile = kind in LOADS and k % 2 == 0
+        value = number(label, value, "1") if tensile else _covered(label, kind, value)
+        if kind == before.kind:
+            opened = value > before.value if kind == MEAN_SEPARATION else value < before.value
+            if value == before.value or opened != (k % 2 == 0):
+                way = "unloading" if k % 2 == 0 else "loading"
+                side = "less" if (k % 2 == 0) != (kind == MEAN_SEPARATION) else "more"
+                raise ValueError(
+                    f"{label}: {value!r} cannot end {way} that begins at {before.value!r}; allowed: {side} than that"
+                )
+        before = Target(kind, value)
+        turns.append(before)
+    return tuple(turns)
+
+
+def _covered(name, kind, value):
+    value = positive(name, value, "m" if kind == MEAN_SEPARATION else "1")
+    limit = {REDUCED_PRESSURE: MAX_REDUCED_PRESSURE, AREA_FRACTION: MAX_AREA_FRACTION}.get(kind)
+    if limit is not None and value > limit:
+        raise ValueError(f"{name}: {value!r} lies beyond what the model covers (at most {limit})")
+    return value
+
+
+def _stops(name, kind, values):
+    try:
+        values = list(values)
+    except TypeError:
+        raise ValueError(f"{name}: {values!r} is not a list of numbers") from None
+    if not values:
+        raise ValueError(f"{name}: the list is empty")
+    values = [_covered(f"{name}[{i}]", kind, v) for i, v in enumerate(values)]
+    for i, (one, next_one) in enumerate(itertools.pairwise(values)):
+        if not (next_one < one if kind == MEAN_SEPARATION else next_one > one):
+            order = "decreasing" if kind == MEAN_SEPARATION else "increasing"
+            raise ValueError(f"{name}[{i + 1}]: {next_one!r} after {one!r}; the list must be strictly {order}")
+    return values
