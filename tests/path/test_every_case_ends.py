@@ -1,4 +1,4 @@
-"""A thousand surfaces, materials and paths at random: every sweep ends, converged or marked with its reason."""
+"""Surfaces, materials and paths at random: every sweep ends, converged or marked with its reason."""
 
 import re
 import warnings

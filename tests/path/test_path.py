@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from icha.path.path import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, follow
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.analysis.checks import check_run
@@ -10,6 +9,8 @@ from icha.asperity.jkr import JKR
 from icha.contact.failures import NotConverged
 from icha.equilibrium.equilibrium import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.path.follow import follow
+from icha.path.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
 from icha.surfaces.summits import find_summits
 
 PERIOD, MODULUS = 100e-6, 25e6
@@ -28,8 +29,8 @@ def large():
     return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
 
 
-def contact_of(surface, material):
-    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+def contact_of(surface, material, model=InteractingAsperities):
+    return model(JKR(material), find_summits(surface), surface.rms_height)
 
 
 @pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
@@ -142,13 +143,13 @@ def test_the_path_starts_where_the_first_asperity_makes_contact(surface):
 def test_no_step_is_longer_than_asked(surface):
     seen = []
 
-    class Spy(InteractingAsperities):
+    class Watched(InteractingAsperities):
         def equilibrium(self, state, *arguments):
             reached = super().equilibrium(state, *arguments)
             seen.append((state.separation - reached.separation) / self.rms_height)
             return reached
 
-    contact = Spy(JKR(BARE), find_summits(surface), surface.rms_height)
+    contact = contact_of(surface, BARE, Watched)
     for _ in follow(contact, Path(reduced_pressures=[1e-2], max_step=0.07), MODULUS):
         pass
     assert 0.069 < max(seen) <= 0.07 * (1 + 1e-9)
@@ -165,8 +166,8 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface):
                 raise NotConverged("on purpose")
             return super().equilibrium(state, separation, control)
 
-    contact = Failing(JKR(BARE), find_summits(surface), surface.rms_height)
-    stops = follow(contact, Path(reduced_pressures=[1e-3, 1e-1]), MODULUS * surface.rms_slope)
+    path = Path(reduced_pressures=[1e-3, 1e-1])
+    stops = follow(contact_of(surface, BARE, Failing), path, MODULUS * surface.rms_slope)
     assert next(stops).target.value == 1e-3
     with pytest.raises(NotConverged, match=r"after 1 of 2 stops: on purpose"):
         next(stops)

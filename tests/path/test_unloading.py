@@ -4,86 +4,49 @@ Asperities of radius 1 in units in which modulus and surface energy are 1 as wel
 do not matter, unless the test says so.
 """
 
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from half_space import displacement_by_quadrature, jkr_approach, jkr_force, periodic_point_load
-from icha.path.path import LOAD_CONTROL, MAX_REDUCED_PRESSURE, follow
-from scipy.integrate import quad
-from scipy.optimize import brentq, minimize_scalar
+from few_asperities import (
+    FAR,
+    HEIGHT,
+    JUMP_OFF_APPROACH,
+    JUMP_OFF_RADIUS,
+    NO_LOAD_RADIUS,
+    PULL_OFF_APPROACH,
+    PULL_OFF_RADIUS,
+    STICKY,
+    WU,
+    alone,
+    approach,
+    beside,
+    closed_again,
+    contact_of,
+    energy,
+    equal_pair,
+    force,
+    history,
+    limit_point,
+    load,
+    pair,
+    small,
+    stable_radius,
+    travelled,
+    united_run,
+)
+from half_space import periodic_point_load
+from scipy.optimize import brentq
 
 import icha
-from icha import Material, Path
-from icha.asperity.jkr import JKR
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
+from icha import Path
+from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
 from icha.contact.failures import NotConverged
-from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.path.follow import follow
+from icha.path.limits import MAX_REDUCED_PRESSURE
+from icha.path.targets import LOAD_CONTROL
 from icha.references.one_asperity import paraboloid
-from icha.surfaces.summits import Asperities, find_summits
-
-FAR = 1e8
-TABOR = 2.5
-STICKY, BARE = Material(1.0, 1.0, 1 / TABOR), Material(1.0, 0.0, 1 / TABOR)
-HEIGHT, RMS_HEIGHT = 100.0, 10.0
-# The law of one asperity in these units; its jump-off radius, pull-off force and their approaches.
-JUMP_OFF_RADIUS, PULL_OFF_RADIUS, NO_LOAD_RADIUS = (np.cbrt(part * np.pi) for part in (1 / 8, 9 / 8, 9 / 2))
-
-
-def force(a, R=1.0):
-    return jkr_force(a, R, 1.0, 1.0)
-
-
-def approach(a, R=1.0):
-    return jkr_approach(a, R, 1.0, 1.0)
-
-
-JUMP_OFF_APPROACH, PULL_OFF_APPROACH = approach(JUMP_OFF_RADIUS), approach(PULL_OFF_RADIUS)
-WU = (1 - 2.641 * TABOR ** (3 / 7)) / TABOR
-
-
-def energy(a, R=1.0):
-    """Work that makes a spot: the integral of F d(delta) along its curve, from a = 0."""
-    return quad(lambda s: force(s, R) * (2 * s / R - np.sqrt(np.pi / (2 * s))), 0, a, epsabs=0, epsrel=1e-12)[0]
-
-
-def stable_radius(d):
-    return brentq(lambda a: approach(a) - d, JUMP_OFF_RADIUS, 50)
-
-
-def contact_of(heights, positions=((0.5, 0.5),), radii=None, *, period=FAR, material=STICKY, until="detachment"):
-    """Asperities of given heights and places, measured from the middle of the cell if it is not one alone."""
-    heights = np.array(heights, float)
-    positions = np.array(positions, float) + period / 2
-    radii = np.ones(len(heights)) if radii is None else np.array(radii, float)
-    return InteractingAsperities(JKR(material), Asperities(positions, heights, radii, period), RMS_HEIGHT, until)
-
-
-def travelled(contact, stops, **settings):
-    """All waypoints of a path; reduced pressures are loads over 1000."""
-    return list(follow(contact, Path(stops, **settings), 1e3 / contact.area))
-
-
-def load(contact, waypoint):
-    return contact.pressure(waypoint.state) * contact.area
-
-
-def history(waypoints):
-    return Events.joined(waypoints[-1].state.history)
-
-
-def closed_again(waypoints):
-    """The last waypoint: nothing touches any more."""
-    assert not len(waypoints[-1].state.spots)
-    return waypoints[-1].state
-
-
-@cache
-def alone(control="separation"):
-    contact = contact_of([HEIGHT])
-    return contact, travelled(contact, [0.01], unload=True, control=control)
-
+from icha.surfaces.summits import find_summits
 
 # --- one asperity -------------------------------------------------------------------------------------------
 
@@ -165,22 +128,6 @@ def test_a_bump_in_a_cell_has_the_law_and_its_images():
 
 
 # --- several that lose their equilibrium together -----------------------------------------------------------
-
-
-def limit_point(displacement):
-    """Largest radius-dependent separation above the summit of equal asperities, and the radius there."""
-    found = minimize_scalar(lambda a: approach(a) + displacement(a), bounds=(0.4, 2), method="bounded")
-    return -found.fun, found.x
-
-
-def beside(distance, a):
-    return displacement_by_quadrature(distance, a, 1.0, 1.0, 1.0)
-
-
-@cache
-def equal_pair():
-    contact = contact_of([HEIGHT, HEIGHT], [[-4, 0], [4, 0]])
-    return contact, travelled(contact, [0.005], unload=True)
 
 
 def test_two_equal_asperities_let_go_at_their_common_limit_point():
@@ -286,10 +233,6 @@ def test_loading_again_goes_on_beyond_the_old_maximum():
 # --- united spots -------------------------------------------------------------------------------------------
 
 
-def pair(lower, distance, until, material=STICKY):
-    return contact_of([HEIGHT, HEIGHT - lower], [[-distance / 2, 0], [distance / 2, 0]], until=until, material=material)
-
-
 def test_when_a_united_spot_lets_go_the_taller_asperity_stays_on_its_branch():
     contact = pair(3.0, 4.0, "detachment")
     waypoints = travelled(contact, [0.03], unload=True)
@@ -332,17 +275,6 @@ def test_an_overlap_parts_where_it_began():
 
 
 # --- dataset and arguments ----------------------------------------------------------------------------------
-
-
-@cache
-def united_run():
-    """A small sticky surface on which two spots unite, pressed and pulled off."""
-    return icha.simulate(*small(), Path([5e-2], unload=True))
-
-
-def small():
-    spectrum = icha.SelfAffineSpectrum(100e-6, 50e-6, 20e-6, 0.8, rms_slope=0.2)
-    return spectrum.realise(32, 1), Material(0.24e6, 2e-3, 2e-9)
 
 
 def test_the_log_of_events_agrees_with_the_counts():

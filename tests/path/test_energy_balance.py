@@ -5,11 +5,9 @@ Asperities as in the tests of unloading: of radius 1 in units in which modulus a
 
 from functools import cache
 
-import icha.path.path
 import numpy as np
 import pytest
-from scipy.optimize import brentq
-from test_unloading import (
+from few_asperities import (
     BARE,
     FAR,
     HEIGHT,
@@ -35,10 +33,13 @@ from test_unloading import (
     travelled,
     united_run,
 )
+from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
 from icha.contact.events import JUMP_IN, JUMP_OFF
+from icha.path import resolution
+from icha.path.limits import DEFAULT_STEP
 
 LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
 
@@ -276,9 +277,9 @@ def test_the_step_does_not_matter(until, monkeypatch):
     path = {"unload": True, "united_until": until}
     coarse = united_run() if until == "detachment" else icha.simulate(*small(), Path([5e-2], **path))
     assert int(coarse.coalescence_count[-1]) > 0
-    for name in ("_UNRESOLVED_LOSS", "_UNRESOLVED_WORK", "_UNITING_STEP"):
-        monkeypatch.setattr(icha.path.path, name, 0.5 * getattr(icha.path.path, name))
-    fine = icha.simulate(*small(), Path([5e-2], max_step=0.5 * icha.path.path.DEFAULT_STEP, **path))
+    for name in ("UNRESOLVED_LOSS", "UNRESOLVED_WORK", "UNITING_STEP"):
+        monkeypatch.setattr(resolution, name, 0.5 * getattr(resolution, name))
+    fine = icha.simulate(*small(), Path([5e-2], max_step=0.5 * DEFAULT_STEP, **path))
     assert fine.sizes["step"] > coarse.sizes["step"]
     for name in ("pull_off_pressure", "hysteresis_loss"):
         assert float(fine[name]) == pytest.approx(float(coarse[name]), rel=0.01), name
