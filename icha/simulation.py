@@ -12,10 +12,12 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
-from icha.contact.events import EVENT_KINDS, Events
+from icha.contact.events import Events
 from icha.contact.failures import NotConverged
 from icha.datasets.attributes import COMPUTED, discovery
-from icha.datasets.bins import bin_table, bin_values, with_bounds
+from icha.datasets.bins import bin_values
+from icha.datasets.build import build, described
+from icha.datasets.variables.run import CYCLE, LOOP, RUN
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
@@ -41,168 +43,6 @@ REFERENCES = (
     "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303; "
     "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
 )
-
-# name: (dimensions, units, long name)
-VARIABLES = {
-    "mean_separation": (
-        ("step",),
-        "m",
-        "mean separation of the surfaces; of a free square that of its mean plane and the half-space far away",
-    ),
-    "mean_gap": (
-        ("step",),
-        "m",
-        "mean gap over the nominal area; of a periodic surface the mean separation, of a free square less or more by "
-        "what the half-space is displaced there",
-    ),
-    "nominal_pressure": (("step",), "Pa", "force over nominal area"),
-    "contact_area_fraction": (("step",), "1", "real over nominal contact area, A/A0"),
-    "spot_count": (("step",), "1", "number of contact spots"),
-    "contact_stiffness": (("step",), "Pa m^-1", "contact stiffness, -dp/du of the present spots"),
-    "residual": (("step",), "1", "largest equilibrium error over h_rms"),
-    "converged": (("step",), "1", "1 where the equilibrium converged"),
-    "leg": (("step",), "1", "leg of the path: 0 the first loading, odd unloading, even loading again"),
-    "reduced_pressure": (("step",), "1", "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"),
-    "reduced_separation": (("step",), "1", "mean separation over rms height"),
-    "step_kind": (("step",), "1", "quantity that this step was asked to reach"),
-    "step_target": (
-        ("step",),
-        "1",
-        "value asked for, in the SI unit of its kind (m for mean_separation, else 1)",
-    ),
-    "jump_in_count": (("step",), "1", "contacts formed so far"),
-    "jump_off_count": (("step",), "1", "contacts broken so far"),
-    "coalescence_count": (("step",), "1", "unions of two spots so far"),
-    "split_count": (
-        ("step",),
-        "1",
-        "united spots so far that let go and left asperities in contact",
-    ),
-    "pending_count": (
-        ("step",),
-        "1",
-        "asperities past jump-in left free after breaking contact at the same step",
-    ),
-    "outside_wu_fraction": (("step",), "1", "fraction of single-asperity spots outside 2 <= mu <= 5"),
-    "snapshot_step": (("snapshot",), "1", "step of the snapshot"),
-    "snapshot_kind": (("snapshot",), "1", "quantity that the snapshot was asked to reach"),
-    "snapshot_target": (("snapshot",), "1", "value asked for, in the SI unit of its kind"),
-    "overlap_fraction": (
-        ("snapshot",),
-        "1",
-        "area fraction outside the spots where the computed gap is negative",
-    ),
-    "area_beyond_edges": (
-        ("snapshot",),
-        "1",
-        "part of the nominal area by which spots reach over the edges of a free square; 0 of a periodic surface",
-    ),
-    "gap_density": (("snapshot", "gap_bin"), "m^-1", "probability density of the gap over the nominal area"),
-    "pressure_density": (
-        ("snapshot", "pressure_bin"),
-        "Pa^-1",
-        "probability density of the contact pressure over the nominal area",
-    ),
-    "pressure_bin_mean": (
-        ("snapshot", "pressure_bin"),
-        "Pa",
-        "mean pressure of the area in the bin, 0 where empty",
-    ),
-    **bin_table("gap", "m"),
-    **bin_table("pressure", "Pa"),
-    "spot_snapshot": (("spot",), "1", "snapshot to which the spot belongs"),
-    "spot_x": (("spot",), "m", "x of the spot's centre"),
-    "spot_y": (("spot",), "m", "y of the spot's centre"),
-    "spot_radius": (("spot",), "m", "contact radius"),
-    "spot_force": (("spot",), "N", "contact force, negative in tension"),
-    "spot_curvature_radius": (("spot",), "m", "radius of curvature of the spot's paraboloid"),
-    "spot_members": (("spot",), "1", "number of asperities united in the spot"),
-    "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
-    "interaction_range": ((), "m", "range of the attractive forces"),
-    "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
-    "rms_height": ((), "m", "root mean square height"),
-    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
-    "spectral_moment_0": ((), "m^2", "spectral moment m0 of a profile: variance of its height"),
-    "spectral_moment_2": ((), "1", "spectral moment m2 of a profile: variance of its slope"),
-    "spectral_moment_4": ((), "m^-2", "spectral moment m4 of a profile: variance of its curvature"),
-    "nayak_parameter": ((), "1", "Nayak's parameter m0 m4/m2^2: breadth of the spectrum"),
-    "period": ((), "m", "side of the periodic cell, or of the free square"),
-    "boundary": ((), "1", "what lies beyond the cell: periodic or free"),
-    "grid": ((), "1", "nodes along a side of the cell"),
-    "seed": ((), "1", "seed of the surface; -1 where it has none"),
-    "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
-    "stickiness": ((), "1", "attraction over repulsion after Pastewka and Robbins; above 1 surfaces stick"),
-    "asperity_count": ((), "1", "number of asperities on the surface"),
-    "control": ((), "1", "what is imposed: separation or load"),
-    "united_until": ((), "1", "until when united spots stay united on the way back: detachment or overlap"),
-}
-
-# Those of a path that goes on after the first loading ...
-CYCLE_VARIABLES = {
-    "work": (
-        ("step",),
-        "J m^-2",
-        "work done on the contact since first contact, -(integral of p du), "
-        "cubic between steps, by pressure and contact stiffness, and at constant pressure in a jump under load control",
-    ),
-    "stored_energy": (("step",), "J m^-2", "elastic energy less that of adhesion, 0 out of contact"),
-    "dissipated_by_jump_in": (("step",), "J m^-2", "energy lost so far as contacts formed"),
-    "dissipated_by_jump_off": (("step",), "J m^-2", "energy lost so far as contacts broke"),
-    "dissipated_by_coalescence": (("step",), "J m^-2", "energy lost so far as spots united or unions were undone"),
-    "dissipated_by_load_jump": (
-        ("step",),
-        "J m^-2",
-        "energy lost so far in jumps at constant load, under load control",
-    ),
-    "event_kind": (("event",), "1", "kind of the event"),
-    "event_step": (("event",), "1", "step at which the event is first seen"),
-    "event_separation": (("event",), "m", "mean separation of that step"),
-    "event_x": (("event",), "m", "x of the centre of the spot concerned"),
-    "event_y": (("event",), "m", "y of the centre of the spot concerned"),
-    "event_members": (("event",), "1", "number of asperities in the spot concerned"),
-}
-# ... and of one that ends in separation.
-LOOP_VARIABLES = {
-    "pull_off_pressure": ((), "Pa", "largest tension on the last unloading"),
-    "pull_off_separation": ((), "m", "mean separation at the largest tension"),
-    "pull_off_over_strength": (
-        (),
-        "1",
-        "largest tension over the strength of the interface, 16 dgamma/(9 sqrt(3) range); 0 without adhesion",
-    ),
-    "pull_off_over_summits": (
-        (),
-        "1",
-        "largest tension over that of all asperities pulling their most at once, 3/2 pi dgamma sum(R)/A0; "
-        "0 without adhesion",
-    ),
-    "detachment_pressure": ((), "Pa", "nominal pressure just before the last contact breaks"),
-    "detachment_separation": ((), "m", "mean separation just before the last contact breaks"),
-    "hysteresis_loss": ((), "J m^-2", "work lost from first contact to separation, integral of p du around the path"),
-    "hysteresis_loss_over_surface_energy": (
-        (),
-        "1",
-        "work lost over the energy of adhesion; 0 without adhesion",
-    ),
-    "loss_by_jump_in": ((), "J m^-2", "part of the loss in jumps into contact"),
-    "loss_by_jump_off": ((), "J m^-2", "part of the loss in jumps out of contact"),
-    "loss_by_coalescence": ((), "J m^-2", "part of the loss in unions of spots and their undoing"),
-    "loss_by_load_jump": ((), "J m^-2", "part of the loss in jumps at constant load, under load control"),
-    "loss_unattributed": (
-        (),
-        "J m^-2",
-        "part of the loss without an event: non-reciprocal interaction and integration",
-    ),
-    "largest_contact_area_fraction": ((), "1", "largest A/A0 on the path"),
-    "largest_reduced_pressure": ((), "1", "largest reduced pressure on the path"),
-}
-
-
-# Spots and events are kept one after the other, and these say to which snapshot or step each belongs: the indexed
-# ragged arrays of CF 1.11, section 9.3.4. Its feature types, all of a time or a place on earth, are not claimed.
-INDEXED = {"spot_snapshot": "snapshot", "event_step": "step"}
-_RAGGED = "index of a ragged array: positions along instance_dimension, from 0"
 
 
 class ConvergenceError(RuntimeError):
@@ -296,7 +136,7 @@ def simulate(
             failure = f"the path ends {error}"
         dataset = _dataset(surface, material, contact, steps, snapshots, seed, path, events)
         if failure is None and path.unload:
-            dataset = dataset.assign(_described(LOOP_VARIABLES, _loop(contact, steps, pulled[0])))
+            dataset = dataset.assign(described(LOOP, _loop(contact, steps, pulled[0])))
     if failure is not None:
         raise ConvergenceError(failure, dataset.assign_attrs(incomplete=failure)) from None
     return dataset
@@ -322,7 +162,7 @@ def _step(contact, waypoint, unit):
         "spot_count": len(spots),
         "contact_stiffness": contact.stiffness(state),
         "residual": state.residual,
-        "converged": np.int8(1),
+        "converged": 1,
         "branch": "loading" if waypoint.loading else "unloading",
         "leg": waypoint.leg,
         "reduced_pressure": pressure / unit,
@@ -404,39 +244,6 @@ def _snapshot(law, surface, target, state, step):
     }
 
 
-_INTEGERS = {
-    "leg",
-    "split_count",
-    "event_step",
-    "event_members",
-    "spot_count",
-    "jump_in_count",
-    "jump_off_count",
-    "coalescence_count",
-    "pending_count",
-    "snapshot_step",
-    "spot_snapshot",
-    "spot_members",
-}
-_STRINGS = {"step_kind", "snapshot_kind"}
-
-
-def _dtype(name):
-    if name in _STRINGS:
-        return object
-    if name in ("converged", "event_kind"):
-        return np.int8
-    return np.int64 if name in _INTEGERS else np.float64
-
-
-def _described(variables, values):
-    """Variables of a dataset with their dimensions, units and long names."""
-    return {
-        name: (dims, values[name], {"units": units, "long_name": long_name})
-        for name, (dims, units, long_name) in variables.items()
-    }
-
-
 def _event_columns(steps, events):
     """The events of all steps, one after the other."""
     counts = [len(each) for each in events]
@@ -449,6 +256,20 @@ def _event_columns(steps, events):
         "event_y": joined.position[:, 1],
         "event_members": joined.members,
     }
+
+
+def _snapshot_columns(snapshots):
+    """What belongs to snapshots, and the spots of all, one after the other."""
+    counts = [len(snapshot["spot_x"]) for snapshot in snapshots]
+    sizes = {"snapshot": len(snapshots), "gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
+    columns = {"spot_snapshot": np.repeat(np.arange(len(snapshots)), counts)}
+    for name, (dims, *_) in RUN.items():
+        if dims == ("spot",) and name != "spot_snapshot":
+            columns[name] = np.concatenate([np.empty(0), *(snapshot[name] for snapshot in snapshots)])
+        elif dims[:1] == ("snapshot",) and name != "snapshot":
+            rows = np.array([snapshot[name] for snapshot in snapshots])
+            columns[name] = rows.reshape([sizes[dim] for dim in dims])
+    return columns
 
 
 def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
@@ -477,41 +298,13 @@ def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
         "control": path.control,
         "united_until": path.united_until,
     }
-    wanted = VARIABLES | (CYCLE_VARIABLES if path.cyclic else {})
+    values["step"], values["snapshot"] = np.arange(len(steps)), np.arange(len(snapshots))
+    values |= {name: [step[name] for step in steps] for name in RUN if RUN[name].dims == ("step",) and name != "step"}
     if path.cyclic:
-        values |= _event_columns(steps, events)
-    bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
-    for name, (dims, _, _) in wanted.items():
-        if name in values:
-            if dims == ("event",):
-                values[name] = np.asarray(values[name], _dtype(name))
-            continue
-        if dims == ("spot",):
-            rows = [
-                np.full(len(s["spot_x"]), k) if name == "spot_snapshot" else s[name] for k, s in enumerate(snapshots)
-            ]
-            values[name] = np.concatenate(rows).astype(_dtype(name)) if rows else np.empty(0, _dtype(name))
-            continue
-        rows = [row[name] for row in (steps if dims[0] == "step" else snapshots)]
-        shape = (len(rows), *(bins[d] for d in dims[1:]))
-        values[name] = np.array(rows, dtype=_dtype(name)).reshape(shape)
-    variables = _described(wanted, values)
-    if path.cyclic:
-        kinds = {"flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8), "flag_meanings": " ".join(EVENT_KINDS)}
-        variables["event_kind"][2].update(kinds)
-    for name, dim in INDEXED.items():
-        if name in variables:
-            variables[name][2].update(instance_dimension=dim, comment=_RAGGED)
+        of_steps = [name for name in CYCLE if CYCLE[name].dims == ("step",)]
+        values |= {name: [step[name] for step in steps] for name in of_steps} | _event_columns(steps, events)
+    values |= _snapshot_columns(snapshots)
     adhesion = "with" if material.surface_energy > 0 else "without"
-    coordinates = {
-        "step": ("step", np.arange(len(steps)), {"units": "1", "long_name": "equilibrium along the path"}),
-        "branch": (
-            "step",
-            np.array([step["branch"] for step in steps], dtype=object),
-            {"units": "1", "long_name": "branch of the path: loading or unloading"},
-        ),
-        "snapshot": ("snapshot", np.arange(len(snapshots)), {"units": "1", "long_name": "snapshot"}),
-    }
     attrs = discovery(
         f"Rough contact {adhesion} adhesion, ICHA model",
         f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "
@@ -521,4 +314,4 @@ def _dataset(surface, material, contact, steps, snapshots, seed, path, events):
         references=REFERENCES,
     )
     of_campaign = dict.fromkeys(("campaign", "study", "config_sha256", "license"), "")
-    return with_bounds(xr.Dataset(variables, coordinates, attrs | of_campaign))
+    return build(RUN | CYCLE, values, attrs | of_campaign)

@@ -56,27 +56,27 @@ def _command(name, command):
 
 def run_variables() -> str:
     """The variables of a run's file: of every run, of one that turns back, of one that ends in separation."""
-    from icha.simulation import CYCLE_VARIABLES, LOOP_VARIABLES, VARIABLES
+    from icha.datasets.variables.run import CYCLE, LOOP, RUN
 
     sections = {
-        "Of every run": VARIABLES,
-        "Of a run that turns back": CYCLE_VARIABLES,
-        "Of a run that ends in separation": LOOP_VARIABLES,
+        "Of every run": RUN,
+        "Of a run that turns back": CYCLE,
+        "Of a run that ends in separation": LOOP,
     }
     return "\n".join(f"### {heading}\n\n{_table(_rows(variables))}" for heading, variables in sections.items())
 
 
 def campaign_variables() -> str:
     """The variables that a campaign dataset has beside those of its runs, and what each depends on."""
-    from icha.simulation import CYCLE_VARIABLES, LOOP_VARIABLES, VARIABLES
+    from icha.datasets.variables.run import CYCLE, LOOP, RUN
 
     study = _small_campaign()["study"].to_dataset()
-    of_runs = VARIABLES | CYCLE_VARIABLES | LOOP_VARIABLES
+    of_runs = RUN | CYCLE | LOOP
     own = {name: variable for name, variable in study.variables.items() if name not in of_runs}
     shared = {
-        name: ", ".join(dim for dim in study[name].dims if dim not in of_runs[name][0]) or "nothing"
+        name: ", ".join(dim for dim in study[name].dims if dim not in of_runs[name].dims) or "nothing"
         for name in of_runs
-        if name in study and not {"spot", "event"} & set(study[name].dims)
+        if name in study and name not in study.dims and not {"spot", "event"} & set(study[name].dims)
     }
     everything = {"surface, seed, rms_slope, material"}
     fewer = {}
@@ -107,9 +107,10 @@ def surface_variables() -> str:
 
 def model_error_variables() -> str:
     """The variables of the comparison with boundary elements."""
-    from icha.analysis.model_error import AXES, VARIABLES
+    from icha.analysis.model_error import AXES
+    from icha.datasets.variables.model_error import MODEL_ERROR
 
-    return _table((name, (*AXES, *dims), units, text) for name, (dims, units, text) in VARIABLES.items())
+    return _table(_rows({name: own._replace(dims=(*AXES, *own.dims)) for name, own in MODEL_ERROR.items()}))
 
 
 def theory_variables() -> str:
@@ -143,7 +144,7 @@ def _small_campaign():
 
 
 def _rows(variables):
-    return ((name, dims, units, text) for name, (dims, units, text) in variables.items())
+    return ((name, own.dims, own.units, own.long_name) for name, own in variables.items())
 
 
 def _rows_of(variables):

@@ -13,10 +13,13 @@ from scipy.stats import wasserstein_distance
 
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.attributes import DERIVED, collected
-from icha.datasets.bins import bin_table, bin_values, with_bounds
+from icha.datasets.bins import bin_values
+from icha.datasets.build import described, variable
 from icha.datasets.campaign import LABELS, RAGGED, find_snapshot, select_run, spots_of
 from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, status_variable
 from icha.datasets.labels import RunLabels, SolutionLabels
+from icha.datasets.variables.model_error import ASKED, BINS, MODEL_ERROR
+from icha.datasets.variables.terms import MATERIAL, Variable
 from icha.equilibrium.distributions import nodes_in_discs
 from icha.path.targets import REDUCED_PRESSURE
 
@@ -36,61 +39,6 @@ SHARED = (
 )
 _ROUNDING = 1e-6
 
-# name: (further dimensions, units, long name)
-VARIABLES = {
-    "contact_area_fraction": ((), "1", "real over nominal contact area, A/A0, of the model"),
-    "contact_area_fraction_boundary_elements": (
-        (),
-        "1",
-        "real over nominal contact area, A/A0, of boundary elements, corrected by the contact's perimeter",
-    ),
-    "contact_area_fraction_raw": ((), "1", "fraction of the boundary elements' nodes in contact"),
-    "perimeter_correction": (
-        (),
-        "1",
-        "fraction of the nodes in contact over the area corrected by the contact's perimeter, less 1",
-    ),
-    "energetic_area_fraction": (
-        (),
-        "1",
-        "energy of adhesion of boundary elements over that of full contact; the raw area without adhesion",
-    ),
-    "reduced_separation": ((), "1", "mean separation over rms height, of the model"),
-    "reduced_separation_boundary_elements": ((), "1", "mean separation over rms height, of boundary elements"),
-    "area_error": ((), "1", "contact area of the model over that of boundary elements, less 1"),
-    "energetic_area_error": (
-        (),
-        "1",
-        "contact area of the model over the energetic area of boundary elements, less 1; area_error without adhesion",
-    ),
-    "separation_error": ((), "1", "mean separation of the model over that of boundary elements, less 1"),
-    "gap_distribution_distance": (
-        (),
-        "1",
-        "first Wasserstein distance between the distributions of the gap over the nominal area, over rms height; "
-        "contact, and what overlaps in the model, has gap 0",
-    ),
-    "pressure_distribution_distance": (
-        (),
-        "1",
-        "first Wasserstein distance between the distributions of the contact pressure over the nominal area, over the "
-        "nominal pressure",
-    ),
-    "jaccard": ((), "1", "area in contact in both over area in contact in either"),
-    "shared_of_icha": ((), "1", "area in contact in both over area in contact in the model"),
-    "shared_of_boundary_elements": ((), "1", "area in contact in both over area in contact in boundary elements"),
-    "load_error": ((), "1", "nominal pressure of boundary elements over the one asked for, less 1"),
-    "residual": ((), "1", "error of the boundary elements' solver: its criterion of convergence"),
-    "solution_grid": ((), "1", "boundary elements along a side"),
-    "gap_density": (("gap_bin",), "1", "P(u) h_rms of boundary elements, over the nominal area"),
-    "pressure_density": (
-        ("pressure_bin",),
-        "1",
-        "P(p) E* h'rms of boundary elements in contact, over the nominal area",
-    ),
-}
-_BINS = bin_table("gap", "1", "rms height") | bin_table("pressure", "1", "contact modulus and rms slope")
-_INTEGERS = {"solution_grid"}
 # Of these, mean and deviation over the seeds.
 SUMMARISED = (
     "area_error",
@@ -120,10 +68,10 @@ def model_error(
     Returns
     -------
     DataTree with a group for every entry, along surface, seed, rms_slope, material and reduced_pressure (the one
-    asked for): the variables of `VARIABLES`; for those of `SUMMARISED` the mean over the seeds, `<name>_mean`, and from
-    two seeds on their standard deviation, `<name>_deviation`; modulus, energy, range and Tabor parameter of the runs.
-    `status(surface, seed, rms_slope, material)` says which of these combinations have solutions beside a complete run;
-    elsewhere values are missing, and do not count.
+    asked for): those of `icha.datasets.variables.model_error`; for those of `SUMMARISED` the mean over the seeds,
+    `<name>_mean`, and from two seeds on their standard deviation, `<name>_deviation`; modulus, energy, range and Tabor
+    parameter of the runs. `status(surface, seed, rms_slope, material)` says which of these combinations have solutions
+    beside a complete run; elsewhere values are missing, and do not count.
 
     Raises
     ------
@@ -165,7 +113,7 @@ def model_error(
 
 
 def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
-    """The variables of `VARIABLES` for one snapshot of a run and the boundary-element solution of the same state.
+    """The variables of `MODEL_ERROR` for one snapshot of a run and the boundary-element solution of the same state.
 
     Raises
     ------
@@ -317,10 +265,7 @@ def _entry_dataset(campaign, entry, states):
     if len(studies) > 1:
         raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")
     study = campaign[studies[0]].to_dataset()
-    asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
-    axes = {label: [value for value in study[label].values.tolist() if value in asked[label]] for label in LABELS}
-    axes["rms_slope"] = sorted(asked["rms_slope"])
-    axes["reduced_pressure"] = sorted(asked["reduced_pressure"])
+    axes = _axes(study, states)
     grid = [SolutionLabels(entry, studies[0], *values) for values in itertools.product(*axes.values())]
     contacts = {labels.run for labels in states}
     if missing := [labels for labels in grid if labels.run in contacts and labels not in states]:
@@ -331,46 +276,64 @@ def _entry_dataset(campaign, entry, states):
         label: xr.Variable(label, np.array(axes[label], dtype=study[label].dtype), study[label].attrs)
         for label in LABELS
     }
-    coords["reduced_pressure"] = _variable(
-        ("reduced_pressure",), axes["reduced_pressure"], "1", "reduced pressure asked for, p/(E* h'rms)"
-    )
+    coords["reduced_pressure"] = variable(ASKED, axes["reduced_pressure"])
     of_contact = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
-    status = np.array(of_contact, np.int8).reshape(shape)[..., 0]
-    variables = {"status": status_variable(LABELS, status)}
-    bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
-    for name, (dims, units, long_name) in VARIABLES.items():
-        unknown = np.full([bins[dim] for dim in dims], np.nan)
-        values = np.array([unknown if states.get(labels) is None else states[labels][name] for labels in grid])
-        variables[name] = _variable(AXES + dims, values.reshape(shape + values.shape[1:]), units, long_name)
-        if name in _INTEGERS and values.dtype.kind == "f":
-            variables[name].encoding["dtype"] = np.dtype("int32")
-    seeds = AXES.index("seed")
-    others = tuple(axis for axis in AXES if axis != "seed")
-    for name in SUMMARISED:
-        values, long_name = variables[name].values, VARIABLES[name][2]
-        # Of no complete run there is no mean.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)
-            mean = np.nanmean(values, axis=seeds)
-            deviation = np.nanstd(values, axis=seeds, ddof=1) if len(axes["seed"]) > 1 else None
-        variables[f"{name}_mean"] = _variable(others, mean, "1", f"mean over the seeds: {long_name}")
-        if deviation is not None:
-            described = f"standard deviation over the seeds: {long_name}"
-            variables[f"{name}_deviation"] = _variable(others, deviation, "1", described)
-            variables[f"{name}_deviation"].attrs["missing"] = "where fewer than two runs are complete"
-    edges = bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS)
-    variables |= {name: _variable(dims, edges[name], units, text) for name, (dims, units, text) in _BINS.items()}
-    result = with_bounds(xr.Dataset(variables, coords, {"entry": entry, "study": studies[0]}))
+    variables = {"status": status_variable(LABELS, np.array(of_contact).reshape(shape)[..., 0])}
+    variables |= _along_axes([states.get(labels) for labels in grid], shape)
+    variables |= _over_seeds(variables)
+    bins = described(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
+    coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
+    result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
     own = study.sel(surface=axes["surface"], seed=axes["seed"], material=axes["material"])
     own = own.sel(rms_slope=axes["rms_slope"], method="nearest").assign_coords(rms_slope=result["rms_slope"])
-    for name in ("contact_modulus", "surface_energy", "interaction_range", "tabor_parameter"):
+    for name in (*MATERIAL, "tabor_parameter"):
         result[name] = own[name]
     return result
 
 
+def _axes(study, states):
+    """Values of `AXES` that an entry asks for."""
+    asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
+    axes = {label: [value for value in study[label].values.tolist() if value in asked[label]] for label in LABELS}
+    return axes | {axis: sorted(asked[axis]) for axis in ("rms_slope", "reduced_pressure")}
+
+
+def _along_axes(states, shape):
+    """The variables of all states, missing where there is none, as arrays of a shape along `AXES`."""
+    bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
+    variables = {}
+    for name, description in MODEL_ERROR.items():
+        unknown = np.full([bins[dim] for dim in description.dims], np.nan)
+        values = np.array([unknown if state is None else state[name] for state in states])
+        values = values.reshape(shape + values.shape[1:])
+        variables[name] = xr.Variable(AXES + description.dims, values, description.attributes)
+        if description.dtype is int and values.dtype.kind == "f":
+            variables[name].encoding["dtype"] = np.dtype("int32")
+    return variables
+
+
+def _over_seeds(variables):
+    """Mean and standard deviation over the seeds of what is summarised."""
+    seeds = AXES.index("seed")
+    others = tuple(axis for axis in AXES if axis != "seed")
+    found = {}
+    for name in SUMMARISED:
+        values, long_name = variables[name].values, MODEL_ERROR[name].long_name
+        mean = Variable(others, "1", f"mean over the seeds: {long_name}")
+        # Of no complete run there is no mean.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            found[f"{name}_mean"] = variable(mean, np.nanmean(values, axis=seeds))
+            if values.shape[seeds] > 1:
+                deviation = Variable(
+                    others,
+                    "1",
+                    f"standard deviation over the seeds: {long_name}",
+                    further={"missing": "where fewer than two runs are complete"},
+                )
+                found[f"{name}_deviation"] = variable(deviation, np.nanstd(values, axis=seeds, ddof=1))
+    return found
+
+
 def _status(state):
     return INCOMPLETE if state is None else COMPLETE
-
-
-def _variable(dims, values, units, long_name):
-    return xr.Variable(dims, values, {"units": units, "long_name": long_name})

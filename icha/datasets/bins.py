@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    import xarray as xr
+from icha.datasets.variables.terms import Table, Variable
 
 # Lower and upper edge of a bin, as CF has bounds.
 BOUND = "bound"
 
 
-def bin_table(quantity: str, units: str, over: str = "") -> dict[str, tuple[tuple[str, ...], str, str]]:
-    """Dimensions, units and long names of the variables that say where the bins of a quantity are.
+def bin_table(quantity: str, units: str, over: str = "") -> Table:
+    """Descriptions of the variables that say where the bins of a quantity are.
 
     `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
     bounds (CF 1.11, section 7.1), which have its units and its long name. In Pa it must not be a coordinate
@@ -28,10 +25,11 @@ def bin_table(quantity: str, units: str, over: str = "") -> dict[str, tuple[tupl
     """
     over = f" over {over}" if over else ""
     bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
+    middle = {"bounds": f"{bins}_bounds", "comment": "middle of the bin"}
     return {
-        f"{bins}_edges": ((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
-        f"{bins}_centre": ((bins,), units, inside),
-        f"{bins}_bounds": ((bins, BOUND), units, inside),
+        f"{bins}_edges": Variable((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
+        f"{bins}_centre": Variable((bins,), units, inside, further=middle, coordinate=True),
+        f"{bins}_bounds": Variable((bins, BOUND), units, inside),
     }
 
 
@@ -42,12 +40,3 @@ def bin_values(quantity: str, edges: np.ndarray) -> dict[str, np.ndarray]:
         f"{quantity}_bin_centre": (edges[:-1] + edges[1:]) / 2,
         f"{quantity}_bin_bounds": np.column_stack([edges[:-1], edges[1:]]),
     }
-
-
-def with_bounds(data: xr.Dataset) -> xr.Dataset:
-    """The dataset whose bin centres are coordinates and name their bounds."""
-    centres = {name: variable for name, variable in data.variables.items() if str(name).endswith("_bin_centre")}
-    for name, variable in centres.items():
-        variable.attrs |= {"bounds": name.replace("_centre", "_bounds"), "comment": "middle of the bin"}
-    # Behind all others, where they are in a dataset that is read.
-    return data.drop_vars(centres).assign_coords(centres)

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from icha.datasets.attributes import INPUT, discovery
-from icha.datasets.bins import BOUND
+from icha.datasets.build import build
 from icha.datasets.netcdf import (
     COMPRESSION,
     FLOAT_FILL,
@@ -28,6 +28,7 @@ from icha.datasets.netcdf import (
     define_text,
     is_text,
 )
+from icha.datasets.variables.surface import SURFACE
 from icha.support.atomic_files import whole_file
 from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, ring_edges, spectral_moments
 from icha.surfaces.surface import PERIODIC, Surface
@@ -241,50 +242,31 @@ def write_surface(
     """
     n = surface.grid
     nodes = np.arange(n) * surface.spacing
-
-    def variable(dims, value, units, long_name):
-        return xr.Variable(dims, value, {"units": units, "long_name": long_name})
-
     moments = spectral_moments(surface)
     wave_number, power = radial_power_spectrum(surface)
     edges = ring_edges(surface)
-    rings = "rad m^-1", "wave number of a ring of wave vectors"
-    variables = {
-        "height": variable(("y", "x"), surface.heights, "m", "height towards the elastic body"),
-        "period": variable((), surface.period, "m", "side of the periodic cell, or of the free square"),
-        "grid": variable((), np.int32(n), "1", "nodes along a side"),
-        "seed": variable((), np.int32(seed), "1", "seed of the random phases"),
-        "rms_slope": variable((), surface.rms_slope, "1", "root mean square slope"),
-        "rms_height": variable((), surface.rms_height, "m", "root mean square height"),
-        "rms_curvature": variable((), surface.rms_curvature, "m^-1", "root mean square curvature of a profile"),
-        "spectral_moment_0": variable((), moments.m0, "m^2", "variance of a profile's height"),
-        "spectral_moment_2": variable((), moments.m2, "1", "variance of a profile's slope"),
-        "spectral_moment_4": variable((), moments.m4, "m^-2", "variance of a profile's curvature"),
-        "nayak_parameter": variable((), moments.nayak_parameter, "1", "Nayak's parameter m0 m4/m2^2"),
-        "psd_wavevector_bounds": variable(("psd_bin", BOUND), np.column_stack([edges[:-1], edges[1:]]), *rings),
-        "power_spectrum": variable(
-            "psd_bin",
-            power,
-            "m^4",
-            "isotropic power spectrum C(q); its integral over the plane is the variance of height",
-        ),
+    values = {
+        "x": nodes,
+        "y": nodes,
+        "psd_wavevector": wave_number,
+        "height": surface.heights,
+        "period": surface.period,
+        "grid": n,
+        "seed": seed,
+        "rms_slope": surface.rms_slope,
+        "rms_height": surface.rms_height,
+        "rms_curvature": surface.rms_curvature,
+        "spectral_moment_0": moments.m0,
+        "spectral_moment_2": moments.m2,
+        "spectral_moment_4": moments.m4,
+        "nayak_parameter": moments.nayak_parameter,
+        "psd_wavevector_bounds": np.column_stack([edges[:-1], edges[1:]]),
+        "power_spectrum": power,
     }
     if spectrum is not None:
-        variables |= {
-            "rolloff_wavelength": variable((), spectrum.rolloff_wavelength, "m", "roll-off wavelength"),
-            "short_wavelength": variable((), spectrum.short_wavelength, "m", "short cut-off wavelength"),
-            "hurst": variable((), spectrum.hurst, "1", "Hurst exponent"),
-        }
+        values |= {name: getattr(spectrum, name) for name in ("rolloff_wavelength", "short_wavelength", "hurst")}
     if measured is not None:
-        variables["measured_rms_slope"] = variable(
-            (), measured.rms_slope, "1", "root mean square slope of the measurement as prepared, before scaling"
-        )
-    coords = {axis: variable((axis,), nodes, "m", f"{axis} of the nodes") for axis in ("x", "y")}
-    coords["psd_wavevector"] = variable("psd_bin", wave_number, *rings)
-    coords["psd_wavevector"].attrs |= {
-        "bounds": "psd_wavevector_bounds",
-        "comment": "mean over the ring's wave vectors",
-    }
+        values["measured_rms_slope"] = measured.rms_slope
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
     if measured is not None:
         kind = "Measured topography"
@@ -293,14 +275,14 @@ def write_surface(
             "source_sha256": measured.source_sha256,
             "preparation": measured.description,
         }
-    described = discovery(
+    attributes = discovery(
         f"Topography {name}, seed {seed}",
         f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
         INPUT,
         keywords=["topography"],
     )
     origin |= {"surface": name, "boundary": surface.boundary}
-    write_dataset(xr.Dataset(variables, coords, described | origin | dict(attrs)), path)
+    write_dataset(build(SURFACE, values, attributes | origin | dict(attrs)), path)
 
 
 def read_surface(path: str | os.PathLike) -> Surface:

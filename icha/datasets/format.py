@@ -1,7 +1,7 @@
-"""The documented format of the files that users rely on, as data, and what of a file does not keep to it.
+"""The documented format of the files that users rely on, and what of a file does not keep to it.
 
-The tables hold the names that are promised; a file may have more, of which every variable has its units and its long
-name, too. They are not those that the program writes from: a change of the program that breaks the promise is seen.
+Some names of the vocabulary are promised, with their dimensions and units; a file may have more variables, of which
+every one has its units and its long name, too.
 """
 
 from __future__ import annotations
@@ -9,10 +9,14 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+
+from icha.datasets.files import read_campaign, read_dataset
+from icha.datasets.variables import run as variables_of_run
+from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
+from icha.datasets.variables.terms import Variable
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
 
@@ -24,110 +28,48 @@ class UnknownFile(ValueError):
     """A file that is none of those that are documented, or no readable netCDF file at all."""
 
 
-class Promised(NamedTuple):
-    """A variable: its dimensions and units, and which condition of `_there` decides whether it must be there."""
-
-    dims: tuple[str, ...]
-    units: str
-    condition: str = ""
-
-
 # Conditions under which a variable must be there.
-SNAPSHOTS, WAY_BACK, SYNTHESISED, MEASURED = "snapshots", "a way back to separation", "a spectrum", "a measurement"
+ALWAYS, SNAPSHOTS, WAY_BACK = "", "snapshots", "a way back to separation"
+SYNTHESISED, MEASURED = "a spectrum", "a measurement"
 
-RUN_VARIABLES = {
-    "mean_separation": Promised(("step",), "m"),
-    "nominal_pressure": Promised(("step",), "Pa"),
-    "contact_area_fraction": Promised(("step",), "1"),
-    "spot_count": Promised(("step",), "1"),
-    "contact_stiffness": Promised(("step",), "Pa m^-1"),
-    "residual": Promised(("step",), "1"),
-    "converged": Promised(("step",), "1"),
-    "branch": Promised(("step",), "1"),
-    "leg": Promised(("step",), "1"),
-    "reduced_pressure": Promised(("step",), "1"),
-    "reduced_separation": Promised(("step",), "1"),
-    "jump_in_count": Promised(("step",), "1"),
-    "jump_off_count": Promised(("step",), "1"),
-    "coalescence_count": Promised(("step",), "1"),
-    "split_count": Promised(("step",), "1"),
-    "step_kind": Promised(("step",), "1"),
-    "step_target": Promised(("step",), "1"),
-    "snapshot_step": Promised(("snapshot",), "1", SNAPSHOTS),
-    "snapshot_kind": Promised(("snapshot",), "1", SNAPSHOTS),
-    "snapshot_target": Promised(("snapshot",), "1", SNAPSHOTS),
-    "overlap_fraction": Promised(("snapshot",), "1", SNAPSHOTS),
-    "gap_density": Promised(("snapshot", "gap_bin"), "m^-1", SNAPSHOTS),
-    "pressure_density": Promised(("snapshot", "pressure_bin"), "Pa^-1", SNAPSHOTS),
-    "pressure_bin_mean": Promised(("snapshot", "pressure_bin"), "Pa", SNAPSHOTS),
-    "gap_bin_edges": Promised(("gap_edge",), "m", SNAPSHOTS),
-    "pressure_bin_edges": Promised(("pressure_edge",), "Pa", SNAPSHOTS),
-    "gap_bin_centre": Promised(("gap_bin",), "m", SNAPSHOTS),
-    "gap_bin_bounds": Promised(("gap_bin", "bound"), "m", SNAPSHOTS),
-    "pressure_bin_centre": Promised(("pressure_bin",), "Pa", SNAPSHOTS),
-    "pressure_bin_bounds": Promised(("pressure_bin", "bound"), "Pa", SNAPSHOTS),
-    "spot_snapshot": Promised(("spot",), "1", SNAPSHOTS),
-    "spot_x": Promised(("spot",), "m", SNAPSHOTS),
-    "spot_y": Promised(("spot",), "m", SNAPSHOTS),
-    "spot_radius": Promised(("spot",), "m", SNAPSHOTS),
-    "spot_force": Promised(("spot",), "N", SNAPSHOTS),
-    "contact_modulus": Promised((), "Pa"),
-    "surface_energy": Promised((), "J m^-2"),
-    "interaction_range": Promised((), "m"),
-    "rms_slope": Promised((), "1"),
-    "rms_height": Promised((), "m"),
-    "period": Promised((), "m"),
-    "seed": Promised((), "1"),
-    "work": Promised(("step",), "J m^-2", WAY_BACK),
-    "stored_energy": Promised(("step",), "J m^-2", WAY_BACK),
-    "dissipated_by_jump_in": Promised(("step",), "J m^-2", WAY_BACK),
-    "dissipated_by_jump_off": Promised(("step",), "J m^-2", WAY_BACK),
-    "dissipated_by_coalescence": Promised(("step",), "J m^-2", WAY_BACK),
-    "dissipated_by_load_jump": Promised(("step",), "J m^-2", WAY_BACK),
-    "pull_off_pressure": Promised((), "Pa", WAY_BACK),
-    "pull_off_separation": Promised((), "m", WAY_BACK),
-    "detachment_pressure": Promised((), "Pa", WAY_BACK),
-    "hysteresis_loss": Promised((), "J m^-2", WAY_BACK),
-    "loss_by_jump_in": Promised((), "J m^-2", WAY_BACK),
-    "loss_by_jump_off": Promised((), "J m^-2", WAY_BACK),
-    "loss_by_coalescence": Promised((), "J m^-2", WAY_BACK),
-    "loss_by_load_jump": Promised((), "J m^-2", WAY_BACK),
-    "loss_unattributed": Promised((), "J m^-2", WAY_BACK),
-    "event_kind": Promised(("event",), "1", WAY_BACK),
-    "event_step": Promised(("event",), "1", WAY_BACK),
-    "event_x": Promised(("event",), "m", WAY_BACK),
-    "event_y": Promised(("event",), "m", WAY_BACK),
-    "event_members": Promised(("event",), "1", WAY_BACK),
+# The names that are promised, by the condition under which a file has them.
+RUN_NAMES = {
+    ALWAYS: (
+        *("mean_separation", "nominal_pressure", "contact_area_fraction", "spot_count", "contact_stiffness"),
+        *("residual", "converged", "branch", "leg", "reduced_pressure", "reduced_separation", "jump_in_count"),
+        *("jump_off_count", "coalescence_count", "split_count", "step_kind", "step_target"),
+        *("contact_modulus", "surface_energy", "interaction_range", "rms_slope", "rms_height", "period", "seed"),
+    ),
+    SNAPSHOTS: (
+        *("snapshot_step", "snapshot_kind", "snapshot_target", "overlap_fraction"),
+        *("gap_density", "pressure_density", "pressure_bin_mean"),
+        *("gap_bin_edges", "gap_bin_centre", "gap_bin_bounds"),
+        *("pressure_bin_edges", "pressure_bin_centre", "pressure_bin_bounds"),
+        *("spot_snapshot", "spot_x", "spot_y", "spot_radius", "spot_force"),
+    ),
+    WAY_BACK: (
+        *("work", "stored_energy", "dissipated_by_jump_in", "dissipated_by_jump_off", "dissipated_by_coalescence"),
+        *("dissipated_by_load_jump", "pull_off_pressure", "pull_off_separation", "detachment_pressure"),
+        *("hysteresis_loss", "loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump"),
+        *("loss_unattributed", "event_kind", "event_step", "event_x", "event_y", "event_members"),
+    ),
 }
-
-SURFACE_VARIABLES = {
-    "height": Promised(("y", "x"), "m"),
-    "x": Promised(("x",), "m"),
-    "y": Promised(("y",), "m"),
-    "period": Promised((), "m"),
-    "grid": Promised((), "1"),
-    "seed": Promised((), "1"),
-    "rms_slope": Promised((), "1"),
-    "rms_height": Promised((), "m"),
-    "rms_curvature": Promised((), "m^-1"),
-    "spectral_moment_0": Promised((), "m^2"),
-    "spectral_moment_2": Promised((), "1"),
-    "spectral_moment_4": Promised((), "m^-2"),
-    "rolloff_wavelength": Promised((), "m", SYNTHESISED),
-    "short_wavelength": Promised((), "m", SYNTHESISED),
-    "hurst": Promised((), "1", SYNTHESISED),
-    "measured_rms_slope": Promised((), "1", MEASURED),
-    "psd_wavevector": Promised(("psd_bin",), "rad m^-1", MEASURED),
-    "psd_wavevector_bounds": Promised(("psd_bin", "bound"), "rad m^-1", MEASURED),
-    "power_spectrum": Promised(("psd_bin",), "m^4", MEASURED),
+SURFACE_NAMES = {
+    ALWAYS: (
+        *("height", "x", "y", "period", "grid", "seed", "rms_slope", "rms_height", "rms_curvature"),
+        *("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"),
+    ),
+    SYNTHESISED: ("rolloff_wavelength", "short_wavelength", "hurst"),
+    MEASURED: ("measured_rms_slope", "psd_wavevector", "psd_wavevector_bounds", "power_spectrum"),
 }
+_OF_RUN = variables_of_run.RUN | variables_of_run.CYCLE | variables_of_run.LOOP
 
 # Dimensions of every variable of a run in a study of a campaign dataset: those of the run are added.
 DESIGN = ("surface", "seed", "rms_slope", "material")
-STUDY_VARIABLES = {name: Promised(DESIGN, "1") for name in ("status", "step_count", "failure")} | {
-    name: promised._replace(dims=(*DESIGN, *promised.dims))
-    for name, promised in RUN_VARIABLES.items()
-    if promised.dims == ("step",) and not promised.condition
+_OF_STUDY = {name: Variable(DESIGN, "1", "") for name in ("status", "step_count", "failure")} | {
+    name: _OF_RUN[name]._replace(dims=(*DESIGN, "step"))
+    for name in RUN_NAMES[ALWAYS]
+    if _OF_RUN[name].dims == ("step",)
 }
 
 # Global attributes. Those of a campaign are written by the workflow, not by `icha.simulate`.
@@ -156,8 +98,6 @@ def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
     UnknownFile
         If it is none of them, or cannot be read.
     """
-    from icha.datasets.files import read_campaign, read_dataset
-
     try:
         tree = read_campaign(path)
         if tree.children:
@@ -193,7 +133,7 @@ def _flaws_of_run(run):
     needed = (*ATTRIBUTES[RUN], *(IN_CAMPAIGN if run.attrs.get("campaign") else ()))
     yield from _flaws_of_attributes(run.attrs, needed)
     there = {SNAPSHOTS: run.sizes.get("snapshot", 0) > 0, WAY_BACK: "hysteresis_loss" in run}
-    missing = list(_flaws_of_variables(run, RUN_VARIABLES, there))
+    missing = list(_flaws_of_variables(run, _OF_RUN, RUN_NAMES, there))
     yield from missing
     yield from _flaws_of_numbers(run)
     if missing:
@@ -237,7 +177,7 @@ def _flaws_of_steps(data, scalars):
 def _flaws_of_surface(surface):
     yield from _flaws_of_attributes(surface.attrs, ATTRIBUTES[SURFACE])
     there = {SYNTHESISED: "hurst" in surface, MEASURED: "source_sha256" in surface.attrs}
-    missing = list(_flaws_of_variables(surface, SURFACE_VARIABLES, there))
+    missing = list(_flaws_of_variables(surface, SURFACE_TABLE, SURFACE_NAMES, there))
     yield from missing
     yield from _flaws_of_numbers(surface)
     boundary = surface.attrs.get("boundary", "periodic")
@@ -255,7 +195,7 @@ def _flaws_of_study(study):
     for dim in (*DESIGN, "step"):
         if dim not in study.dims:
             yield f"dimension {dim} is missing"
-    missing = list(_flaws_of_variables(study, STUDY_VARIABLES, {}))
+    missing = list(_flaws_of_variables(study, _OF_STUDY, {ALWAYS: tuple(_OF_STUDY)}, {}))
     yield from missing
     if missing:
         return
@@ -266,13 +206,13 @@ def _flaws_of_study(study):
         return
     complete = study["status"] == meanings.index("complete")
     wanted = complete & (study["step"] < study["step_count"])
-    for name, promised in STUDY_VARIABLES.items():
-        if "step" in promised.dims and study[name].dtype.kind == "f":
+    for name, description in _OF_STUDY.items():
+        if "step" in description.dims and study[name].dtype.kind == "f":
             gaps = int((wanted & ~np.isfinite(study[name])).sum())
             if gaps:
                 yield f"{name}: {gaps} values of complete runs are not finite"
     # Runs that are not complete may lack any value.
-    numbers = study[[name for name in STUDY_VARIABLES if "step" in study[name].dims and name not in _WORDS]]
+    numbers = study[[name for name in _OF_STUDY if "step" in study[name].dims and name not in _WORDS]]
     yield from _flaws_of_steps(numbers.reset_coords(drop=True).where(complete).assign(branch=study["branch"]), study)
 
 
@@ -293,17 +233,19 @@ def _flaws_of_attributes(attributes, needed, refused=(*_REFUSED_ATTRIBUTES, *_MA
         yield f"attribute Conventions: {conventions!r}; allowed: CF-1.11 or another of CF"
 
 
-def _flaws_of_variables(data, promised, there) -> Iterator[str]:
-    for name, (dims, units, condition) in promised.items():
-        if name not in data.variables:
-            if not condition or there[condition]:
-                yield f"{name} is missing" + (f" in a file with {condition}" if condition else "")
-            continue
-        variable = data[name]
-        if variable.dims != dims:
-            yield f"{name}: has the dimensions ({', '.join(variable.dims)}); allowed: ({', '.join(dims)})"
-        if variable.attrs.get("units") != units:
-            yield f"{name}: has the units {variable.attrs.get('units')!r}; allowed: {units!r}"
+def _flaws_of_variables(data, table, names, there) -> Iterator[str]:
+    """Of promised names by the condition under which they must be there, and of all that a file has."""
+    for condition, promised in names.items():
+        for name in promised:
+            if name not in data.variables:
+                if condition == ALWAYS or there[condition]:
+                    yield f"{name} is missing" + (f" in a file with {condition}" if condition else "")
+                continue
+            variable, (dims, units, *_) = data[name], table[name]
+            if variable.dims != dims:
+                yield f"{name}: has the dimensions ({', '.join(variable.dims)}); allowed: ({', '.join(dims)})"
+            if variable.attrs.get("units") != units:
+                yield f"{name}: has the units {variable.attrs.get('units')!r}; allowed: {units!r}"
     for name, variable in data.variables.items():
         for attribute in ("units", "long_name"):
             if attribute not in variable.attrs:

@@ -30,7 +30,9 @@ from icha.asperity.cohesive_zone import longest_spacing, resolution_problem, str
 from icha.asperity.material import Material
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
-from icha.datasets.bins import bin_table, bin_values, with_bounds
+from icha.datasets.bins import bin_values
+from icha.datasets.build import build
+from icha.datasets.variables.boundary_elements import SOLUTION
 from icha.support.validation import integer, positive
 from icha.surfaces.surface import Surface
 
@@ -53,48 +55,6 @@ REFERENCES = (
     "V. A. Yastrebov, G. Anciaux and J.-F. Molinari, Tribol. Int. 114 (2017) 161-171, "
     "doi:10.1016/j.triboint.2017.04.023"
 )
-
-# name: (dimensions, units, long name)
-VARIABLES = {
-    "mean_separation": ((), "m", "mean gap"),
-    "nominal_pressure": ((), "Pa", "mean traction over the nominal area, attraction included"),
-    "reduced_pressure": ((), "1", "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"),
-    "target_reduced_pressure": ((), "1", "reduced pressure asked for"),
-    "load_error": ((), "1", "nominal pressure over the one asked for, less 1"),
-    "reduced_separation": ((), "1", "mean gap over rms height"),
-    "contact_area_fraction": ((), "1", "real over nominal contact area, A/A0, corrected by the contact's perimeter"),
-    "contact_area_fraction_raw": ((), "1", "fraction of the nodes in contact"),
-    "energetic_area_fraction": ((), "1", "energy of adhesion over that of full contact; the raw area without adhesion"),
-    "contact_perimeter": ((), "m", "edges between nodes in contact and out of contact, of one cell of the surface"),
-    "outside_pressure": ((), "Pa", "mean over the nominal area of the traction outside the contact"),
-    "residual": ((), "1", "error of the solver: its criterion of convergence"),
-    "tolerance": ((), "1", "error of the solver at which it was to stop"),
-    "solve_count": ((), "1", "solutions until the load was met"),
-    "refinement": ((), "1", "cells per cell of the surface's grid, along a side"),
-    "grid": ((), "1", "nodes along a side"),
-    "spacing": ((), "m", "distance between nodes"),
-    "longest_spacing": ((), "m", "widest spacing that resolves the cohesive zone; 0 without adhesion"),
-    "strength_number": ((), "1", "sqrt(dgamma dx/E*)/range; 0 without adhesion"),
-    "gap_density": (("gap_bin",), "m^-1", "probability density of the gap out of contact, over the nominal area"),
-    **bin_table("gap", "m"),
-    "pressure_density": (
-        ("pressure_bin",),
-        "Pa^-1",
-        "probability density of the pressure in contact, over the nominal area",
-    ),
-    "pressure_bin_mean": (("pressure_bin",), "Pa", "mean pressure of the area in the bin, 0 where empty"),
-    **bin_table("pressure", "Pa"),
-    "contact": (("y", "x"), "1", "1 where the node is in contact"),
-    "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
-    "interaction_range": ((), "m", "range of the attractive forces"),
-    "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
-    "rms_height": ((), "m", "root mean square height"),
-    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
-    "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
-    "period": ((), "m", "side of the periodic cell"),
-    "seed": ((), "1", "seed of the surface; -1 where it has none"),
-}
 
 
 class NotSolved(RuntimeError):
@@ -173,8 +133,9 @@ def boundary_elements(
 
     Returns
     -------
-    xarray.Dataset of one state (see `VARIABLES`). Densities are over the nominal area: the integral of `gap_density`
-    and the raw area make 1, that of `pressure_density` is the raw area; the bins are those of `icha.simulate`.
+    xarray.Dataset of one state (`icha.datasets.variables.boundary_elements.SOLUTION`). Densities are over the nominal
+    area: the integral of `gap_density` and the raw area make 1, that of `pressure_density` is the raw area; the bins
+    are those of `icha.simulate`.
 
     Raises
     ------
@@ -440,7 +401,10 @@ def _dataset(surface, material, state, target, tolerance, seed):
     if gaps.sum() + count.sum() != nodes:
         raise NotSolved("gaps or pressures lie beyond the bins of their distributions")
     pressure = state.nominal_pressure
+    along = np.arange(fine.grid) * fine.spacing
     values = {
+        "x": along,
+        "y": along,
         "mean_separation": state.mean_separation,
         "nominal_pressure": pressure,
         "reduced_pressure": pressure / unit,
@@ -465,7 +429,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "pressure_density": count / nodes / np.diff(PRESSURE_BINS * unit),
         "pressure_bin_mean": np.divide(load, count, out=np.zeros(len(load)), where=count > 0) * unit,
         **bin_values("pressure", PRESSURE_BINS * unit),
-        "contact": contact.astype(np.int8),
+        "contact": contact,
         "contact_modulus": material.contact_modulus,
         "surface_energy": material.surface_energy,
         "interaction_range": material.interaction_range,
@@ -476,12 +440,6 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "period": surface.period,
         "seed": seed,
     }
-    variables = {
-        name: (dims, values[name], {"units": units, "long_name": long_name})
-        for name, (dims, units, long_name) in VARIABLES.items()
-    }
-    nodes = np.arange(fine.grid) * fine.spacing
-    coordinates = {axis: (axis, nodes, {"units": "m", "long_name": f"{axis} of the nodes"}) for axis in ("x", "y")}
     attrs = discovery(
         f"Rough contact {'with' if adhesive else 'without'} adhesion, boundary elements",
         "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
@@ -490,4 +448,4 @@ def _dataset(surface, material, state, target, tolerance, seed):
         references=REFERENCES,
         keywords=[BOUNDARY_ELEMENTS],
     )
-    return with_bounds(xr.Dataset(variables, coordinates, attrs))
+    return build(SOLUTION, values, attrs)

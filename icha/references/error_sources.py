@@ -44,6 +44,8 @@ from icha.asperity.coalescence import covering_spot
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
+from icha.datasets.build import build
+from icha.datasets.variables.error_sources import ERROR_SOURCES
 from icha.equilibrium.distributions import contact_cover
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import ContactState
@@ -88,38 +90,6 @@ CATEGORIES = {
     "united": "with a united spot",
     "extra": "a spot without a patch",
     "missed": "a patch without a spot",
-}
-
-# name: (dimensions, units, long name)
-VARIABLES = {
-    "contact_area_fraction": (("variant", "reduced_pressure"), "1", "real over nominal contact area, A/A0"),
-    "mean_separation": (("variant", "reduced_pressure"), "m", "mean separation from the surface's own mean plane"),
-    "reduced_separation": (("variant", "reduced_pressure"), "1", "mean separation over rms height"),
-    "spot_count": (("category", "reduced_pressure"), "1", "number of the model's spots"),
-    "patch_count": (("category", "reduced_pressure"), "1", "number of the boundary elements' patches"),
-    "spot_area_fraction": (("category", "reduced_pressure"), "1", "area of the model's spots over the nominal area"),
-    "patch_area_fraction": (("category", "reduced_pressure"), "1", "area of the patches over the nominal area"),
-    "spot_load_share": (("category", "reduced_pressure"), "1", "part of the load that the model's spots carry"),
-    "patch_load_share": (("category", "reduced_pressure"), "1", "part of the load that the patches carry"),
-    "pair_reduced_pressure": (("pair",), "1", "reduced pressure at which a single spot and its patch were found"),
-    "pair_spot_area": (("pair",), "m^2", "area of the spot"),
-    "pair_patch_area": (("pair",), "m^2", "area of the patch"),
-    "pair_spot_force": (("pair",), "N", "force on the spot"),
-    "pair_patch_force": (("pair",), "N", "force on the patch"),
-    "pair_patch_nodes": (("pair",), "1", "boundary elements in the patch"),
-    "pair_curvature_radius": (("pair",), "m", "the summit's radius of curvature"),
-    "pair_fourth_order": (("pair",), "m^-3", "the summit's fourth-order term, bi-Laplacian of the heights over 64"),
-    "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
-    "interaction_range": ((), "m", "range of the attractive forces"),
-    "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
-    "rms_height": ((), "m", "root mean square height"),
-    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
-    "period": ((), "m", "side of the periodic cell"),
-    "grid": ((), "1", "nodes of the surface along a side"),
-    "refinement": ((), "1", "boundary elements per cell of the surface's grid, along a side"),
-    "tolerance": ((), "1", "error of the boundary elements' solver at which it was to stop"),
-    "seed": ((), "1", "seed of the surface; -1 where it has none"),
 }
 
 # Without unions: equilibrium error in h_rms and relative error of the load; relative change of radii of curvature.
@@ -202,9 +172,9 @@ def error_sources(
 
     Returns
     -------
-    xarray.Dataset of `VARIABLES`: areas and separations along (variant, reduced_pressure). Without adhesion also the
-    split along (category, reduced_pressure), whose sums are the total areas and loads of `icha` and
-    `boundary_elements`, and along `pair` every single spot and its patch.
+    xarray.Dataset (`icha.datasets.variables.error_sources`): areas and separations along (variant, reduced_pressure).
+    Without adhesion also the split along (category, reduced_pressure), whose sums are the total areas and loads of
+    `icha` and `boundary_elements`, and along `pair` every single spot and its patch.
 
     Raises
     ------
@@ -615,7 +585,7 @@ def _split(contact, state, truth, fourth):
     area = np.pi * spots.contact_radius**2
     force = law.force(spots.contact_radius, spots.radius_of_curvature)
     load = np.sum(patches.force)
-    split = {name: [] for name, (dims, _, _) in VARIABLES.items() if dims[:1] == ("category",)}
+    split = {name: [] for name, own in ERROR_SOURCES.items() if own.dims == ("category", "reduced_pressure")}
     for category in CATEGORIES:
         own = found.category[found.spot_group] == category
         other = found.category[found.patch_group] == category
@@ -693,6 +663,8 @@ def _dataset(surface, material, pressures, states, parts, seed, solver):
     area = np.array([[state.area for state in states[name]] for name in order])
     separation = np.array([[state.separation for state in states[name]] for name in order])
     values = {
+        "variant": order,
+        "reduced_pressure": pressures,
         "contact_area_fraction": area,
         "mean_separation": separation,
         "reduced_separation": separation / surface.rms_height,
@@ -708,33 +680,12 @@ def _dataset(surface, material, pressures, states, parts, seed, solver):
         **solver,
     }
     if parts is not None:
-        for name, (dims, _, _) in VARIABLES.items():
-            if dims[:1] == ("category",):
-                values[name] = np.array([part[name] for part in parts]).T
-            elif name == "pair_reduced_pressure":
-                counts = [len(part["pair_spot_area"]) for part in parts]
-                values[name] = np.repeat(pressures, counts)
-            elif dims == ("pair",):
-                values[name] = np.concatenate([part[name] for part in parts])
-    variables = {
-        name: (dims, values[name], {"units": units, "long_name": long_name})
-        for name, (dims, units, long_name) in VARIABLES.items()
-        if name in values
-    }
-    coordinates = {
-        "variant": ("variant", order, {"units": "1", "long_name": "what was solved"}),
-        "reduced_pressure": (
-            "reduced_pressure",
-            pressures,
-            {"units": "1", "long_name": "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"},
-        ),
-    }
-    if parts is not None:
-        coordinates["category"] = (
-            "category",
-            list(CATEGORIES),
-            {"units": "1", "long_name": "what spots and patches lie on each other"},
-        )
+        values["category"] = list(CATEGORIES)
+        values["pair_reduced_pressure"] = np.repeat(pressures, [len(part["pair_spot_area"]) for part in parts])
+        for name in parts[0]:
+            of_states = [part[name] for part in parts]
+            along_pairs = ERROR_SOURCES[name].dims == ("pair",)
+            values[name] = np.concatenate(of_states) if along_pairs else np.array(of_states).T
     adhesion = "with" if material.surface_energy > 0 else "without"
     attrs = discovery(
         f"Sources of the error of the ICHA model {adhesion} adhesion",
@@ -744,4 +695,4 @@ def _dataset(surface, material, pressures, states, parts, seed, solver):
         references=REFERENCES,
         keywords=[BOUNDARY_ELEMENTS],
     )
-    return xr.Dataset(variables, coordinates, attrs)
+    return build(ERROR_SOURCES, values, attrs)

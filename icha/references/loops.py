@@ -19,6 +19,8 @@ import xarray as xr
 from icha.asperity.cohesive_zone import longest_spacing, strength_number
 from icha.asperity.material import Material
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
+from icha.datasets.build import build
+from icha.datasets.variables.boundary_elements import LOOP
 from icha.references.boundary_elements import (
     DEFAULT_TOLERANCE,
     REFERENCES,
@@ -43,53 +45,6 @@ _LOAD_TOLERANCE = 1e-3
 _MAX_MEETING = 12
 # A loop that takes more solutions than this does not end.
 _MAX_SOLVES = 5000
-
-# name: (dimensions, units, long name)
-VARIABLES = {
-    "mean_separation": (("step",), "m", "mean gap"),
-    "nominal_pressure": (("step",), "Pa", "mean traction over the nominal area, attraction included"),
-    "reduced_pressure": (("step",), "1", "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"),
-    "reduced_separation": (("step",), "1", "mean gap over rms height"),
-    "contact_area_fraction": (("step",), "1", "area of zero gap over the nominal area, corrected by its perimeter"),
-    "contact_area_fraction_raw": (("step",), "1", "fraction of the nodes in contact"),
-    "energetic_area_fraction": (
-        ("step",),
-        "1",
-        "energy of adhesion over that of full contact; the raw area without adhesion",
-    ),
-    "residual": (("step",), "1", "error of the solver: its criterion of convergence"),
-    "leg": (("step",), "1", "0 on the way down, 1 on the way up"),
-    "work": (("step",), "J m^-2", "work done on the contact so far, minus the integral of pressure over mean gap"),
-    "stored_energy": (("step",), "J m^-2", "elastic energy less that of adhesion, over the nominal area"),
-    "dissipated": (("step",), "J m^-2", "work so far less the change of the stored energy: lost in jumps"),
-    "pull_off_pressure": ((), "Pa", "largest tension on the way up, at least 0"),
-    "pull_off_separation": ((), "m", "mean gap of the largest tension on the way up"),
-    "hysteresis_loss": ((), "J m^-2", "work of the whole loop"),
-    "hysteresis_loss_error": (
-        (),
-        "J m^-2",
-        "estimate of its error, by the trapezoid and by the steps within which pressure jumps",
-    ),
-    "largest_reduced_pressure": ((), "1", "largest nominal pressure over contact modulus and rms slope"),
-    "largest_contact_area_fraction": ((), "1", "largest area of zero gap over the nominal area, corrected"),
-    "separation_step": ((), "1", "largest step of the mean gap over rms height"),
-    "solve_count": ((), "1", "solutions, those included that were replaced by smaller steps"),
-    "tolerance": ((), "1", "error of the solver at which it was to stop"),
-    "refinement": ((), "1", "cells per cell of the surface's grid, along a side"),
-    "grid": ((), "1", "nodes along a side"),
-    "spacing": ((), "m", "distance between nodes"),
-    "longest_spacing": ((), "m", "widest spacing that resolves the cohesive zone; 0 without adhesion"),
-    "strength_number": ((), "1", "sqrt(dgamma dx/E*)/range; 0 without adhesion"),
-    "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
-    "interaction_range": ((), "m", "range of the attractive forces"),
-    "rms_slope": ((), "1", "root mean square slope |grad h| from the spectrum"),
-    "rms_height": ((), "m", "root mean square height"),
-    "rms_curvature": ((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
-    "tabor_parameter": ((), "1", "Tabor parameter with the radius 1/rms_curvature"),
-    "period": ((), "m", "side of the periodic cell"),
-    "seed": ((), "1", "seed of the surface; -1 where it has none"),
-}
 
 
 def boundary_element_loop(
@@ -117,7 +72,8 @@ def boundary_element_loop(
 
     Returns
     -------
-    xarray.Dataset of `VARIABLES`. Both ends of `step` are the same state, apart, and work is counted from the first.
+    xarray.Dataset of `icha.datasets.variables.boundary_elements.LOOP`. Both ends of
+    `step` are the same state, apart, and work is counted from the first.
 
     Raises
     ------
@@ -319,6 +275,7 @@ def _dataset(surface, way, legs, separation_step, seed):
     last = len(legs[0]) + int(np.argmin(pressure[leg == 1]))
     adhesive = material.surface_energy > 0
     values = {
+        "step": np.arange(len(records)),
         "mean_separation": separation,
         "nominal_pressure": pressure,
         "reduced_pressure": pressure / unit,
@@ -354,14 +311,8 @@ def _dataset(surface, way, legs, separation_step, seed):
         "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
         "period": surface.period,
         "seed": seed,
+        "branch": np.array(["loading", "unloading"], dtype=object)[leg],
     }
-    variables = {
-        name: (dims, values[name], {"units": units, "long_name": long_name})
-        for name, (dims, units, long_name) in VARIABLES.items()
-    }
-    branch = np.array(["loading", "unloading"], dtype=object)[leg]
-    named = {"units": "1", "long_name": "loading on the way down, unloading on the way up"}
-    variables["branch"] = ("step", branch, named)
     attrs = discovery(
         f"Rough contact {'with' if adhesive else 'without'} adhesion both ways, boundary elements",
         "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
@@ -370,5 +321,4 @@ def _dataset(surface, way, legs, separation_step, seed):
         references=REFERENCES,
         keywords=[BOUNDARY_ELEMENTS],
     )
-    steps = ("step", np.arange(len(records)), {"units": "1", "long_name": "state of the loop"})
-    return xr.Dataset(variables, {"step": steps}, attrs)
+    return build(LOOP, values, attrs)

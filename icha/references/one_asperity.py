@@ -26,6 +26,8 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import Control
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
+from icha.datasets.build import build
+from icha.datasets.variables.one_asperity import ONE_ASPERITY
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.interaction import displacement_at
 from icha.references.boundary_elements import (
@@ -50,60 +52,6 @@ _LAW = (
     "K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971) 301-313, "
     "doi:10.1098/rspa.1971.0141; D. Tabor, J. Colloid Interface Sci. 58 (1977) 2-13; "
 )
-
-# name: (dimensions, units, long name)
-VARIABLES = {
-    "force_boundary_elements": (("approach",), "N", "force by boundary elements"),
-    "zero_gap_area": (("approach",), "m^2", "area of zero gap by boundary elements, corrected by its perimeter"),
-    "energetic_area": (("approach",), "m^2", "energy of adhesion by boundary elements over the surface energy"),
-    "residual": (("approach",), "1", "error of the boundary elements' solver: its criterion of convergence"),
-    "force_icha": (("approach",), "N", "force by ICHA"),
-    "area_icha": (("approach",), "m^2", "contact area by ICHA"),
-    "area_icha_at_load": (("given_load",), "m^2", "contact area by ICHA at the boundary elements' force"),
-    "approach_icha_at_load": (("given_load",), "m", "approach by ICHA at the boundary elements' force"),
-    "approach_boundary_elements_at_load": (
-        ("given_load",),
-        "m",
-        "approach of the boundary elements' states of these loads",
-    ),
-    "pull_off_force_icha": ((), "N", "largest tension by ICHA, 3/2 pi dgamma R"),
-    "pull_off_force_boundary_elements": ((), "N", "largest tension of the boundary elements' states"),
-    "force_error": (
-        ("approach",),
-        "1",
-        "ICHA's force less the boundary elements', over the larger of the latter and ICHA's pull-off force",
-    ),
-    "zero_gap_area_error": (("approach",), "1", "ICHA's area over that of zero gap, less 1, at the same approach"),
-    "energetic_area_error": (("approach",), "1", "ICHA's area over the energetic one, less 1, at the same approach"),
-    "zero_gap_area_error_at_load": (
-        ("given_load",),
-        "1",
-        "ICHA's area over that of zero gap, less 1, at the same load",
-    ),
-    "energetic_area_error_at_load": (
-        ("given_load",),
-        "1",
-        "ICHA's area over the energetic one, less 1, at the same load",
-    ),
-    "approach_error_at_load": (
-        ("given_load",),
-        "1",
-        "ICHA's approach less the boundary elements' at the same load, over (dgamma^2 R/E*^2)^(1/3), without adhesion "
-        "over the latter",
-    ),
-    "pull_off_error": ((), "1", "ICHA's pull-off force less the boundary elements', over ICHA's"),
-    "tabor_parameter": ((), "1", "Tabor parameter, (dgamma^2 R/E*^2)^(1/3)/range; 0 without adhesion"),
-    "contact_modulus": ((), "Pa", "composite contact modulus E*"),
-    "surface_energy": ((), "J m^-2", "energy of adhesion per area"),
-    "interaction_range": ((), "m", "range of the attractive forces"),
-    "radius_of_curvature": ((), "m", "radius of curvature of the asperity"),
-    "period": ((), "m", "side of the periodic cell"),
-    "grid": ((), "1", "nodes along a side"),
-    "spacing": ((), "m", "distance between nodes"),
-    "strength_number": ((), "1", "sqrt(dgamma dx/E*)/range; 0 without adhesion"),
-    "tolerance": ((), "1", "error of the boundary elements' solver at which it was to stop"),
-}
-
 
 _OF_PULL_OFF = ("pull_off_force_icha", "pull_off_force_boundary_elements", "pull_off_error")
 
@@ -150,9 +98,9 @@ def one_asperity(
 
     Returns
     -------
-    xarray.Dataset of `VARIABLES`: along `approach` both sides at the same approach, the last that of pull-off; along
-    `given_load` the model at the forces that boundary elements have at the approaches asked for, where the model can
-    carry them.
+    xarray.Dataset (`icha.datasets.variables.one_asperity`): along `approach` both sides at the same approach, the last
+    that of pull-off; along `given_load` the model at the forces that boundary elements have at the approaches asked
+    for, where the model can carry them.
 
     Raises
     ------
@@ -197,7 +145,7 @@ def hertz_asperity(
 
     Returns
     -------
-    xarray.Dataset of those `VARIABLES` that have a meaning without adhesion.
+    xarray.Dataset of those variables that have a meaning without adhesion.
 
     Raises
     ------
@@ -284,6 +232,8 @@ def _comparison(
     area_at_load, approach_at_load = np.array([solved for _, *solved in loaded]).reshape(-1, 2).T
     length = np.cbrt(material.adhesion_length**2 * _RADIUS) if adhesive else approach[at]
     values = {
+        "approach": approach,
+        "given_load": force[at],
         "force_boundary_elements": force,
         "zero_gap_area": zero_gap,
         "residual": residual,
@@ -317,15 +267,6 @@ def _comparison(
             "energetic_area_error_at_load": area_at_load / energetic[at] - 1,
             "pull_off_error": (pull_off - tension) / pull_off,
         }
-    variables = {
-        name: (dims, values[name], {"units": units, "long_name": long_name})
-        for name, (dims, units, long_name) in VARIABLES.items()
-        if name in values
-    }
-    coordinates = {
-        "approach": ("approach", approach, {"units": "m", "long_name": "approach of the summit to the mean plane"}),
-        "given_load": ("given_load", force[at], {"units": "N", "long_name": "force by boundary elements, held"}),
-    }
     attrs = discovery(
         f"One asperity {'with' if adhesive else 'without'} adhesion, ICHA and boundary elements",
         "One paraboloid in a periodic cell by the model and by boundary elements, at the same approach and at the same "
@@ -335,4 +276,4 @@ def _comparison(
         references=(_LAW if adhesive else "") + REFERENCES,
         keywords=[BOUNDARY_ELEMENTS],
     )
-    return xr.Dataset(variables, coordinates, attrs)
+    return build(ONE_ASPERITY, values, attrs)
