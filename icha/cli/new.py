@@ -102,7 +102,8 @@ def _measured(path: Path, data: str | None, start: Path) -> tuple[str, str, list
     """Name and section of a measured surface, and what of it is left to fill in."""
     import numpy as np
 
-    from icha.surfaces.measured.topography import Preparation, UnfitTopography, read_scan
+    from icha.surfaces.measured.scan import read_scan
+    from icha.surfaces.measured.settings import Preparation, UnfitTopography
 
     if not path.is_file():
         raise Mistake(f"--measured {path}: no such file")

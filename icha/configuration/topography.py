@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from icha.configuration.values import MAX_GRID
+from icha.support import in_words
 from icha.support.units import PATTERN, conversion_factor, to_si
 from icha.support.values import File, Length, Section, Text, integer, number, quantity
 
@@ -70,9 +71,8 @@ class Crop(Section):
 
     def __repr__(self):
         """How messages call it."""
-        from icha.surfaces.measured.topography import in_words  # slow to import
-
-        return f"a square of {in_words(self.side)} at x = {in_words(self.x)}, y = {in_words(self.y)}"
+        side, x, y = map(in_words.length, (self.side, self.x, self.y))
+        return f"a square of {side} at x = {x}, y = {y}"
 
 
 class MeasuredSurface(Section):
@@ -164,7 +164,7 @@ class MeasuredSurface(Section):
 
     @property
     def preparation(self) -> dict:
-        """What `icha.surfaces.measured.topography.Preparation` takes: everything but kind and path, in SI units."""
+        """What `icha.surfaces.measured.settings.Preparation` takes: everything but kind and path, in SI units."""
         settings = self.model_dump(exclude={"kind", "path"})
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None

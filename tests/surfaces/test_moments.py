@@ -1,4 +1,4 @@
-"""Moments of spectra in closed form and of profiles; when surfaces stick, by Hertz's gap beside a contact."""
+"""Moments of spectra in closed form and of profiles; power spectra; when surfaces stick, by Hertz's gap."""
 
 import math
 
@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.stickiness import stickiness
-from icha.datasets.files import read_spectral_moments, write_surface
-from icha.surfaces.moments import SpectralMoments, spectral_moments
+from icha.datasets.files import read_dataset, read_spectral_moments, write_surface
+from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, spectral_moments
 
 MATERIAL = Material(25e6, 0.05, 2.071e-9)
 
@@ -118,3 +118,47 @@ def test_softness_energy_and_smoothness_make_sticky():
     assert stickiness(moments, Material(12.5e6, 0.05, 2.071e-9)) == pytest.approx(2 * usual)
     assert stickiness(moments, Material(25e6, 0.1, 2.071e-9)) == pytest.approx(2 * usual)
     assert stickiness(moments.scaled_to_rms_slope(0.5), MATERIAL) == pytest.approx(usual * 2 ** (5 / 3))
+
+
+def test_power_spectrum_is_that_of_the_synthesis():
+    """C(q) of every ring: integral over the plane is h_rms^2, and the spectrum that was asked for comes back."""
+    spectrum = SelfAffineSpectrum(1.0, 0.25, 0.02, 0.7)
+    surface = spectrum.realise(256, 9)
+    q, power = radial_power_spectrum(surface)
+    assert np.all(np.diff(q) > 0)
+    inside = (q > 1.05 * 2 * np.pi / 0.25) & (q < 0.95 * 2 * np.pi / 0.02)
+    np.testing.assert_allclose(power[inside], spectrum.psd(q[inside]), rtol=0.03)
+    assert np.all(power[q > 1.1 * 2 * np.pi / 0.02] < 1e-20 * power.max())
+
+
+def test_power_spectrum_of_one_wave_is_where_it_belongs():
+    y, x = np.mgrid[:64, :64] / 64
+    surface = Surface(2.0 * np.cos(2 * np.pi * (6 * x + 8 * y)), 3.0)
+    q, power = radial_power_spectrum(surface)
+    assert q[np.argmax(power)] == pytest.approx(10 * 2 * np.pi / 3.0, rel=0.05)
+
+
+def test_power_spectrum_of_a_free_square_does_not_see_its_edges():
+    """A window keeps the jump at the edges of a cut-out part from drowning the short waves."""
+    spectrum = SelfAffineSpectrum(4.0, 0.5, 0.1, 0.8)
+    whole = spectrum.realise(512, 2)
+    part = Surface(whole.heights[:256, :256], 2.0, boundary="free")
+    q, power = radial_power_spectrum(part)
+    inside = (q > 2 * 2 * np.pi / 0.5) & (q < 0.9 * 2 * np.pi / 0.1)
+    np.testing.assert_allclose(power[inside], spectrum.psd(q[inside]), rtol=0.6)
+    beyond = q > 1.5 * 2 * np.pi / 0.1
+    assert np.max(power[beyond]) < 1e-2 * spectrum.psd(0.95 * 2 * np.pi / 0.1)
+
+
+def test_surface_files_of_all_kinds_have_their_power_spectrum(tmp_path):
+    spectrum = SelfAffineSpectrum(1.0, 0.5, 0.1, 0.8)
+    write_surface(tmp_path / "s.nc", spectrum.realise(64, 1), name="rough", seed=1, spectrum=spectrum)
+    file = read_dataset(tmp_path / "s.nc")
+    assert file.attrs["boundary"] == "periodic" and "source_file" not in file.attrs
+    q, power = file["psd_wavevector"].values, file["power_spectrum"].values
+    assert file["power_spectrum"].attrs["units"] == "m^4" and file["psd_wavevector"].attrs["units"] == "rad m^-1"
+    # The integral over the plane of wave vectors, ring by ring, is the mean square height.
+    low, high = file["psd_wavevector_bounds"].values.T
+    assert np.all((low < q) & (q < high)) and file["psd_wavevector"].attrs["bounds"] == "psd_wavevector_bounds"
+    variance = np.sum(np.pi * (high**2 - low**2) * power)
+    assert variance == pytest.approx(float(file["rms_height"]) ** 2, rel=0.1)

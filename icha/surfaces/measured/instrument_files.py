@@ -1,0 +1,37 @@
+"""Reader of the formats of instruments: whatever SurfaceTopography reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from icha.surfaces.measured.found import Found, chosen_name, metres_of
+from icha.surfaces.measured.settings import Preparation, UnfitTopography
+
+
+def read_instrument(path: Path, how: Preparation) -> Found:
+    """Whatever SurfaceTopography reads. Its arrays have x as first axis."""
+    from SurfaceTopography import open_topography
+    from SurfaceTopography.Exceptions import CannotDetectFileFormat
+
+    try:
+        opened = open_topography(str(path))
+    except CannotDetectFileFormat:  # its message lists what every reader says
+        raise ValueError("none of the formats that SurfaceTopography knows") from None
+    with opened as file:
+        names = [channel.name for channel in file.channels]
+        if how.data is None:
+            channel = file.default_channel
+        else:
+            channel = file.channels[names.index(chosen_name(how.data, names, (), "channel"))]
+        if channel.dim != 2:
+            raise UnfitTopography("data", f"is a line scan; allowed: an areal one, of {', '.join(names)}")
+        said = channel.physical_sizes
+        topography = channel.topography(**({"physical_sizes": (1.0, 1.0)} if said is None else {}))
+        heights = np.ma.filled(np.ma.asarray(topography.heights()).astype(float), np.nan).T
+        unit = None if topography.unit is None else metres_of(topography.unit)
+        sides = None if said is None else tuple(float(side) for side in topography.physical_sizes)
+    if sides is not None and (lateral := how.lateral_unit or unit) is not None:
+        return Found(heights, unit, tuple(side * lateral for side in sides))
+    return Found(heights, unit, coordinates=sides)

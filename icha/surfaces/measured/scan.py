@@ -1,0 +1,115 @@
+"""A scan in metres: what a file of any format says, with units and size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from icha.support import in_words
+from icha.surfaces.measured.array_files import read_hdf5, read_netcdf, read_npy
+from icha.surfaces.measured.fourier_files import read_fourier
+from icha.surfaces.measured.instrument_files import read_instrument
+from icha.surfaces.measured.settings import Preparation, UnfitTopography
+from icha.surfaces.measured.text_files import columns_of_text, read_matrix, read_xyz
+
+# Letters of what a library says about a file that it cannot read.
+_LONGEST_REASON = 160
+
+READERS = {
+    "npy": read_npy,
+    "netcdf": read_netcdf,
+    "matrix": read_matrix,
+    "xyz": read_xyz,
+    "hdf5": read_hdf5,
+    "fourier": read_fourier,
+    "instrument": read_instrument,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """What a file says in metres: heights (ny, nx), nan where missing, first axis y, and the size (x, y) of it all.
+
+    coordinate_unit: metres, where the size follows from coordinates whose unit the file does not tell.
+    """
+
+    heights: np.ndarray
+    size: tuple[float, float]
+    description: str = ""
+    coordinate_unit: float | None = None
+
+    @property
+    def pixel(self) -> tuple[float, float]:
+        """Distance of neighbouring nodes along x and along y, m."""
+        rows, columns = self.heights.shape
+        return self.size[0] / columns, self.size[1] / rows
+
+    @property
+    def remark_on_unit(self) -> str:
+        """What is to be added where a length of the scan is at fault."""
+        if self.coordinate_unit is None:
+            return ""
+        unit = in_words.length(self.coordinate_unit)
+        return f"; the coordinates are taken to be in units of {unit}, see `lateral_unit`"
+
+
+def read_scan(path: Path, how: Preparation) -> Scan:
+    """Read a file of any of the formats; errors as `icha.surfaces.measured.topography.prepared_topography`."""
+    if not path.stat().st_size:
+        raise UnfitTopography("path", "is empty; allowed: a file of heights")
+    name = _format_of(path) if how.format == "auto" else how.format
+    found = _read(path, name, how)
+    unit = how.height_unit or found.unit
+    if unit is None:
+        raise UnfitTopography("height_unit", "is missing, and the file does not say it; allowed: such as 'um'")
+    size, coordinate_unit = how.size or found.size, None
+    if size is None and found.coordinates is not None:
+        coordinate_unit = how.lateral_unit or unit
+        size = tuple(each * coordinate_unit for each in found.coordinates)
+    if size is None:
+        raise UnfitTopography("size", "is missing, and the file does not say it; allowed: a length, such as '90 um'")
+    rows, columns = found.heights.shape
+    said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
+    scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit)
+    if not all(np.isfinite(each) and each > 0 for each in size):
+        raise UnfitTopography(
+            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; allowed: give it here"
+        )
+    return scan
+
+
+def _read(path, name, how):
+    """What the reader of a format finds, if that are heights."""
+    try:
+        found = READERS[name](path, how)
+    except UnfitTopography:
+        raise
+    except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
+        reason = " ".join(str(error).replace(str(path), path.name).split()) or type(error).__name__
+        if len(reason) > _LONGEST_REASON:
+            reason = f"{reason[: _LONGEST_REASON - 1]}…"
+        raise UnfitTopography(
+            "path", f"cannot be read as {name} ({reason}); allowed: a file that is, or another `format`"
+        ) from None
+    heights = found.heights
+    if heights.dtype.kind not in "iuf":
+        raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; allowed: heights")
+    if heights.ndim != 2:
+        raise UnfitTopography("path", f"holds an array of shape {heights.shape}; allowed: rows and columns of heights")
+    if not heights.size:
+        raise UnfitTopography(
+            "path", f"holds an array of shape {heights.shape}, no heights; allowed: a file of heights"
+        )
+    return found
+
+
+def _format_of(path):
+    """The format that a file has by the ending of its name and, if it is text, by its columns."""
+    suffix = path.suffix.lower()
+    known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
+    if suffix in known:
+        return known[suffix]
+    columns = columns_of_text(path)
+    return {None: "instrument", 3: "xyz", 4: "fourier"}.get(columns, "matrix")

@@ -1,0 +1,53 @@
+"""What the numbers of a file mean and how they become a surface, as whoever measured it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+# How edges are treated, beside `periodic` and `free` (`icha.surfaces.surface`); both end in a periodic surface.
+WINDOW, MIRROR = "window", "mirror"
+
+
+class UnfitTopography(ValueError):
+    """A file that is no topography or cannot be prepared as asked; `key`: the setting that is at fault."""
+
+    def __init__(self, key: str, message: str):
+        """Keep the key and the message, which says why and what is allowed."""
+        super().__init__(message)
+        self.key = key
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """What the numbers of a file mean and how they become a surface.
+
+    Parameters
+    ----------
+    format : a name of `READERS`, or "auto".
+    boundary : "periodic", "window", "mirror" or "free".
+    data : name of variable, dataset or channel; None: the only one, or the file's own default.
+    first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
+    height_unit, lateral_unit : metres; None: as the file says, and the lateral one else that of height.
+    size : (x, y) of the whole scan, m; None: as the file says.
+    touches_first : "high" or "low" numbers.
+    missing : "refuse" or "fill".
+    crop : x, y, side (m) of the square; None: the largest, in the middle.
+    detrend : "none", "tilt" or "curvature".
+    taper : of a window, part of the side on which it falls at either edge.
+    grid : nodes along a side of the result; None: as the scan.
+    """
+
+    format: str
+    boundary: str
+    data: str | None = None
+    first_axis: str = "y"
+    height_unit: float | None = None
+    lateral_unit: float | None = None
+    size: tuple[float, float] | None = None
+    touches_first: str = "high"
+    missing: str = "refuse"
+    crop: Mapping[str, float] | None = None
+    detrend: str = "none"
+    taper: float | None = None
+    grid: int | None = None

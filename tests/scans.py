@@ -1,0 +1,37 @@
+"""A small scan, neither square nor symmetric in any way, and what reads and prepares it."""
+
+import numpy as np
+
+from icha.surfaces.measured.scan import read_scan
+from icha.surfaces.measured.settings import Preparation
+
+NM, UM = 1e-9, 1e-6
+# 10 rows along y, 16 columns along x: neither square nor symmetric in any way.
+ROWS, COLUMNS = 10, 16
+HEIGHTS = np.round(np.random.default_rng(3).normal(size=(ROWS, COLUMNS)), 4)
+SIZE = (COLUMNS * 0.25 * UM, ROWS * 0.25 * UM)
+
+
+def preparation(**keys):
+    return {"format": "auto", "boundary": "mirror"} | keys
+
+
+def scan(path, **keys):
+    return read_scan(path, Preparation(**preparation(**keys)))
+
+
+def assert_read(read, unit=NM):
+    """The heights of this file, the right way round, and the size of the scan."""
+    np.testing.assert_allclose(read.heights, HEIGHTS * unit, rtol=1e-6, atol=1e-9 * unit)
+    np.testing.assert_allclose(read.size, SIZE, rtol=1e-6)
+
+
+def write_xyz(path, order=slice(None), separator=" "):
+    y, x = np.mgrid[:ROWS, :COLUMNS] * 250.0
+    table = np.column_stack([x.ravel(), y.ravel(), HEIGHTS.ravel()])[order]
+    path.write_text("\n".join(separator.join(f"{number:g}" for number in line) for line in table) + "\n")
+    return path
+
+
+def centred(heights):
+    return heights - np.mean(heights)

@@ -1,0 +1,285 @@
+"""Every step of the preparation of measured topographies."""
+
+import hashlib
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scans import NM, SIZE, UM, centred, preparation, scan, write_xyz
+
+from icha.configuration.topography import MeasuredSurface
+from icha.datasets.files import read_dataset, read_surface, write_surface
+from icha.surfaces.measured.settings import UnfitTopography
+from icha.surfaces.measured.topography import prepared_topography, topography_facts
+from icha.surfaces.spectrum import SelfAffineSpectrum
+
+TOPOGRAPHIES = Path(__file__).parents[2] / "config" / "topographies"
+
+
+@pytest.fixture
+def prepared(tmp_path):
+    def prepare(heights, **keys):
+        np.save(tmp_path / "scan.npy", heights)
+        keys = {"height_unit": 1.0, "size": tuple(0.5 * n for n in np.shape(heights)[::-1])} | keys
+        return prepared_topography(tmp_path / "scan.npy", preparation(**keys))
+
+    return prepare
+
+
+def test_largest_square_in_the_middle(prepared):
+    heights = np.random.default_rng(1).normal(size=(10, 17))
+    surface = prepared(heights, boundary="free").surface
+    np.testing.assert_allclose(surface.heights, centred(heights[:, 3:13]), atol=1e-14)
+    assert surface.period == 5.0
+    surface = prepared(heights.T, boundary="free").surface
+    np.testing.assert_allclose(surface.heights, centred(heights.T[3:13]), atol=1e-14)
+
+
+def test_crop(prepared):
+    heights = np.random.default_rng(1).normal(size=(14, 20))
+    result = prepared(heights, boundary="free", crop={"x": 3.5, "y": 1.0, "side": 4.5})
+    np.testing.assert_allclose(result.surface.heights, centred(heights[2:11, 7:16]), atol=1e-14)
+    assert result.surface.period == 4.5 and "cut to 9 x 9 points from (7, 2)" in result.description
+    for crop in ({"x": 6.0, "y": 0.0, "side": 4.5}, {"x": 0.0, "y": 3.0, "side": 4.5}, {"x": 0, "y": 0, "side": 2.0}):
+        with pytest.raises(UnfitTopography) as raised:
+            prepared(heights, boundary="free", crop=crop)
+        assert raised.value.key == "crop"
+
+
+def test_low_numbers_touch_first(prepared):
+    heights = np.random.default_rng(1).normal(size=(9, 9))
+    np.testing.assert_allclose(
+        prepared(heights, boundary="free", touches_first="low").surface.heights, -centred(heights), atol=1e-14
+    )
+
+
+@pytest.mark.parametrize("missing", ["refuse", "fill"])
+def test_trends_are_removed_whatever_is_missing(prepared, missing):
+    y, x = np.mgrid[:12, :12] * 0.5
+    plane, bowl = 3.0 + 0.2 * x - 0.7 * y, 0.1 * x**2 - 0.3 * x * y + 0.05 * y**2
+    rough = 1e-9 * np.random.default_rng(2).normal(size=(12, 12))
+    keys = {"boundary": "free", "missing": missing}
+    if missing == "fill":
+        plane, bowl = plane.copy(), bowl.copy()
+        plane[3, 4] = plane[7:9, 1:3] = np.nan
+    flat = prepared(plane + rough, detrend="tilt", **keys)
+    assert flat.surface.rms_height < 2e-9 and "tilt removed" in flat.description
+    assert prepared(plane + bowl + rough, detrend="tilt", **keys).surface.rms_height > 0.1
+    assert prepared(plane + bowl + rough, detrend="curvature", **keys).surface.rms_height < 2e-9
+    kept = prepared(plane + bowl + rough, **keys).surface.heights
+    if missing == "refuse":
+        np.testing.assert_allclose(kept, centred(plane + bowl + rough), atol=1e-13)
+
+
+def test_missing_points_are_refused_or_filled_harmonically(prepared):
+    y, x = np.mgrid[:10, :10].astype(float)
+    harmonic = x**2 - y**2 + 2 * x * y  # of the five-point Laplacian, too
+    holey = harmonic.copy()
+    holey[4:7, 3:6] = np.nan
+    with pytest.raises(UnfitTopography, match=r"9 among 100; allowed: fill") as raised:
+        prepared(holey, boundary="free")
+    assert raised.value.key == "missing"
+    result = prepared(holey, boundary="free", missing="fill")
+    np.testing.assert_allclose(result.surface.heights, centred(harmonic), atol=1e-11)
+    assert "9 missing points filled" in result.description
+    # Those outside of the square that is used matter to nobody.
+    assert prepared(np.pad(harmonic, ((0, 0), (2, 2)), constant_values=np.nan), boundary="free")
+    holey[:, 2:9] = np.nan
+    with pytest.raises(UnfitTopography, match="up to half"):
+        prepared(holey, boundary="free", missing="fill")
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_filling_is_that_of_surface_topography(prepared, boundary):
+    """Also at edges and corners, where a point has fewer neighbours, or those on the other side."""
+    from SurfaceTopography import Topography
+
+    rng = np.random.default_rng(9)
+    heights, holes = rng.normal(size=(14, 14)), rng.random((14, 14)) < 0.3
+    holes[0, :4] = holes[10:, 0] = holes[-1, -1] = True
+    theirs = Topography(np.ma.masked_array(heights, holes), (7.0, 7.0), periodic=boundary == "periodic")
+    ours = prepared(np.where(holes, np.nan, heights), boundary=boundary, missing="fill").surface.heights
+    np.testing.assert_allclose(ours, centred(theirs.interpolate_undefined_data("harmonic").heights()), atol=1e-12)
+
+
+def test_mirror_is_periodic_and_twice_as_wide(prepared):
+    heights = np.random.default_rng(4).normal(size=(9, 9))
+    surface = prepared(heights, boundary="mirror").surface
+    assert surface.boundary == "periodic" and surface.period == 9.0 and surface.grid == 18
+    np.testing.assert_allclose(surface.heights[:9, :9], centred(heights), atol=1e-14)
+    for again in (surface.heights[::-1], surface.heights[:, ::-1]):
+        np.testing.assert_array_equal(again, surface.heights)
+
+
+def test_window_leaves_the_middle_and_ends_flat(prepared):
+    heights = np.random.default_rng(4).normal(size=(80, 80))
+    result = prepared(heights, boundary="window", taper=0.25)
+    surface = result.surface
+    shift = surface.heights[40, 40] - centred(heights)[40, 40]
+    np.testing.assert_allclose(surface.heights[20:60, 20:60], centred(heights)[20:60, 20:60] + shift, atol=1e-13)
+    np.testing.assert_allclose(surface.heights[0], shift, atol=0.01)
+    assert abs(surface.heights.mean()) < 1e-15 and surface.boundary == "periodic"
+    assert result.rms_slope == pytest.approx(surface.rms_slope) and "0.25 of the side" in result.description
+
+
+def test_periodic_scans_are_taken_as_they_are(prepared):
+    surface = SelfAffineSpectrum(1.0, 0.5, 0.2, 0.8).realise(32, 3)
+    taken = prepared(surface.heights, boundary="periodic", size=(1.0, 1.0))
+    np.testing.assert_allclose(taken.surface.heights, surface.heights, atol=1e-16)
+    assert taken.rms_slope == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(UnfitTopography, match="needs a square") as raised:
+        prepared(surface.heights[:20], boundary="periodic", size=(1.0, 0.625))
+    assert raised.value.key == "boundary"
+
+
+@pytest.mark.parametrize("grid", [24, 48])
+def test_resampling_of_a_periodic_scan_is_exact(prepared, grid):
+    spectrum = SelfAffineSpectrum(1.0, 0.5, 0.2, 0.8)
+    surface = prepared(spectrum.realise(32, 3).heights, boundary="periodic", size=(1.0, 1.0), grid=grid).surface
+    np.testing.assert_allclose(surface.heights, spectrum.realise(grid, 3).heights, atol=1e-14)
+
+
+@pytest.mark.parametrize("grid", [12, 40])
+def test_resampling_of_a_free_square_keeps_cosines(prepared, grid):
+    """Cells stay cells: the points lie in the middles of as many parts of the same square."""
+
+    def cosines(n):
+        x = (np.arange(n) + 0.5) / n
+        return np.cos(3 * np.pi * x)[:, None] * np.cos(5 * np.pi * x) + np.cos(2 * np.pi * x)[:, None]
+
+    surface = prepared(cosines(20), boundary="free", grid=grid).surface
+    np.testing.assert_allclose(surface.heights, centred(cosines(grid)), atol=1e-13)
+    assert surface.period == 10.0
+
+
+def test_pixels_that_are_not_square_need_a_grid(prepared):
+    y, x = (np.arange(n) + 0.5 for n in (10, 20))
+    heights = np.cos(2 * np.pi * y / 10)[:, None] + 0.5 * np.cos(4 * np.pi * x / 20)
+    with pytest.raises(UnfitTopography, match="20 x 10 points") as raised:
+        prepared(heights, boundary="free", size=(10.0, 10.0))
+    assert raised.value.key == "grid"
+    surface = prepared(heights, boundary="free", size=(10.0, 10.0), grid=16).surface
+    z = np.arange(16) + 0.5
+    wanted = np.cos(2 * np.pi * z / 16)[:, None] + 0.5 * np.cos(4 * np.pi * z / 16)
+    np.testing.assert_allclose(surface.heights, wanted, atol=1e-13)
+    with pytest.raises(UnfitTopography, match="no square"):
+        prepared(heights, boundary="free", size=(10.0, 7.3), grid=16)
+
+
+@pytest.mark.parametrize("boundary", ["free", "mirror", "window"])
+@pytest.mark.parametrize(("detrend", "degree"), [("none", 0), ("tilt", 0), ("tilt", 1), ("curvature", 2)])
+def test_a_flat_file_is_refused(prepared, boundary, detrend, degree):
+    """Also where rounding is all that is left when the trend is removed: it would be scaled to any slope."""
+    y, x = np.mgrid[:12, :12]
+    with pytest.raises(UnfitTopography, match="all the same") as raised:
+        prepared(0.1 + degree * 0.3 * x - (degree == 2) * 0.07 * y**2, boundary=boundary, detrend=detrend, taper=0.1)
+    assert raised.value.key == "path"
+
+
+def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
+    """Nanometres on an offset of a metre."""
+    rough = 1e-9 * np.random.default_rng(2).normal(size=(12, 12))
+    surface = prepared(1.0 + rough, boundary="free").surface
+    np.testing.assert_allclose(surface.heights, centred(rough), atol=3e-16)
+
+
+@pytest.mark.parametrize(
+    ("heights", "key", "words"),
+    [
+        (np.empty((0, 0)), "path", "no heights"),
+        (np.empty((0, 12)), "path", "no heights"),
+        (np.empty((12, 0)), "path", "no heights"),
+        (np.ones((1, 1)), "path", "leaves 1 x 1 points"),
+        (np.arange(12.0)[None], "path", "leaves 12 x 1 points"),
+        (np.arange(12.0)[:, None], "path", "leaves 1 x 12 points"),
+        (np.full((12, 12), np.nan), "path", "no height at all"),
+        (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "would make up 132 of 144"),
+        (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 among 144"),
+    ],
+)
+@pytest.mark.parametrize("detrend", ["none", "tilt"])
+def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
+    missing = "fill" if "make up" in words else "refuse"
+    with pytest.raises(UnfitTopography, match=words) as raised:
+        prepared(heights, boundary="free", detrend=detrend, missing=missing, size=(6.0, 6.0))
+    assert raised.value.key == key
+
+
+def test_messages_are_short_and_in_units_of_people(tmp_path, prepared):
+    (tmp_path / "words.txt").write_text("no heights in here\n")
+    with pytest.raises(UnfitTopography, match="none of the formats that SurfaceTopography knows") as raised:
+        scan(tmp_path / "words.txt", height_unit=NM, size=SIZE)
+    assert len(str(raised.value)) < 200
+    crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}
+    with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* up to x = 4 um, y = 3 um"):
+        prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=crop)
+    with pytest.raises(UnfitTopography, match=r"needs a square, and the scan is 4 um x 3 um"):
+        prepared(np.eye(12, 16), size=(4e-6, 3e-6), boundary="periodic")
+
+
+def test_where_coordinates_tell_the_size_their_unit_is_doubted(tmp_path):
+    """Coordinates in micrometres, taken for nanometres as the heights are."""
+    path = write_xyz(tmp_path / "scan.xyz")
+    crop = {"x": 0.0, "y": 0.0, "side": 2000 * UM}
+    with pytest.raises(UnfitTopography, match="units of 1 nm, see `lateral_unit`") as raised:
+        prepared_topography(path, preparation(height_unit=NM, crop=crop))
+    assert raised.value.key == "crop"
+    assert (
+        prepared_topography(path, preparation(height_unit=NM, lateral_unit=UM, crop=crop)).surface.period == 4000 * UM
+    )
+    # Not where the size was given.
+    with pytest.raises(UnfitTopography) as raised:
+        prepared_topography(path, preparation(height_unit=NM, size=SIZE, crop=crop))
+    assert "lateral_unit" not in str(raised.value)
+
+
+def test_provenance_and_facts(prepared, tmp_path):
+    heights = np.random.default_rng(4).normal(size=(10, 10))
+    result = prepared(heights, boundary="free", detrend="tilt")
+    assert result.source_file == "scan.npy"
+    assert result.source_sha256 == hashlib.sha256((tmp_path / "scan.npy").read_bytes()).hexdigest()
+    assert str(tmp_path) not in result.description
+    how = preparation(height_unit=1.0, size=(5.0, 5.0), boundary="free", detrend="tilt")
+    facts = topography_facts(tmp_path / "scan.npy", how)
+    assert (facts.grid, facts.period, facts.boundary) == (10, 5.0, "free")
+    assert facts.rms_slope == result.rms_slope
+    # A file that changes is read again.
+    np.save(tmp_path / "scan.npy", np.pad(heights, 1))
+    assert topography_facts(tmp_path / "scan.npy", how).grid == 12
+
+
+def test_synthetic_scan_is_what_its_script_makes(tmp_path):
+    spec = importlib.util.spec_from_file_location("make_scan", TOPOGRAPHIES / "make_synthetic_scan.py")
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    script.write(tmp_path / "again.txt")
+    assert (tmp_path / "again.txt").read_bytes() == (TOPOGRAPHIES / "synthetic_scan.txt").read_bytes()
+    section = MeasuredSurface.model_validate(
+        {
+            "kind": "measured", "path": "synthetic_scan.txt", "height_unit": "nm", "size": ["72 um", "64 um"],
+            "missing": "fill", "detrend": "curvature", "boundary": "mirror",
+        }
+    )  # fmt: skip
+    result = prepared_topography(TOPOGRAPHIES / "synthetic_scan.txt", json.loads(json.dumps(section.preparation)))
+    assert result.surface.grid == 256 and result.surface.period == pytest.approx(128e-6)
+    # What was put in: slopes of 0.15 of the roughness; the scratch and the filled points add a little.
+    assert 0.12 < result.rms_slope < 0.2
+
+
+def test_surface_file_says_where_a_measurement_comes_from(tmp_path, prepared):
+    result = prepared(np.random.default_rng(6).normal(size=(24, 24)), boundary="free")
+    unit = result.surface.scaled_to_rms_slope(1.0)
+    for name in ("one.nc", "two.nc"):
+        write_surface(tmp_path / name, unit, name="scan", seed=0, measured=result)
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+    file = read_dataset(tmp_path / "one.nc")
+    assert file.attrs["boundary"] == "free" and file.attrs["source_file"] == "scan.npy"
+    assert file.attrs["source_sha256"] == result.source_sha256
+    assert file.attrs["preparation"] == result.description
+    assert float(file["measured_rms_slope"]) == result.rms_slope and float(file["rms_slope"]) == pytest.approx(1.0)
+    # Heights times the measured slope are those of the measurement.
+    again = read_surface(tmp_path / "one.nc")
+    assert again.free
+    np.testing.assert_allclose(again.scaled_to_rms_slope(result.rms_slope).heights, result.surface.heights, atol=1e-13)

@@ -1,0 +1,279 @@
+"""Readers of measured topographies, on files that are written here."""
+
+import h5py
+import netCDF4
+import numpy as np
+import pytest
+from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, UM, assert_read, centred, preparation, scan, write_xyz
+
+from icha.surfaces.measured.settings import UnfitTopography
+from icha.surfaces.measured.topography import prepared_topography, topography_facts
+
+
+@pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
+def test_npy(tmp_path, first_axis, stored):
+    np.save(tmp_path / "scan.npy", stored)
+    assert_read(scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE, first_axis=first_axis))
+
+
+def test_integers_are_heights_too(tmp_path):
+    np.save(tmp_path / "scan.npy", (HEIGHTS * 1e4).astype(np.int32))
+    read = scan(tmp_path / "scan.npy", height_unit=1e-4 * NM, size=SIZE)
+    np.testing.assert_allclose(read.heights, HEIGHTS * NM, atol=1.1e-4 * NM)
+
+
+@pytest.mark.parametrize("separator", [" ", "\t", ",", ";", ", "])
+@pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
+def test_matrix_of_text(tmp_path, separator, first_axis, stored):
+    lines = [separator.join(f"{height:.4f}" for height in row) for row in stored]
+    (tmp_path / "scan.txt").write_text("# a remark\n\n" + "\n".join(lines) + "\n")
+    assert_read(scan(tmp_path / "scan.txt", height_unit=NM, size=SIZE, first_axis=first_axis))
+
+
+@pytest.mark.parametrize("text", ["0,1;0,2;0,3", "0,1 0,2 0,3"])
+def test_decimal_commas_are_not_taken_for_columns(tmp_path, text):
+    (tmp_path / "scan.txt").write_text("\n".join([text] * 9))
+    with pytest.raises(UnfitTopography, match="decimal"):
+        scan(tmp_path / "scan.txt", format="matrix", height_unit=NM, size=SIZE)
+
+
+@pytest.mark.parametrize("separator", [" ", ","])
+def test_xyz_in_any_order(tmp_path, separator):
+    order = np.random.default_rng(8).permutation(HEIGHTS.size)
+    path = write_xyz(tmp_path / "scan.xyz", order, separator)
+    assert_read(scan(path, height_unit=NM))
+    assert_read(scan(path.rename(tmp_path / "scan.txt"), height_unit=NM, lateral_unit=NM))
+    # Coordinates in another unit than the heights; a size goes before both.
+    wide = scan(tmp_path / "scan.txt", height_unit=NM, lateral_unit=UM)
+    np.testing.assert_allclose(wide.size, np.multiply(SIZE, 1000))
+    assert_read(scan(tmp_path / "scan.txt", height_unit=NM, lateral_unit=UM, size=SIZE))
+
+
+def test_text_files_of_the_challenge(tmp_path):
+    """Remarks, numbers with commas and blanks between them, an empty line after every line of points."""
+    x = np.arange(8) / 8
+    heights = np.round(np.random.default_rng(2).normal(size=(8, 8)), 5)
+    lines = ["# surface", "# x, y, h"]
+    for row, y in zip(heights, x, strict=True):
+        lines += [f"{x_k:.6f}, {y:.6f}, {h:.5f}" for x_k, h in zip(x, row, strict=True)] + [""]
+    (tmp_path / "surface.0008x0008.ASCII.xyz.dat").write_text("\n".join(lines) + "\n")
+    matrix = "\n".join(", ".join(f"{h:.5f}" for h in row) + "," for row in heights)
+    (tmp_path / "surface.0008x0008.ASCII.dat").write_text(f"# surface\n{matrix}\n")
+    for name, keys in (
+        ("surface.0008x0008.ASCII.xyz.dat", {}),
+        ("surface.0008x0008.ASCII.dat", {"size": (1e-4, 1e-4)}),
+    ):
+        how = preparation(boundary="periodic", height_unit=1e-4, touches_first="low", **keys)
+        surface = prepared_topography(tmp_path / name, how).surface
+        np.testing.assert_allclose(surface.heights, -1e-4 * centred(heights), atol=1e-18)
+        assert surface.period == pytest.approx(1e-4, rel=1e-12)
+
+
+def test_xyz_without_some_points(tmp_path):
+    path = write_xyz(tmp_path / "scan.xyz", np.setdiff1d(np.arange(HEIGHTS.size), [0, 37]))
+    heights = scan(path, height_unit=NM).heights
+    assert np.isnan(heights[0, 0]) and np.isnan(heights[2, 5]) and np.count_nonzero(np.isnan(heights)) == 2
+
+
+def test_xyz_written_with_few_digits(tmp_path):
+    y, x = np.mgrid[:40, :60] * 0.1953
+    table = np.column_stack([x.ravel(), y.ravel(), np.arange(2400.0)])
+    np.savetxt(tmp_path / "scan.xyz", table, fmt="%.2f")
+    read = scan(tmp_path / "scan.xyz", height_unit=UM)
+    assert read.heights.shape == (40, 60)
+    np.testing.assert_array_equal(read.heights.ravel(), np.arange(2400.0) * UM)
+    np.testing.assert_allclose(read.size, [60 * 0.1953 * UM, 40 * 0.1953 * UM], rtol=1e-3)
+
+
+def test_xyz_with_a_point_twice_or_off_the_grid(tmp_path):
+    path = write_xyz(tmp_path / "scan.xyz", [*range(160), 5])
+    with pytest.raises(UnfitTopography, match="x = 1250, y = 0 is given twice"):
+        scan(path, height_unit=NM)
+    path.write_text(path.read_text().replace("\n1250 250 ", "\n1300 250 "))
+    with pytest.raises(UnfitTopography, match="regular grid"):
+        scan(path, height_unit=NM)
+
+
+def write_netcdf(path, turned=False, backwards=False, names=("y", "x"), unit="nm"):
+    with netCDF4.Dataset(path, "w") as file:
+        for name, count in zip(names, (ROWS, COLUMNS), strict=True):
+            file.createDimension(name, count)
+            axis = file.createVariable(name, "f8", (name,))
+            axis.units = "um"
+            axis[:] = np.arange(count) * 0.25
+        height = file.createVariable("height", "f8", names[::-1] if turned else names, fill_value=-9999.0)
+        height.units = unit
+        stored = HEIGHTS[::-1] if backwards else HEIGHTS
+        height[:] = stored.T if turned else stored
+        if backwards:
+            file[names[0]][:] = np.arange(ROWS)[::-1] * 0.25
+        other = file.createVariable("phase", "f8", names)
+        other[:] = 1.0
+    return path
+
+
+@pytest.mark.parametrize("keys", [{}, {"turned": True}, {"backwards": True}, {"turned": True, "backwards": True}])
+def test_netcdf_says_its_axes_and_units(tmp_path, keys):
+    assert_read(scan(write_netcdf(tmp_path / "scan.nc", **keys)))
+
+
+def test_netcdf_with_axes_of_other_names(tmp_path):
+    path = write_netcdf(tmp_path / "scan.nc", names=("row", "column"), turned=True)
+    assert_read(scan(path, first_axis="x"))
+    with pytest.raises(UnfitTopography, match=r"phase, height|height, phase") as raised:
+        scan(path, data="width")
+    assert raised.value.key == "data"
+
+
+def test_netcdf_fill_values_are_missing_points(tmp_path):
+    path = write_netcdf(tmp_path / "scan.nc")
+    with netCDF4.Dataset(path, "a") as file:
+        file["height"][3, 7] = -9999.0
+    assert np.argwhere(np.isnan(scan(path).heights)).tolist() == [[3, 7]]
+
+
+def test_unit_of_the_file_and_unit_that_is_given(tmp_path):
+    path = write_netcdf(tmp_path / "scan.nc", unit="um")
+    assert_read(scan(path), UM)
+    assert_read(scan(path, height_unit=NM), NM)
+    with pytest.raises(UnfitTopography) as raised:
+        scan(write_netcdf(tmp_path / "volts.nc", unit="V"))
+    assert raised.value.key == "height_unit"
+
+
+@pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
+def test_hdf5(tmp_path, first_axis, stored):
+    path = tmp_path / "scan.h5"
+    with h5py.File(path, "w") as file:
+        file["scans/first"] = stored
+        file["scans/first"].attrs["units"] = "nm"
+        file["time"] = np.arange(5.0)
+    assert_read(scan(path, size=SIZE, first_axis=first_axis))
+    with h5py.File(path, "a") as file:
+        file["scans/second"] = stored + 1
+    with pytest.raises(UnfitTopography, match="scans/first, scans/second") as raised:
+        scan(path, size=SIZE, first_axis=first_axis)
+    assert raised.value.key == "data"
+    assert_read(scan(path, size=SIZE, first_axis=first_axis, data="scans/first"))
+
+
+def waves():
+    """Some waves (kx, ky, amplitude) of a real series, one of every pair of opposite ones."""
+    rng = np.random.default_rng(5)
+    k = np.array([(1, 0), (0, 2), (3, 1), (-2, 3), (5, -4)])
+    return k, rng.normal(size=5) + 1j * rng.normal(size=5)
+
+
+def summed(n):
+    """The same waves added up one by one, node by node."""
+    y, x = np.mgrid[:n, :n] / n
+    k, h = waves()
+    each = (2 * (h_k * np.exp(2j * np.pi * (kx * x + ky * y))).real for (kx, ky), h_k in zip(k, h, strict=True))
+    return sum(each)
+
+
+@pytest.mark.parametrize("opposite", [False, True])
+@pytest.mark.parametrize("integers", [False, True])
+def test_fourier_list_of_the_challenge(tmp_path, opposite, integers):
+    """Wave vectors in rad per 0.1 mm (or as integers), heights in 0.1 mm, and the smaller numbers touch first."""
+    k, h = waves()
+    if opposite:
+        k, h = np.concatenate([k, -k]), np.concatenate([h, np.conj(h)])
+    q = k if integers else 2 * np.pi * k
+    np.savetxt(
+        tmp_path / "list.dat",
+        np.column_stack([q, h.real, h.imag]),
+        fmt=["%d"] * 2 + ["%.12e"] * 2 if integers else "%.12e",
+    )
+    keys = {"size": (1e-4, 1e-4)} if integers else {}
+    how = preparation(boundary="periodic", height_unit=1e-4, grid=24, touches_first="low", **keys)
+    surface = prepared_topography(tmp_path / "list.dat", how).surface
+    np.testing.assert_allclose(surface.heights, -1e-4 * summed(24), atol=1e-14)
+    assert surface.period == pytest.approx(1e-4, rel=1e-10)
+
+
+def test_fourier_lists_that_are_none(tmp_path):
+    k, h = waves()
+    path = tmp_path / "list.dat"
+    np.savetxt(path, np.column_stack([k, h.real, h.imag]))
+    how = preparation(boundary="periodic", height_unit=1e-4)
+    with pytest.raises(UnfitTopography) as raised:
+        prepared_topography(path, how)
+    assert raised.value.key == "size"
+    how["size"] = (1e-4, 1e-4)
+    assert prepared_topography(path, how).surface.grid == 32  # the next power of two with four cells per wave
+    with pytest.raises(UnfitTopography, match="at least 12") as raised:
+        prepared_topography(path, how | {"grid": 10})
+    assert raised.value.key == "grid"
+    both = np.concatenate([k, -k]), np.concatenate([h, h])
+    np.savetxt(path, np.column_stack([both[0], both[1].real, both[1].imag]))
+    with pytest.raises(UnfitTopography, match="conjugate"):
+        prepared_topography(path, how)
+
+
+def write_by_surface_topography(path):
+    from SurfaceTopography import Topography
+
+    # SurfaceTopography's arrays have x first.
+    Topography(HEIGHTS.T * 1e-3, tuple(side / UM for side in SIZE), unit="µm").to_netcdf(path)
+
+
+def test_instrument_files_are_read_by_surface_topography(tmp_path):
+    write_by_surface_topography(tmp_path / "scan.nc")
+    assert_read(scan(tmp_path / "scan.nc", format="instrument"))
+    assert_read(scan(tmp_path / "scan.nc"))
+    assert_read(scan(tmp_path / "scan.nc", format="instrument", height_unit=UM), UM * 1e-3)
+
+
+def test_instrument_file_by_its_content(tmp_path):
+    """ISO 25178-71 in text, the format of many instruments, under a name that says nothing."""
+    heading = {
+        "ManufacID": "ICHA", "CreateDate": "010120260000", "ModDate": "010120260000", "NumPoints": COLUMNS,
+        "NumProfiles": ROWS, "Xscale": "2.5E-7", "Yscale": "2.5E-7", "Zscale": "1E-9", "Zresolution": -1,
+        "Compression": 0, "DataType": 7, "CheckType": 0,
+    }  # fmt: skip
+    lines = ["aISO-1.0", *(f"{name} = {value}" for name, value in heading.items()), "*"]
+    lines += [" ".join(f"{height:.4f}" for height in row) for row in HEIGHTS] + ["*"]
+    (tmp_path / "scan.sdf").write_text("\n".join(lines) + "\n")
+    assert_read(scan(tmp_path / "scan.sdf"))
+
+
+@pytest.mark.parametrize("name", ["scan.npy", "scan.nc", "scan.h5", "scan.xyz", "scan.txt", "scan.gwy"])
+def test_damaged_files_are_refused_with_a_remedy(tmp_path, name):
+    (tmp_path / name).write_bytes(bytes(range(256)) * 4)
+    with pytest.raises(UnfitTopography, match=r"cannot be read as .*allowed") as raised:
+        scan(tmp_path / name, height_unit=NM, size=SIZE)
+    assert raised.value.key == "path"
+    assert str(tmp_path) not in str(raised.value)
+
+
+def test_what_is_missing_is_named(tmp_path):
+    np.save(tmp_path / "scan.npy", HEIGHTS)
+    for keys, key in (({"size": SIZE}, "height_unit"), ({"height_unit": NM}, "size")):
+        with pytest.raises(UnfitTopography, match="is missing") as raised:
+            scan(tmp_path / "scan.npy", **keys)
+        assert raised.value.key == key
+    np.save(tmp_path / "scan.npy", HEIGHTS[None])
+    with pytest.raises(UnfitTopography, match=r"shape \(1, 10, 16\)"):
+        scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE)
+    np.save(tmp_path / "scan.npy", HEIGHTS + 0j)
+    with pytest.raises(UnfitTopography, match="complex128"):
+        scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE)
+    with pytest.raises(UnfitTopography, match="no such file"):
+        topography_facts(tmp_path / "nothing.npy", preparation())
+
+
+@pytest.mark.parametrize("name", ["scan.txt", "scan.xyz", "scan.npy", "scan.nc", "scan.h5", "scan.dat"])
+def test_an_empty_file_is_refused(tmp_path, name):
+    (tmp_path / name).touch()
+    with pytest.raises(UnfitTopography, match="is empty") as raised:
+        scan(tmp_path / name, height_unit=NM, size=SIZE)
+    assert raised.value.key == "path"
+
+
+@pytest.mark.parametrize("kind", ["auto", "matrix", "xyz", "fourier"])
+def test_a_heading_alone_is_refused(tmp_path, kind):
+    (tmp_path / "scan.txt").write_text("# width 90 um\n\n  # heights\n")
+    with pytest.raises(UnfitTopography, match="holds no numbers") as raised:
+        scan(tmp_path / "scan.txt", format=kind, height_unit=NM, size=SIZE)
+    assert raised.value.key == "path"
