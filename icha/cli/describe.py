@@ -11,6 +11,7 @@ import typer
 
 from icha.cli.options import Config, Cores, Folder
 from icha.cli.project import configuration_path, counted, find_project, read_configuration, shown
+from icha.support import in_words
 
 
 def describe(
@@ -52,7 +53,6 @@ def _count(cores: str | None) -> int:
 def _summary(console, items, damaged, cores) -> None:
     from rich.table import Table
 
-    from icha.cli.live import duration
     from icha.planning.plan import memory_on, time_on, total
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
@@ -67,9 +67,9 @@ def _summary(console, items, damaged, cores) -> None:
         "failed": str(every.failed or ""),
         "to do": str(every.to_do),
         "each": "",
-        "core time": duration(every.work),
-        "memory": size(every.memory),
-        "disk": size(every.disk),
+        "core time": in_words.duration(every.work),
+        "memory": in_words.size(every.memory),
+        "disk": in_words.size(every.disk),
     }
     for heading, footer in columns.items():
         # In a narrow terminal it is the names that are broken, not the numbers.
@@ -84,10 +84,10 @@ def _summary(console, items, damaged, cores) -> None:
             str(sums.done or ""),
             str(sums.failed or ""),
             str(sums.to_do or ""),
-            duration(sums.typical),
-            duration(sums.work) if sums.to_do else "",
-            size(sums.memory),
-            size(sums.disk),
+            in_words.duration(sums.typical),
+            in_words.duration(sums.work) if sums.to_do else "",
+            in_words.size(sums.memory),
+            in_words.size(sums.disk),
         )
     console.print(table)
     runs = [item for item in items if item.is_run]
@@ -96,11 +96,11 @@ def _summary(console, items, damaged, cores) -> None:
     if not every.to_do and not damaged:
         console.print(f"{counted(len(runs), 'run')}; everything is there.", highlight=False)
     else:
+        time, memory = in_words.duration(time_on(items, cores)), in_words.size(memory_on(items, cores))
         console.print(
-            f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about "
-            f"[bold]{duration(time_on(items, cores))}[/] and {size(memory_on(items, cores))} of memory on "
-            f"{counted(cores, 'core')}; {size(every.disk)} of disk when all is there, and as much again for the "
-            f"dataset.",
+            f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and {memory} of "
+            f"memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk when all is there, and as much again "
+            f"for the dataset.",
             highlight=False,
         )
     for path in damaged:
@@ -115,21 +115,13 @@ def _summary(console, items, damaged, cores) -> None:
 def _list(console, items) -> None:
     from rich.table import Table
 
-    from icha.cli.live import duration
-
     table = Table(box=None, pad_edge=False, header_style="dim")
     for heading in ("file", "state", "time", "memory", "disk"):
         table.add_column(heading, justify="left" if heading in ("file", "state") else "right", overflow="fold")
     for item in items:
         cost = item.cost
-        table.add_row(item.path, item.state, duration(cost.seconds), size(cost.memory), size(cost.disk))
+        table.add_row(
+            item.path, item.state, in_words.duration(cost.seconds), in_words.size(cost.memory), in_words.size(cost.disk)
+        )
     console.print(table)
     console.print()
-
-
-def size(number: float) -> str:
-    """Bytes as people say them: `70 kB`, `1.5 GB`."""
-    for factor, unit in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")):
-        if number >= factor:
-            return f"{number / factor:.3g} {unit}"
-    return f"{number / 1e3:.0f} kB"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from icha.cli.events import Job, Watch, last_line, reason_of
+from icha.support import in_words
 
 # Running jobs that are shown.
 _MOST_JOBS = 8
@@ -62,7 +62,7 @@ class LiveView:
         ended, failed = len(watch.done) + len(watch.failed), len(watch.failed)
         parts = [f"{self._campaign}: {ended} of {watch.job_count} jobs"]
         parts += [f"{failed} failed"] if failed else []
-        parts += [time_left(watch), f"{duration(watch.clock() - watch.started)} so far"]
+        parts += [time_left(watch), f"{in_words.duration(watch.clock() - watch.started)} so far"]
         parts += [self._remark] if self._remark != "planning" else []
         table = Table(box=None, pad_edge=False, header_style="dim")
         for heading in ("", "done", "running", "failed", "of", ""):
@@ -74,7 +74,7 @@ class LiveView:
             table.add_row(rule.replace("_", " "), *cells, str(total), bar, style=style)
         lines = []
         for job in sorted(watch.running.values(), key=lambda job: job.started)[:_MOST_JOBS]:
-            lines.append(Text(f"▸ {duration(watch.clock() - job.started):>8}  {job.title}", no_wrap=True))
+            lines.append(Text(f"▸ {in_words.duration(watch.clock() - job.started):>8}  {job.title}", no_wrap=True))
             if said := last_line(job, self.folder):
                 lines.append(Text(f"            {said}", style="dim", no_wrap=True))
         if more := len(watch.running) - _MOST_JOBS:
@@ -102,7 +102,7 @@ class PlainView:
         ended = len(watch.done) + len(watch.failed)
         what = "failed: " if failed else ""
         count = f"{ended:>{len(str(watch.job_count))}}/{watch.job_count}"
-        self._say(f"[{count}, {time_left(watch)}] {what}{job.title} ({duration(job.seconds)})")
+        self._say(f"[{count}, {time_left(watch)}] {what}{job.title} ({in_words.duration(job.seconds)})")
         for line in reason_of(job, self.folder)[:3] if failed else ():
             self._say(f"    {line}")
 
@@ -118,18 +118,4 @@ class PlainView:
 def time_left(watch: Watch) -> str:
     """How long it still takes, in words."""
     seconds = watch.seconds_left()
-    return "time left unknown" if seconds is None else f"about {duration(seconds)} left"
-
-
-def duration(seconds: float) -> str:
-    """A time as people say it: `4.2 s`, `3.3 min`, `14 h`."""
-    if seconds < 9.95:
-        return f"{seconds:.1f} s"
-    seconds = round(seconds)
-    if seconds < 120:
-        return f"{seconds} s"
-    for longest, unit, name in ((7200, 60, "min"), (48 * 3600, 3600, "h"), (math.inf, 86400, "days")):
-        if seconds < longest:
-            value = seconds / unit
-            return f"{value:.1f} {name}" if value < 9.95 else f"{value:.0f} {name}"
-    raise ValueError(f"{seconds} s is no time")
+    return "time left unknown" if seconds is None else f"about {in_words.duration(seconds)} left"

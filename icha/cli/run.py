@@ -232,8 +232,8 @@ def _listen(reading: int, watch, view, stopped: list) -> None:
 def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) -> None:
     """Print what has become of the campaign."""
     from icha.cli.events import reason_of
-    from icha.cli.live import duration
     from icha.planning.plan import failed_runs
+    from icha.support import in_words
     from icha.support.atomic_files import why_not_writable
 
     results = folder / "results" / campaign.name
@@ -243,7 +243,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
     if status == 0 and watch.started is None:
         print("Nothing to do: everything that was asked for is there and up to date.")
     elif ended:
-        took = duration(watch.clock() - watch.started)
+        took = in_words.duration(watch.clock() - watch.started)
         print(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}")
     incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
     if incomplete:

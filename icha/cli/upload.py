@@ -15,7 +15,8 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, Mistake, counted, shown
+from icha.cli.project import FAILED, Mistake, shown
+from icha.support import in_words
 
 TOKEN = "ZENODO_TOKEN"
 # Beside the archive, where Zenodo shows them.
@@ -156,6 +157,7 @@ def _refuse_foreign_doi(metadata: dict, draft: str | None) -> None:
 def _summary(metadata: dict, files: list[Path], where: str) -> str:
     authors = "; ".join(creator.get("name", "") for creator in metadata.get("creators", ()))
     communities = ", ".join(each.get("identifier", "") for each in metadata.get("communities", ()))
+    sizes = [(path, path.stat().st_size) for path in files]
     rows = [
         ("to", where),
         ("title", metadata.get("title")),
@@ -163,17 +165,9 @@ def _summary(metadata: dict, files: list[Path], where: str) -> str:
         ("authors", authors),
         ("licence", metadata.get("license")),
         ("community", communities or "none"),
-        *(("file", f"{path.name}, {_size(path.stat().st_size)}") for path in files),
+        *(("file", f"{path.name}, {in_words.size(size)} ({size:,} bytes)") for path, size in sizes),
     ]
     return "\n".join(f"{name + ':':<11}{value or 'none'}" for name, value in rows)
-
-
-def _size(count: int) -> str:
-    """`15.2 MB (15,234,567 bytes)`."""
-    for unit, factor in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if count >= factor:
-            return f"{count / factor:.1f} {unit} ({count:,} bytes)"
-    return counted(count, "byte")
 
 
 def _ask(yes: bool) -> None:

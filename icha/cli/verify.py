@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.describe import size
 from icha.cli.project import FAILED, Mistake, counted
+from icha.support import in_words
 
 
 def verify(
@@ -29,4 +29,4 @@ def verify(
         typer.secho(f"{deposit}: not whole: {counted(len(problems), 'problem')}", err=True, fg="red")
         raise typer.Exit(FAILED)
     sizes = contents(deposit)
-    typer.echo(f"{deposit}: whole: {counted(len(sizes), 'file')}, {size(sum(sizes.values()))}")
+    typer.echo(f"{deposit}: whole: {counted(len(sizes), 'file')}, {in_words.size(sum(sizes.values()))}")

@@ -23,6 +23,7 @@ from icha.planning.costs import Cost
 from icha.publication.citation import MODEL_PAPER, paragraphs, web_address
 from icha.publication.dictionary import Entry
 from icha.publication.licences import Licence
+from icha.support import in_words
 
 _TEMPLATE = "README.md.jinja"
 # What lies in a deposit, in the order of interest: only what is there is listed.
@@ -139,8 +140,8 @@ def readme(
         "link": _link,
         "number": "{:.4g}".format,
         "value": "{:z.2g}".format,
-        "size": _size,
-        "duration": _duration,
+        "size": in_words.size,
+        "duration": in_words.duration,
         "span": _span,
         "seeds": _seeds,
         "few": _few,
@@ -318,20 +319,6 @@ def _link(address: str) -> str:
     """A web address as a link."""
     plain = re.sub(r"[\s<>|`\\]", lambda found: quote(found[0]), address)
     return f"<{plain}>"
-
-
-def _size(number: float) -> str:
-    for factor, unit in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
-        if number >= factor:
-            return f"{number / factor:.3g} {unit}"
-    return f"{number:.0f} B"
-
-
-def _duration(seconds: float) -> str:
-    for factor, unit in ((3600, "h"), (60, "min")):
-        if seconds >= factor:
-            return f"{seconds / factor:.2g} {unit}"
-    return f"{seconds:.2g} s"
 
 
 def _span(values, form="{:z.3g}") -> str:

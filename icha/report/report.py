@@ -31,6 +31,7 @@ from icha.datasets.files import COMPLETE, INCOMPLETE, MISSING
 from icha.figures.scale import Scale
 from icha.figures.style import COLOURS, quantity, unit_for
 from icha.report.inline_svg import Curve, Node, flow_graph, logarithmic_chart
+from icha.support import in_words
 from icha.support.atomic_files import whole_file
 from icha.support.statistics import ensemble
 
@@ -672,14 +673,6 @@ def _per_cent(value: float, *, signed: bool = True) -> str:
     return text.replace("+0.0", "0.0").replace("-0.0", "0.0").replace("-", "−")
 
 
-def _duration(seconds: float) -> str:
-    """A time as people say it: `0.8 s`, `12 min 5 s`, `3 h 20 min`."""
-    if seconds < 60:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
-
-
 def _template(name: str) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("icha.report", "templates"),
@@ -693,6 +686,6 @@ def _template(name: str) -> jinja2.Template:
         "scientific": _scientific,
         "per_cent": _per_cent,
         "number": "{:g}".format,
-        "duration": _duration,
+        "duration": in_words.duration,
     }
     return environment.get_template(name)

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from icha.cli import app
 from icha.cli.events import Watch, last_line, reason_of
-from icha.cli.live import LiveView, duration
+from icha.cli.live import LiveView
 from icha.cli.show import sparkline
 from icha.configuration.expansion import run_cases, run_sha256
 from icha.configuration.load import load_configuration
@@ -379,7 +379,7 @@ def test_the_live_view_shows_jobs_and_what_they_say(watch, tmp_path):
     view = LiveView(watch, "tiny", tmp_path, console)
     console.print(view._draw())
     text = console.export_text()
-    assert "tiny: 0 of 4 jobs" in text and "65 s  Sweep 0" in text and "stop 2 of 2: A/A0 3e-2" in text
+    assert "tiny: 0 of 4 jobs" in text and "1.1 min  Sweep 0" in text and "stop 2 of 2: A/A0 3e-2" in text
     assert "half a li" not in text
 
 
@@ -391,9 +391,6 @@ def test_reasons_are_taken_from_logs(watch, tmp_path):
     assert reason_of(job, tmp_path) == ["2 checks failed", "this one", "that one"]
 
 
-def test_times_and_curves_in_short():
-    assert [duration(s) for s in (0.04, 9.96, 119, 300, 7000, 7200, 200000)] == [
-        *("0.0 s", "10 s", "119 s", "5.0 min", "117 min", "2.0 h", "2.3 days"),
-    ]
+def test_curves_in_short():
     assert sparkline([0, 1, 2]) == "▁▅█" and sparkline([]) == "" and sparkline([3, 3]) == "▁▁"
     assert len(sparkline(range(1000))) == 60

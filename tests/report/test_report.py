@@ -243,8 +243,8 @@ def test_times_are_summed_by_kind_of_job(tmp_path):
     kinds, longest = (part.split("</tbody>")[0] for part in text.split("<tbody>")[1:])
     rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in kinds.split("</tr>")[:-1]]
     assert [(row[0], row[1], row[2], row[4], row[5]) for row in rows] == [
-        ("dataset", "1", "2 h 1 min", "2 h 1 min", "300 MB"),
-        ("runs", "2", "1 min 33 s", "1 min 30 s", "120 MB"),
+        ("dataset", "1", "2 h", "2 h", "300 MB"),
+        ("runs", "2", "1.6 min", "1.5 min", "120 MB"),
     ]
     assert re.findall(r"<tr><th>(.*?)</th>", longest) == ["dataset", "runs/a/2", "runs/a/1"]
     write_times_page(tmp_path / "t.html", [])
