@@ -1,14 +1,14 @@
 """Boundary elements against exact solutions; ICHA against boundary elements where the two must agree: on one bump."""
 
-import hashlib
 import os
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+import small_rough_solution
+from small_rough_solution import MATERIALS, PRESSURE
 
-import icha
 from icha.asperity.cohesive_zone import longest_spacing, strength_number
 from icha.asperity.material import Material
 from icha.references.boundary_elements import (
@@ -23,10 +23,7 @@ from icha.references.one_asperity import hertz_asperity, one_asperity, paraboloi
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
 
-ROUGH = icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=40e-6, short_wavelength=100e-6 / 7, hurst=0.8)
-MATERIALS = {"hertz": Material(25e6, 0.0, 1e-9), "adhesive": Material(25e6, 0.05, 0.2e-6)}
 HERTZ = MATERIALS["hertz"]
-PRESSURE = 1e-2
 
 
 def displacement(state, contact_modulus):
@@ -63,33 +60,40 @@ def test_hertzian_bump_agrees_within_one_percent_at_a_given_load(hertzian, name)
     assert hertzian.sizes["given_load"] == 2
 
 
-@pytest.fixture(scope="module")
-def adhesive():
+@pytest.fixture(scope="module", params=[2.0, pytest.param(3.5, marks=pytest.mark.slow)])
+def adhesive(request):
     """A bump with adhesion in compression, in tension and where it is pulled off, on as few nodes as resolve it.
+
+    At the Tabor parameter 3.5 the two are within 3 %; the smaller one is as quick as it is less near JKR's limit.
 
     The area is compared with the energetic one, which JKR's is the limit of: the cohesive zone, a few per cent of the
     radius, is no part of the area of zero gap. Approach and load change sign on the way: their errors are those of
     JKR's own length, and of the load or the pull-off force, whichever is larger.
     """
-    return one_asperity(3.5, approaches=[3.0, 1.5], period=10.0)
+    return one_asperity(request.param, approaches=[3.0, 1.5], period=10.0)
+
+
+def near_jkr(adhesive):
+    return 0.03 if adhesive.tabor_parameter > 3 else 0.08
 
 
 @pytest.mark.parametrize("name", ["energetic_area_error", "force_error"])
-def test_jkr_bump_agrees_within_three_percent_at_a_given_approach(adhesive, name):
-    np.testing.assert_allclose(adhesive[name], 0, atol=0.03)
+def test_jkr_bump_agrees_at_a_given_approach(adhesive, name):
+    np.testing.assert_allclose(adhesive[name], 0, atol=near_jkr(adhesive))
 
 
 @pytest.mark.parametrize("name", ["energetic_area_error_at_load", "approach_error_at_load"])
-def test_jkr_bump_agrees_within_three_percent_at_a_given_load(adhesive, name):
-    np.testing.assert_allclose(adhesive[name], 0, atol=0.03)
+def test_jkr_bump_agrees_at_a_given_load(adhesive, name):
+    np.testing.assert_allclose(adhesive[name], 0, atol=near_jkr(adhesive))
     assert adhesive.given_load[0] > 0 > adhesive.given_load[1]
 
 
-def test_jkr_pull_off_force_agrees_within_three_percent(adhesive):
+def test_jkr_pull_off_force_agrees(adhesive):
     """The largest tension on the way up, against JKR's 3/2 pi dgamma R."""
-    assert max(-adhesive.force_boundary_elements) == pytest.approx(1.5 * np.pi, rel=0.03)
+    assert max(-adhesive.force_boundary_elements) == pytest.approx(1.5 * np.pi, rel=near_jkr(adhesive))
 
 
+@pytest.mark.slow
 def test_area_of_zero_gap_agrees_within_three_percent_where_the_cohesive_zone_is_narrow():
     """It needs a larger Tabor parameter than all else, and a grid to resolve it; this state bears next to no load."""
     narrow = one_asperity(5.0, approaches=(2.0,), pull_off=False)
@@ -170,7 +174,7 @@ def test_perimeter_of_a_square():
 @pytest.fixture(scope="module", params=["hertz", "adhesive"])
 def rough(request):
     """A small rough surface with and without adhesion, one of its states, and the dataset of the same."""
-    surface, material = ROUGH.realise(grid=48, seed=3), MATERIALS[request.param]
+    surface, material = small_rough_solution.surface(), MATERIALS[request.param]
     state = contact_state(surface, material, PRESSURE, refinement=2)
     return surface, material, state, boundary_elements(surface, material, PRESSURE, refinement=2, seed=3)
 
@@ -231,7 +235,7 @@ def test_energetic_area_is_the_derivative_of_the_energy():
 
     Between two ranges of dgamma, at one mean gap: E = elastic energy - dgamma A0 mean(exp(-u/rho)).
     """
-    surface, material = ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"]
+    surface, material = small_rough_solution.surface(), MATERIALS["adhesive"]
     separation = 1.5 * surface.rms_height
 
     def energy(change):
@@ -247,7 +251,7 @@ def test_energetic_area_is_the_derivative_of_the_energy():
 
 
 def test_up_and_down_are_the_same_at_a_range_that_the_grid_resolves():
-    surface, material = ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"]
+    surface, material = small_rough_solution.surface(), MATERIALS["adhesive"]
     gaps = np.array([2.2, 1.6, 1.2, 1.6, 2.2]) * surface.rms_height
     pressure = [state.nominal_pressure for state in states_at_mean_separations(surface, material, gaps)]
     unit = material.contact_modulus * surface.rms_slope
@@ -258,7 +262,7 @@ def test_up_and_down_are_the_same_at_a_range_that_the_grid_resolves():
 
 
 def test_range_that_the_grid_does_not_resolve_is_refused_with_the_numbers():
-    surface = ROUGH.realise(grid=48, seed=3)
+    surface = small_rough_solution.surface()
     short = Material(25e6, 0.05, 2.071e-9)
     lines = []
     with pytest.raises(ValueError, match=r"^interaction_range: a range of 2\.071e-09 m is not resolved") as refused:
@@ -286,11 +290,11 @@ def test_range_that_the_grid_does_not_resolve_is_refused_with_the_numbers():
 def test_wrong_arguments_are_named(wrong, name):
     arguments = {"reduced_pressure": PRESSURE} | wrong
     with pytest.raises(ValueError, match=f"^{name}: "):
-        boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["hertz"], **arguments)
+        boundary_elements(small_rough_solution.surface(), MATERIALS["hertz"], **arguments)
 
 
 def test_mean_separations_need_adhesion_and_are_positive():
-    surface = ROUGH.realise(grid=48, seed=3)
+    surface = small_rough_solution.surface()
     with pytest.raises(ValueError, match=r"^surface_energy: "):
         states_at_mean_separations(surface, MATERIALS["hertz"], [1e-6])
     with pytest.raises(ValueError, match=r"^mean_separations: "):
@@ -300,42 +304,31 @@ def test_mean_separations_need_adhesion_and_are_positive():
 def test_solver_that_does_not_converge_is_an_error(monkeypatch):
     monkeypatch.setattr("icha.references.boundary_elements._MAX_ITERATIONS", 3)
     with pytest.raises(NotSolved, match=r"did not converge: error .*, tolerance 1e-08"):
-        boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["hertz"], PRESSURE)
+        boundary_elements(small_rough_solution.surface(), MATERIALS["hertz"], PRESSURE)
 
 
 def test_load_that_no_mean_gap_carries_is_an_error(monkeypatch):
     monkeypatch.setattr("icha.references.boundary_elements._MAX_SOLVES", 1)
     with pytest.raises(NotSolved, match=r"no mean gap was found that carries the load: 1 tries"):
-        boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"], PRESSURE)
-
-
-def digest(solution):
-    """SHA-256 of all values of a dataset."""
-    return hashlib.sha256(b"".join(solution[name].values.tobytes() for name in sorted(solution.variables))).hexdigest()
+        boundary_elements(small_rough_solution.surface(), MATERIALS["adhesive"], PRESSURE)
 
 
 def test_same_bytes_in_another_process_with_more_threads():
-    script = f"""
-import sys
-sys.path.insert(0, {os.path.dirname(__file__)!r})
-from test_boundary_elements import MATERIALS, PRESSURE, ROUGH, boundary_elements, digest
-print(digest(boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"], PRESSURE)))
-"""
+    here = boundary_elements(small_rough_solution.surface(), MATERIALS["adhesive"], PRESSURE)
     other = subprocess.run(
-        [sys.executable, "-c", script],
+        [sys.executable, small_rough_solution.__file__],
         env=os.environ | {"OMP_NUM_THREADS": "2"},
         check=True,
         capture_output=True,
         text=True,
     )
-    here = boundary_elements(ROUGH.realise(grid=48, seed=3), MATERIALS["adhesive"], PRESSURE)
-    assert other.stdout.strip() == digest(here)
+    assert other.stdout.strip() == small_rough_solution.digest(here)
 
 
 def test_area_without_adhesion_does_not_depend_on_the_slope():
     """One topography, scaled: the same area and reduced separation at the same reduced pressure."""
     steep, flat = (
-        boundary_elements(ROUGH.realise(grid=48, seed=3).scaled_to_rms_slope(slope), HERTZ, PRESSURE)
+        boundary_elements(small_rough_solution.surface().scaled_to_rms_slope(slope), HERTZ, PRESSURE)
         for slope in (1.0, 0.2)
     )
     assert flat.contact_area_fraction == pytest.approx(float(steep.contact_area_fraction), rel=1e-6)

@@ -36,6 +36,7 @@ def snapping():
     return loop(paraboloid(130, PERIOD), Material(1.0, 1.0, 0.5), 0.0005, 0.2, tolerance=1e-5)
 
 
+@pytest.mark.slow
 def test_both_ways_are_there_and_end_apart(snapping):
     assert list(dict.fromkeys(snapping.branch.values)) == ["loading", "unloading"]
     np.testing.assert_array_equal(snapping.leg, snapping.branch == "unloading")
@@ -52,7 +53,7 @@ def test_both_ways_are_there_and_end_apart(snapping):
     assert float(snapping.largest_reduced_pressure) == pytest.approx(0.0005, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["without_adhesion", "long_range", "snapping"])
+@pytest.mark.parametrize("name", ["without_adhesion", "long_range", pytest.param("snapping", marks=pytest.mark.slow)])
 def test_work_is_the_change_of_stored_energy_but_for_losses(request, name):
     """Losses are never negative, by more than the trapezoid's error; the ends differ by the solver's tolerance."""
     ds = request.getfixturevalue(name)
@@ -82,6 +83,7 @@ def test_loop_of_a_long_range_closes(long_range):
     assert long_range.pull_off_pressure > 0
 
 
+@pytest.mark.slow
 def test_a_snapping_asperity_loses_its_jumps(snapping):
     """The loss is that of one step in and one step out; the rest of the way is conservative."""
     lost = np.diff(snapping.dissipated)
@@ -93,6 +95,7 @@ def test_a_snapping_asperity_loses_its_jumps(snapping):
     np.testing.assert_allclose(jump_in + jump_off, loss, rtol=0, atol=error)
 
 
+@pytest.mark.slow
 def test_pull_off_is_near_johnson_kendall_and_roberts(snapping):
     """3/2 pi dgamma R; at a Tabor parameter this low, more, towards the rigid sphere's 2 pi."""
     force = float(snapping.pull_off_pressure) * PERIOD**2
