@@ -98,9 +98,9 @@ def _summary(console, items, damaged, cores) -> None:
     else:
         time, memory = in_words.duration(time_on(items, cores)), in_words.size(memory_on(items, cores))
         console.print(
-            f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and {memory} of "
-            f"memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk when all is there, and as much again "
-            f"for the dataset.",
+            f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and {memory}"
+            f" of memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk when all is there, and as "
+            f"much again for the dataset.",
             highlight=False,
         )
     for path in damaged:
