@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pages import error_sources, hysteresis, one_asperity, validation
 
-from icha.configuration.expansion import asperity_cases, loop_cases, source_cases
+from icha.configuration.cases import asperity_cases, loop_cases, source_cases
 from icha.configuration.load import load_configuration
 from icha.datasets.files import read_campaign, read_dataset
 from icha.support.atomic_files import whole_file

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from snakemake.logging import logger
 
-from icha.configuration.load import Configuration, ConfigurationError, load_configuration
-from icha.configuration.problems import warnings
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.load import Configuration, load_configuration
 
 DEFAULT = "config/config.yaml"
 
@@ -27,7 +27,7 @@ def campaign_configuration(workflow) -> Configuration:
         )
     except ConfigurationError as error:
         raise SystemExit(f"The configuration cannot be run:\n{error}") from None
-    for warning in warnings(configuration.campaign):
+    for warning in configuration.campaign.warnings():
         logger.warning(f"Warning: {warning}")
     return configuration
 

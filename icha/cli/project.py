@@ -92,14 +92,14 @@ def read_configuration(path: Path):
     Mistake
         With everything that is wrong with it.
     """
-    from icha.configuration.load import ConfigurationError, load_configuration
-    from icha.configuration.problems import warnings
+    from icha.configuration.errors import ConfigurationError
+    from icha.configuration.load import load_configuration
 
     try:
         configuration = load_configuration(path)
     except ConfigurationError as error:
         raise Mistake(f"the configuration cannot be run:\n{error}") from None
-    for warning in warnings(configuration.campaign):
+    for warning in configuration.campaign.warnings():
         typer.secho(f"Warning: {warning}", err=True, fg="yellow")
     return configuration
 

@@ -16,11 +16,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from icha.configuration.model import BESIDE_STUDIES, SCALARS, SURFACE_KINDS, Campaign, Contact, Material, Study
-from icha.configuration.problems import Problem
+from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
+from icha.configuration.materials import MaterialSection
+from icha.configuration.studies import SCALARS, Study
+from icha.configuration.surfaces import SURFACE_KINDS
 from icha.configuration.values import MEASURED
 from icha.datasets.labels import number_label
-from icha.support.values import NOTHING, Unit
+from icha.support.values import NOTHING, Problem, Unit
 
 MAX_RUNS = 100_000
 # Lists of a study, and what one of their entries is called in a case.
@@ -77,8 +79,9 @@ def _lists(label: str, study: Study) -> dict[str, list[_Placed]]:
     varied = study.vary.model_dump(exclude_none=True) if study.vary else {}
     for name, values in varied.items():
         lists[name] = [((*at, "vary", name, index), value) for index, value in enumerate(values)]
-    order = [*(name for name in SCALARS if name not in Material.model_fields), *Material.model_fields]
-    names = ["surface", *order[: -len(Material.model_fields)], "seed", "rms_slope", "material", *Material.model_fields]
+    of_material = MaterialSection.model_fields
+    of_surface = (name for name in SCALARS if name not in of_material)
+    names = ["surface", *of_surface, "seed", "rms_slope", "material", *of_material]
     return {name: lists[name] for name in names if name in lists}
 
 
@@ -180,7 +183,7 @@ class _Variants:
         kind = type(self._campaign.surfaces[surface])
         varied = {name: point[name] for name in point if name in SCALARS}
         of_surface = {name: varied[name] for name in kind.model_fields if name in varied}
-        of_material = {name: varied[name] for name in Material.model_fields if name in varied}
+        of_material = {name: varied[name] for name in MaterialSection.model_fields if name in varied}
         for name, (location, value) in varied.items():
             if name not in of_surface and name not in of_material:
                 kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)

@@ -8,14 +8,15 @@ from __future__ import annotations
 import datetime
 import re
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import combinations
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
-from icha.support.values import Section, Text, distinct
+from icha.datasets.labels import RunLabels
+from icha.support.values import Problem, Section, Text, distinct
 
 # How a deposit may stand to something else: the relation types of DataCite 4.5 that Zenodo knows, too.
 RELATIONS = (
@@ -411,14 +412,15 @@ class Publication(Section):
         default=[], description="Runs whose checks fail and that are published nevertheless."
     )
 
-
-# What the entries of its lists are.
-PARTS = {
-    "authors": Author,
-    "funding": Funding,
-    "related_identifiers": RelatedIdentifier,
-    "known_failures": KnownFailure,
-}
+    def problems(self, campaign: Any) -> Iterator[Problem]:
+        """Failures that are known of runs that are none of its `icha.configuration.campaign.Campaign`."""
+        if not self.known_failures:
+            return
+        runs = {RunLabels(study, *contact).path for study in campaign.studies for contact in campaign.contacts(study)}
+        for index, failure in enumerate(self.known_failures):
+            if failure.run not in runs:
+                reason = f"is not a run; allowed: a run of the campaign, such as {min(runs)}"
+                yield ("known_failures", index, "run"), failure.run, reason
 
 
 def needed(publication: Publication) -> list[str]:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from icha.configuration.model import SURFACE_KINDS, Campaign
+from icha.configuration.campaign import Campaign
+from icha.configuration.surfaces import SURFACE_KINDS
 
 SCHEMA = Path("workflow/schemas/config.schema.json")
 README = Path("config/README.md")
@@ -17,7 +18,7 @@ MARK = "<!-- generated from the model: make schema -->\n"
 
 def json_schema() -> str:
     """The schema, as editors use it to check and complete a configuration."""
-    schema = Campaign.model_json_schema()
+    schema = _schema()
     for name in _WITH_DEFAULTS:
         # What is needed may stand among the defaults.
         schema["$defs"][name].pop("required", None)
@@ -25,9 +26,14 @@ def json_schema() -> str:
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
+def _schema() -> dict:
+    # Sections are called there as in the configuration.
+    return json.loads(json.dumps(Campaign.model_json_schema()).replace("MaterialSection", "Material"))
+
+
 def key_tables() -> str:
     """Every key with its description and default, one Markdown table a section."""
-    schema = Campaign.model_json_schema()
+    schema = _schema()
     sections = {"Campaign": schema} | schema["$defs"]
     return "\n".join(_table(_HEADINGS[name], sections[name]) for name in _HEADINGS)
 

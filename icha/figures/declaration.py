@@ -7,15 +7,12 @@ they import libraries for drawing, and modules that need xarray, only where they
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
-from icha.support.values import Section
-
-# Location in the configuration, value, and what is wrong with it and allowed.
-Problem = tuple[tuple, Any, str]
+from icha.support.values import Problem, Section
 
 
 class Campaign(Protocol):
@@ -112,9 +109,3 @@ class Figure:
     inputs: Callable[[Campaign, Any, ResultFiles], Inputs] = dataset_only
     arguments: Callable[[Campaign, Any], dict[str, Any]] = lambda campaign, options: {}
     holds_topography: bool = False
-
-
-def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
-    """The problem of a name that is none of some section's, if it is one."""
-    if name not in names:
-        yield location, name, f"is not defined; allowed: {', '.join(names) or 'none, for there is none'}"

@@ -8,9 +8,9 @@ from typing import Any, Literal
 from pydantic import Field
 
 from icha.datasets.labels import RunLabels
-from icha.figures.declaration import Campaign, FigureOptions, Problem, unknown
+from icha.figures.declaration import Campaign, FigureOptions
 from icha.path.states import Snapshot
-from icha.support.values import Flag, Label, Name, Positive, integer, list_of_names
+from icha.support.values import Flag, Label, Name, Positive, Problem, integer, list_of_names, unknown
 
 
 class StudyFigure(FigureOptions):

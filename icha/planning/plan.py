@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
-from icha.configuration.expansion import run_settings, run_sha256
-from icha.configuration.model import Campaign, SelfAffineSurface
+from icha.configuration.campaign import Campaign
+from icha.configuration.settings import run_settings, run_sha256
+from icha.configuration.surfaces import SelfAffineSurface
 from icha.datasets.results import job_file
 from icha.planning import costs
 from icha.planning.results import campaign_files

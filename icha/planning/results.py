@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from icha.configuration.expansion import (
-    asperity_cases,
-    loop_cases,
-    run_cases,
-    solution_cases,
-    source_cases,
-    surface_cases,
-)
-from icha.configuration.model import Campaign
+from icha.configuration.campaign import Campaign
+from icha.configuration.cases import asperity_cases, loop_cases, run_cases, solution_cases, source_cases, surface_cases
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, parts
 

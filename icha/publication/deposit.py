@@ -19,7 +19,7 @@ from typing import BinaryIO
 import xarray as xr
 
 from icha.analysis.checks import read_checks, refuse_unknown_failures
-from icha.configuration.model import Campaign
+from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
 from icha.datasets.files import read_campaign
 from icha.planning.costs import Cost

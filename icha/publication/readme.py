@@ -14,8 +14,9 @@ import numpy as np
 import xarray as xr
 
 from icha.analysis.checks import COMPLETED, Check, worst
-from icha.configuration.model import Campaign, SelfAffineSurface
+from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
+from icha.configuration.surfaces import SelfAffineSurface
 from icha.datasets.campaign_file import LABELS
 from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.datasets.labels import RunLabels

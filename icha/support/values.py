@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any
@@ -118,8 +119,17 @@ def exactly_one(section):
     return section
 
 
+# Location in a configuration, value, and what is wrong with it and allowed.
+Problem = tuple[tuple, Any, str]
 # In the place of a value that is not there, in problems.
 NOTHING = object()
+
+
+def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
+    """The problem of a name that is none of some section's, if it is one."""
+    if name not in names:
+        yield location, name, f"is not defined; allowed: {', '.join(names) or 'none, for there is none'}"
+
 
 Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=80)]
 # A name, or that of a variant made by a study's `vary`.

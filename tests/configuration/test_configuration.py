@@ -9,32 +9,35 @@ import yaml
 
 import icha
 import icha.surfaces.measured.topography
-from icha.configuration import model
-from icha.configuration.design import value_label
-from icha.configuration.expansion import (
+from icha.configuration.cases import (
     asperity_cases,
-    campaign_sha256,
     loop_cases,
-    loop_settings,
     map_solution,
-    measurement_settings,
     run_cases,
-    run_settings,
-    run_sha256,
     solution_cases,
-    solution_settings,
     source_cases,
-    source_settings,
     surface_cases,
-    surface_settings,
 )
-from icha.configuration.load import ConfigurationError, load_configuration, read_yaml
-from icha.configuration.problems import warnings
+from icha.configuration.design import value_label
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.load import load_configuration
 from icha.configuration.publication import needed
 from icha.configuration.schema import json_schema, readme_with_tables
+from icha.configuration.settings import (
+    campaign_sha256,
+    loop_settings,
+    measurement_settings,
+    run_settings,
+    run_sha256,
+    solution_settings,
+    source_settings,
+    surface_settings,
+)
+from icha.configuration.yaml_files import read_yaml
 from icha.datasets.labels import number_label
 from icha.references.literature import literature
 from icha.support.units import to_number, to_si
+from icha.support.values import Section
 
 REPOSITORY = Path(__file__).parents[2]
 SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])
@@ -113,7 +116,7 @@ def test_numbers_that_yaml_reads_as_text_are_numbers():
 def test_shipped_campaigns_are_valid(path):
     campaign = load_configuration(path).campaign
     assert run_cases(campaign)
-    assert not warnings(campaign)
+    assert not campaign.warnings()
     assert path.name == "config.yaml" or campaign.name == path.stem
 
 
@@ -1132,15 +1135,15 @@ def test_missing_file(tmp_path):
 
 
 def test_few_cells_are_a_warning(load):
-    assert not warnings(load().campaign)
-    (warning,) = warnings(load({"surfaces.rough.grid": 30}).campaign)
+    assert not load().campaign.warnings()
+    (warning,) = load({"surfaces.rough.grid": 30}).campaign.warnings()
     assert "surfaces.rough.grid: 30 gives 3 grid cells" in warning
-    assert warnings(load({"surfaces.rough.grid": 20}).campaign)
+    assert load({"surfaces.rough.grid": 20}).campaign.warnings()
 
 
 def test_slopes_that_no_surface_has_are_a_warning(load):
     changes = {"surfaces.rough": _measured_surface(height_unit="um"), "studies.one.rms_slopes": "measured"}
-    (warning,) = warnings(load(changes).campaign)
+    (warning,) = load(changes).campaign.warnings()
     assert "surfaces.rough: the topography has an rms slope of 145" in warning and "units" in warning
 
 
@@ -1252,6 +1255,6 @@ def test_every_key_is_described():
         for child in kind.__subclasses__():
             yield from sections(child)
 
-    for section in sections(model.Section):
+    for section in sections(Section):
         for key, field in section.model_fields.items():
             assert field.description, f"{section.__name__}.{key}"

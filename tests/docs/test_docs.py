@@ -17,9 +17,9 @@ import pytest
 import yaml
 
 import icha
-from icha.configuration.expansion import run_cases
+from icha.configuration.campaign import Campaign
+from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
-from icha.configuration.model import Campaign
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import write_dataset
 

@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 import pytest
 import small_campaign as small
 
-from icha.configuration.expansion import solution_cases
+from icha.configuration.cases import solution_cases
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import write_dataset

@@ -36,10 +36,10 @@ from typer.testing import CliRunner
 
 from icha.analysis.checks import check_campaign, read_checks
 from icha.cli import app
-from icha.configuration.expansion import campaign_sha256
-from icha.configuration.inputs import with_files_beside_it
 from icha.configuration.load import load_configuration
+from icha.configuration.named_files import with_files_beside_it
 from icha.configuration.publication import Author, Funding, KnownFailure
+from icha.configuration.settings import campaign_sha256
 from icha.planning.costs import Cost
 from icha.planning.plan import whole_cost
 from icha.publication import deposit as deposits

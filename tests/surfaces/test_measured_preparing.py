@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scans import NM, SIZE, UM, centred, preparation, scan, write_xyz
 
-from icha.configuration.topography import MeasuredSurface
+from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.datasets.files import read_dataset, read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography, topography_facts

@@ -17,8 +17,8 @@ import yaml
 from conftest import FIGURES, REPOSITORY, SMOKE, copy_project, snakemake, snakemake_command
 from traces import traces
 
-from icha.configuration.expansion import campaign_sha256
 from icha.configuration.load import load_configuration
+from icha.configuration.settings import campaign_sha256
 
 CAMPAIGNS = ["config/config.yaml", *(f"config/campaigns/{p.name}" for p in (REPOSITORY / "config/campaigns").iterdir())]
 

@@ -12,24 +12,9 @@ from command_line import campaign_configuration
 from fingerprint import code_fingerprint, imported_modules
 from publishable import refuse_unpublishable
 
-from icha.configuration.expansion import (
-    asperity_cases,
-    campaign_sha256,
-    loop_cases,
-    loop_settings,
-    map_solution,
-    measurement_settings,
-    run_cases,
-    run_settings,
-    run_sha256,
-    solution_cases,
-    solution_settings,
-    source_cases,
-    source_settings,
-    surface_cases,
-    surface_settings,
-)
-from icha.configuration.inputs import with_files_beside_it
+from icha.configuration.cases import asperity_cases, loop_cases, map_solution, run_cases, solution_cases, source_cases, surface_cases
+from icha.configuration.settings import campaign_sha256, loop_settings, measurement_settings, run_settings, run_sha256, solution_settings, source_settings, surface_settings
+from icha.configuration.named_files import with_files_beside_it
 from icha.planning.costs import job_threads
 from icha.publication.attributes import discovery_attributes
 from icha.publication.source import committed_source

@@ -5,8 +5,8 @@ import textwrap
 
 from job import guarded
 
-from icha.configuration.measurement import read_columns
 from icha.datasets.files import read_campaign, read_dataset
+from icha.datasets.measured_table import read_columns
 from icha.figures.select import NothingToDraw
 from icha.figures.style import GREY, new_figure, save, styled
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from icha.configuration.topography import MeasuredSurface
+from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.surfaces.measured.settings import Preparation
 
 SECTION = {"kind": "measured", "path": "scan.npy", "boundary": "mirror", "height_unit": "nm", "size": "90 um"}

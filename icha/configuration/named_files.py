@@ -10,7 +10,8 @@ from pathlib import Path, PurePosixPath
 
 import yaml
 
-from icha.configuration.load import Configuration, dumped
+from icha.configuration.load import Configuration
+from icha.configuration.yaml_files import dumped
 
 FOLDER = "inputs"
 

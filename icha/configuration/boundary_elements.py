@@ -1,0 +1,171 @@
+"""Sections of boundary elements: beside runs, both ways, for the sources of the error, of one asperity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any
+
+from pydantic import (
+    AfterValidator,
+    Field,
+    field_validator,
+)
+
+from icha.asperity.cohesive_zone import resolution_problem
+from icha.asperity.material import Material
+from icha.configuration.values import MAX_GRID
+from icha.path.limits import MAX_STEP
+from icha.path.states import ReducedPressure
+from icha.support.values import (
+    Label,
+    Name,
+    Positive,
+    Problem,
+    Section,
+    Seeds,
+    distinct,
+    increasing,
+    integer,
+    list_of_names,
+    number,
+    stops,
+    unknown,
+)
+
+
+class BesideStudy(Section):
+    """Boundary elements on the topographies of a study."""
+
+    study: Name = Field(description="Name of the study on whose topographies they are solved.")
+    surfaces: list_of_names("Surfaces, of the study's. Left out: all.", Label) | None = Field(
+        default=None, description="Surfaces, of the study's. Left out: all."
+    )
+    seeds: Seeds | None = Field(default=None, description="Seeds, of the study's. Left out: all.")
+    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
+        default=None, description="Rms slopes, of the study's. Left out: all."
+    )
+    materials: list_of_names("Materials, of the study's. Left out: all.", Label) | None = Field(
+        default=None,
+        description="Materials, of the study's. Left out: all. With adhesion the grid must resolve their "
+        "`interaction_range`.",
+    )
+    tolerance: number("a number in [1e-12, 1e-4]", least=1e-12, most=1e-4) = Field(
+        default=1e-8, description="Relative error at which the solver may stop."
+    )
+
+    def problems(self, campaign: Any) -> Iterator[Problem]:
+        """What of the study is not there, or cannot be solved; of an `icha.configuration.campaign.Campaign`."""
+        yield from unknown(("study",), self.study, campaign.studies)
+        if self.study in campaign.studies:
+            yield from self._study_problems(campaign, campaign.studies[self.study])
+
+    def _study_problems(self, campaign, study):
+        for key in ("surfaces", "seeds", "rms_slopes", "materials"):
+            there = getattr(study, key)
+            for index, value in enumerate(getattr(self, key) or []):
+                if value not in there:
+                    allowed = ", ".join(map(str, there))
+                    yield (key, index), value, f"is not in study {self.study!r}; allowed: {allowed}"
+        contacts = campaign.solved(self)
+        if not contacts:
+            yield (), self.study, "has no run with all that is asked for; allowed: combinations that the study has"
+        for name in dict.fromkeys(each.surface for each in contacts):
+            if campaign.boundary(name) != "periodic":
+                reason = (
+                    "has a surface without periods; allowed: studies of periodic surfaces, as boundary elements are"
+                )
+                yield ("study",), self.study, f"{reason} ({name!r} is not)"
+                continue
+            yield from self._unresolved(campaign, name)
+            nodes = campaign.grid(name) * self.refinement
+            if nodes > MAX_GRID:
+                reason = f"gives {nodes} nodes a side on {name!r}; allowed: {MAX_GRID} at most"
+                yield ("refinement",), self.refinement, reason
+
+    def _unresolved(self, campaign, surface):
+        """Materials whose attraction the grid of a surface does not resolve."""
+        spacing = campaign.period(surface) / (campaign.grid(surface) * self.coarsest)
+        for label in dict.fromkeys(each.material for each in campaign.solved(self) if each.surface == surface):
+            material = Material(**campaign.materials[label].model_dump())
+            if problem := resolution_problem(material, spacing):
+                yield ("materials",), label, f"on surface {surface!r}: {problem}"
+
+
+Loads = Annotated[
+    stops(ReducedPressure, increasing),
+    Field(
+        description="Loads p/(E* h'rms), increasing. Those of `boundary_elements` become snapshots of the study's runs."
+    ),
+]
+Refinement = Annotated[
+    integer(1, 16),
+    Field(description="Cells per cell of the surface's own grid, along a side; heights are interpolated."),
+]
+
+
+class BoundaryElements(BesideStudy):
+    """Boundary-element solutions of a study's own topographies, beside its runs."""
+
+    reduced_pressures: Loads
+    refinement: Refinement = 1
+
+    @property
+    def coarsest(self) -> int:
+        """Smallest number of cells per cell of the surface's grid."""
+        return self.refinement
+
+
+class BoundaryElementLoops(BesideStudy):
+    """Boundary elements from separation to the largest load of a study's runs and back."""
+
+    refinement: Refinement = 1
+    separation_step: number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
+        default=0.05, description="Change of the mean gap from one solution to the next, in units of h_rms."
+    )
+
+    @property
+    def coarsest(self) -> int:
+        """Smallest number of cells per cell of the surface's grid."""
+        return self.refinement
+
+    def _study_problems(self, campaign, study):
+        """What the way back needs of the study, too."""
+        if not study.unload or study.turning_points:
+            reason = "does not come straight back; allowed: a study with `unload: true` and without turning points"
+            yield ("study",), self.study, reason
+        if study.targets.last[0] != "reduced_pressure":
+            reason = "has no reduced pressures for targets; allowed: a study with them, whose last one is where to turn"
+            yield ("study",), self.study, reason
+        yield from super()._study_problems(campaign, study)
+
+
+class ErrorSources(BesideStudy):
+    """Variants between the model and boundary elements, each of which changes one thing."""
+
+    reduced_pressures: Loads
+    refinement: integer(1, 16) = Field(
+        default=2, description="Cells per cell of the surface's own grid, along a side: even, since half is tried too."
+    )
+
+    @field_validator("refinement")
+    @classmethod
+    def _half_of_it_can_be_tried(cls, value):
+        if value % 2:
+            raise ValueError("is odd; allowed: 2, 4, … 16")
+        return value
+
+    @property
+    def coarsest(self) -> int:
+        """Smallest number of cells per cell of the surface's grid."""
+        return self.refinement // 2
+
+
+class OneAsperity(Section):
+    """One asperity by the model and by boundary elements, where the answer is known."""
+
+    tabor_parameters: Annotated[
+        list[number("a number in [1.5, 6]", least=1.5, most=6)], Field(min_length=1), AfterValidator(increasing)
+    ] = Field(
+        description="Tabor parameters, increasing; boundary elements take a grid that grows with their square, 800 "
+        "nodes a side and some minutes at 4. Hertz's contact is always computed."
+    )

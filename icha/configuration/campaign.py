@@ -1,0 +1,252 @@
+"""What a campaign is: surfaces, materials, and the studies that press one against the other.
+
+Values are kept in SI units. The text of a configuration file becomes these objects in `icha.configuration.load`; what
+is wrong with it is worded in `icha.configuration.errors`; the JSON schema is generated from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path as FilePath
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import (
+    Field,
+    PrivateAttr,
+)
+
+from icha.configuration.boundary_elements import (
+    BesideStudy,
+    BoundaryElementLoops,
+    BoundaryElements,
+    ErrorSources,
+    OneAsperity,
+)
+from icha.configuration.figures import Figures
+from icha.configuration.materials import MaterialSection
+from icha.configuration.measurements import Measurement
+from icha.configuration.publication import Publication
+from icha.configuration.studies import Study
+from icha.configuration.surfaces import AnySurface, SelfAffineSurface
+from icha.configuration.values import MEASURED
+from icha.support.values import (
+    ROUNDING,
+    Name,
+    Problem,
+    Section,
+    Text,
+)
+
+# Sections of entries that belong to a study.
+BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
+# Rms slopes beyond this are rather a mistake about units than a surface.
+_STEEP = 3.0
+
+
+class Contact(NamedTuple):
+    """What is pressed against what in one run of a study; the slope is `measured` until that is known."""
+
+    surface: str
+    seed: int
+    rms_slope: float
+    material: str
+
+
+class Topography(NamedTuple):
+    """What the plan of a campaign needs to know of a topography from a file."""
+
+    grid: int
+    period: float  # m
+    boundary: str
+    rms_slope: float | None  # None where no study asks for it
+    sha256: str
+
+
+class Defaults(Section):
+    """Values for every entry of a section that does not give its own."""
+
+    surfaces: dict[str, Any] = Field(
+        default={}, description="Keys of surfaces; every surface takes those that its kind has."
+    )
+    materials: dict[str, Any] = Field(default={}, description="Keys of materials.")
+    studies: dict[str, Any] = Field(default={}, description="Keys of studies.")
+
+
+class Campaign(Section):
+    """A campaign: everything that one configuration file asks for."""
+
+    name: Name = Field(description="Name of the campaign; results go to `results/<name>/`.")
+    title: Text = Field(description="One line that says what the campaign is.")
+    summary: Text = Field(description="A few sentences for readers of the datasets and of the report.")
+    license: Text = Field(description="Licence of the data, as an SPDX identifier such as `CC-BY-4.0`.")
+    defaults: Defaults = Field(
+        default=Defaults(), description="Values for all surfaces, materials or studies that do not give their own."
+    )
+    surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)] = Field(
+        description="Surfaces by name: `kind: self_affine`, `kind: measured` or `kind: file`."
+    )
+    materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)] = Field(description="Materials by name.")
+    studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
+    boundary_elements: dict[Name, BoundaryElements] = Field(
+        default={}, description="Boundary-element solutions by name, compared with the runs of a study."
+    )
+    boundary_element_loops: dict[Name, BoundaryElementLoops] = Field(
+        default={}, description="Boundary elements both ways by name, beside the runs of a study that unload."
+    )
+    error_sources: dict[Name, ErrorSources] = Field(
+        default={}, description="Studies of where the model's error comes from, by name."
+    )
+    one_asperity: OneAsperity | None = Field(
+        default=None, description="One asperity by the model and by boundary elements."
+    )
+    measurements: dict[Name, Measurement] = Field(
+        default={}, description="Measurements by name, overlaid on figure 5. None are shipped with ICHA."
+    )
+    figures: Figures = Field(default=Figures(), description="Figures and what they show.")
+    publication: Publication = Field(
+        default=Publication(), description="What a deposit says of itself; nothing else depends on it."
+    )
+
+    _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
+    _topographies: dict[str, Topography] = PrivateAttr(default={})
+    _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
+
+    def published(self) -> Publication:
+        """What a deposit says of itself; title, summary and licence are the campaign's where it has none of its own."""
+        own = self.publication
+        return own.model_copy(
+            update={key: getattr(own, key) or getattr(self, key) for key in ("title", "summary", "license")}
+        )
+
+    def loop_load(self, entry: BoundaryElementLoops) -> float:
+        """The reduced pressure at which boundary elements both ways turn: the last one of their study."""
+        return self.studies[entry.study].targets.last[1]
+
+    def contacts(self, study: str) -> list[Contact]:
+        """What is pressed in a study, run by run."""
+        return list(self._contacts[study])
+
+    def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
+        """The same campaign with the runs of its studies written out, and the lists of the studies to match."""
+        contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
+
+        def lists(runs):
+            columns = (list(dict.fromkeys(column)) for column in zip(*runs, strict=True))
+            return dict(zip(("surfaces", "seeds", "rms_slopes", "materials"), columns, strict=True))
+
+        studies = {label: study.model_copy(update=lists(contacts[label])) for label, study in self.studies.items()}
+        campaign = self.model_copy(update={"studies": studies})
+        campaign._contacts = contacts
+        return campaign
+
+    def with_topographies(self, topographies: Mapping[str, Topography]) -> Campaign:
+        """The same campaign with what was read of its topographies, whose slopes stand in the place of `measured`."""
+        contacts = {
+            study: [
+                each._replace(rms_slope=topographies[each.surface].rms_slope) if each.rms_slope == MEASURED else each
+                for each in runs
+            ]
+            for study, runs in self._contacts.items()
+        }
+        campaign = self.with_contacts(contacts)
+        campaign._topographies = dict(topographies)
+        return campaign
+
+    def topography(self, surface: str) -> Topography | None:
+        """What was read of a topography from a file; None of a random one."""
+        return self._topographies.get(surface)
+
+    def origin(self, section: str, name: str) -> str:
+        """The entry of a section (surfaces, materials) of which `name` is a variant, or itself."""
+        return self._origins.get((section, name), name)
+
+    def boundary(self, surface: str) -> str:
+        """What lies beyond the edges of a surface: `periodic` or `free`."""
+        topography = self.topography(surface)
+        return topography.boundary if topography else "periodic"
+
+    def grid(self, surface: str) -> int:
+        """Nodes along a side of a surface."""
+        topography = self.topography(surface)
+        return topography.grid if topography else self.surfaces[surface].grid
+
+    def period(self, surface: str) -> float:
+        """Side of a surface, m."""
+        topography = self.topography(surface)
+        return topography.period if topography else self.surfaces[surface].period
+
+    def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
+        """Kind and value of all states that the runs of a study keep; None where they keep their last one.
+
+        The loads of the study's boundary elements are among them.
+        """
+        asked = self.studies[study].snapshots
+        loads = sorted({p for e in self.boundary_elements.values() if e.study == study for p in e.reduced_pressures})
+        if asked is None and not loads:
+            return None
+        own = [self.studies[study].targets.last] if asked is None else [snapshot.target for snapshot in asked]
+        return own + [("reduced_pressure", p) for p in loads if ("reduced_pressure", p) not in own]
+
+    def solved(self, entry: BesideStudy) -> list[Contact]:
+        """The contacts for which an entry beside a study asks."""
+
+        def asked(wanted, value):
+            return wanted is None or value in wanted
+
+        return [
+            each
+            for each in self._contacts[entry.study]
+            if asked(entry.surfaces, each.surface)
+            and (asked(entry.seeds, each.seed) or not self.surfaces[each.surface].random)
+            and asked(entry.rms_slopes, each.rms_slope)
+            and asked(entry.materials, each.material)
+        ]
+
+    def problems(self) -> Iterator[Problem]:
+        """What keeps it from being run although each of its values is allowed by itself."""
+        for label, study in self.studies.items():
+            yield from _within(("studies", label), study.problems(self.snapshots_of(label)))
+        for section in (*BESIDE_STUDIES, "measurements"):
+            for label, entry in getattr(self, section).items():
+                yield from _within((section, label), entry.problems(self))
+        yield from _within(("publication",), self.publication.problems(self))
+        for label, figure in self.figures.drawn().items():
+            yield from _within(("figures", label), figure.problems(self))
+
+    def warnings(self) -> list[str]:
+        """What is allowed but not advisable."""
+        found = []
+        for name in dict.fromkeys(name for study in self.studies.values() for name in study.surfaces):
+            surface, topography = self.surfaces[name], self.topography(name)
+            origin = self.origin("surfaces", name)
+            variant = "" if origin == name else f" (variant {name})"
+            if isinstance(surface, SelfAffineSurface) and surface.cells_per_short_wave < 4 * (1 - ROUNDING):
+                found.append(
+                    f"surfaces.{origin}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per "
+                    f"shortest wavelength{variant}; 4 are the least advisable, 8 recommended"
+                )
+            if topography is not None and (topography.rms_slope or 0) > _STEEP:
+                found.append(
+                    f"surfaces.{origin}: the topography has an rms slope of {topography.rms_slope:g}{variant}; check "
+                    "its units of height and length, its size, and whether a number stands for points that are missing"
+                )
+        return found
+
+    def with_files_beside(self, folder: FilePath) -> Campaign:
+        """The same campaign with the paths of its files taken relative to `folder`."""
+
+        def placed(section):
+            return section.model_copy(update={"path": str(folder / section.path)})
+
+        return self.model_copy(
+            update={
+                "surfaces": {n: s if s.random else placed(s) for n, s in self.surfaces.items()},
+                "measurements": {name: placed(m) for name, m in self.measurements.items()},
+            }
+        )
+
+
+def _within(location: tuple, problems: Iterable[Problem]) -> Iterator[Problem]:
+    """The problems of a section at their places in the whole."""
+    for place, value, reason in problems:
+        yield (*location, *place), value, reason

@@ -1,0 +1,97 @@
+"""Errors of a configuration in words: file, key, value, what is wrong with it and what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from icha.configuration.campaign import Campaign
+from icha.configuration.surfaces import SURFACE_KINDS
+from icha.support.values import NAME_PATTERN, NOTHING, Problem
+
+
+class ConfigurationError(ValueError):
+    """A configuration that cannot be run; the message lists file, key, value and what is allowed, line by line."""
+
+
+def line(origin: str, location: tuple, value: Any, reason: str) -> str:
+    """A problem as a line for the author of the file."""
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+    shown = "" if value is NOTHING else " (empty)" if value is None else f" {_short(value)}"
+    return f"{origin}: {key or 'top level'}:{shown} {reason}"
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def problem_of(details: Mapping, content: Mapping) -> Problem:
+    """One error of pydantic as (location, value, reason and what is allowed), in this project's words."""
+    location = _without_tags(details["loc"])
+    value, kind, context = details["input"], details["type"], details.get("ctx", {})
+    if location[-1:] == ("[key]",):
+        location = location[:-1]
+    if kind == "value_error":
+        reason = str(context["error"])
+        # A model's own error concerns all its keys; the reason names them.
+        return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
+    if kind == "extra_forbidden":
+        section = _section_at(location[:-1], content)
+        allowed = sorted(section.model_fields) if section else []
+        near = difflib.get_close_matches(str(location[-1]), allowed, 1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        return location, NOTHING, f"unknown key{hint}; allowed: {', '.join(allowed)}"
+    if kind == "missing":
+        section = _section_at(location[:-1], content)
+        field = section.model_fields.get(location[-1]) if section else None
+        return location, NOTHING, f"the key is missing; needed: {field.description if field else 'a value'}"
+    if kind in ("union_tag_not_found", "union_tag_invalid"):
+        given = value.get("kind", NOTHING) if isinstance(value, Mapping) else value
+        return (*location, "kind"), given, f"is no kind of surface; allowed: {', '.join(SURFACE_KINDS)}"
+    if kind == "string_pattern_mismatch" and context.get("pattern") == NAME_PATTERN:
+        return location, value, "is not a name; allowed: lower-case letters, digits, '_' and '-'"
+    if kind in ("too_short", "string_too_short"):
+        return location, value, "is empty; allowed: at least one entry"
+    if kind == "literal_error":
+        return location, value, f"is not a choice; allowed: {context['expected']}"
+    wrong_type = {
+        "list_type": "is not a list; allowed: a list, such as [a, b]",
+        "dict_type": "is not a mapping; allowed: names with their sections",
+        "model_type": "is not a section; allowed: a mapping of keys to values",
+        "model_attributes_type": "is not a section; allowed: a mapping of keys to values",
+        "string_type": "is not text; allowed: text (in quotes if it looks like a number)",
+    }
+    return location, value, wrong_type.get(kind, f"{details['msg'].lower()}")
+
+
+def _without_tags(location: tuple) -> tuple:
+    """The location without what pydantic adds to it: the kind of a surface (its section holds no such key)."""
+    if len(location) > 2 and location[0] == "surfaces" and location[2] in SURFACE_KINDS:
+        location = (*location[:2], *location[3:])
+    return location
+
+
+def _section_at(location: tuple, content: Any) -> type[BaseModel] | None:
+    """The model of the section at `location`."""
+    kind: Any = Campaign
+    for part in location:
+        content = content[part]
+        is_section = isinstance(kind, type) and issubclass(kind, BaseModel)
+        kind = kind.model_fields[part].annotation if is_section else get_args(kind)[-1]
+        kind = _one_of(kind, content)
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+def _one_of(kind: Any, content: Any) -> Any:
+    """The type that is meant where there may be nothing or one of several kinds of surfaces."""
+    if get_origin(kind) is Annotated:
+        return _one_of(get_args(kind)[0], content)
+    if get_origin(kind) not in (Union, UnionType):
+        return kind
+    kinds = [each for each in get_args(kind) if each is not type(None)]
+    return _one_of(kinds[0], content) if len(kinds) == 1 else SURFACE_KINDS.get(content.get("kind"), kinds[0])

@@ -1,0 +1,102 @@
+"""Everything that determines a file's numbers, in SI units: what jobs are told, and checksums of it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+from icha.configuration.boundary_elements import BesideStudy
+from icha.configuration.campaign import Campaign
+from icha.configuration.cases import run_cases
+from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
+
+
+def surface_settings(campaign: Campaign, name: str) -> dict:
+    """Everything that determines a topography but its seed and its file, in SI units."""
+    surface = campaign.surfaces[name]
+    if surface.random:
+        return surface.model_dump()
+    if isinstance(surface, MeasuredSurface):
+        return {"kind": surface.kind} | surface.preparation
+    return {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.metres_per_unit}
+
+
+def run_settings(campaign: Campaign, case: RunLabels) -> dict:
+    """Everything that determines a run's numbers, in SI units: arguments of the model's own objects."""
+    return {
+        "material": campaign.materials[case.material].model_dump(),
+        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
+        "rms_slope": case.rms_slope,
+        "seed": case.seed,
+    }
+
+
+def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
+    """Everything but the topography that determines a boundary-element solution, in SI units."""
+    entry = campaign.boundary_elements[case.entry]
+    return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
+
+
+def source_settings(campaign: Campaign, case: ContactLabels) -> dict:
+    """Everything but the topography that determines a study of the sources of the error, in SI units."""
+    entry = campaign.error_sources[case.entry]
+    return _solver_settings(campaign, entry, case) | {"reduced_pressures": entry.reduced_pressures}
+
+
+def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
+    """Everything but the topography that determines boundary elements both ways, in SI units."""
+    entry = campaign.boundary_element_loops[case.entry]
+    own = {"largest_reduced_pressure": campaign.loop_load(entry), "separation_step": entry.separation_step}
+    return _solver_settings(campaign, entry, case) | own
+
+
+def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabels | ContactLabels) -> dict:
+    """What boundary elements are told but for their loads."""
+    return {
+        "material": campaign.materials[case.material].model_dump(),
+        "rms_slope": case.rms_slope,
+        "seed": case.seed,
+        "refinement": entry.refinement,
+        "tolerance": entry.tolerance,
+    }
+
+
+def measurement_settings(campaign: Campaign, study: str) -> list[dict]:
+    """The measurements that belong to a study, as a figure needs them, but for their files."""
+    return [
+        {
+            "label": measurement.label,
+            "citation": measurement.citation,
+            "columns": measurement.columns,
+            "load_unit": _load_unit(campaign, measurement),
+            "material": measurement.material,
+            "rms_slope": measurement.rms_slope,
+        }
+        for measurement in campaign.measurements.values()
+        if measurement.study == study
+    ]
+
+
+def _load_unit(campaign, measurement) -> float:
+    """What a measured load is divided by to become p/(E* h'rms)."""
+    if not measurement.load_is_pressure:
+        return 1.0
+    return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
+
+
+def run_sha256(campaign: Campaign, case: RunLabels) -> str:
+    """Checksum of everything that determines a run."""
+    topography = campaign.topography(case.surface)
+    file = [topography.sha256] if topography else []
+    return _sha256([run_settings(campaign, case), surface_settings(campaign, case.surface), *file])
+
+
+def campaign_sha256(campaign: Campaign) -> str:
+    """Checksum of everything that determines the runs of a campaign: not of its figures or its title."""
+    return _sha256({case.path: run_sha256(campaign, case) for case in run_cases(campaign)})
+
+
+def _sha256(settings) -> str:
+    """Checksum of settings, whatever their order or the units that they were written in."""
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,225 @@
+"""Section `studies`: surfaces, materials, and the path along which one is pressed against the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, get_args, get_origin
+
+from pydantic import (
+    AfterValidator,
+    Field,
+    WithJsonSchema,
+    create_model,
+    model_validator,
+)
+
+from icha.configuration.materials import MaterialSection
+from icha.configuration.surfaces import SURFACE_KINDS
+from icha.configuration.values import Slope, Slopes, Values
+from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.path.states import AreaFraction, ReducedPressure, Snapshot
+from icha.path.targets import Path
+from icha.support.values import (
+    Flag,
+    Length,
+    Name,
+    Problem,
+    Section,
+    Seeds,
+    Text,
+    decreasing,
+    distinct,
+    exactly_one,
+    increasing,
+    integer,
+    list_of_names,
+    number,
+    stops,
+)
+
+
+class Targets(Section):
+    """The stops of the loading path: exactly one of the three lists."""
+
+    reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
+        default=None, description=f"Reduced pressures p/(E* h'rms), increasing, up to {MAX_REDUCED_PRESSURE}."
+    )
+    area_fractions: stops(AreaFraction, increasing) | None = Field(
+        default=None, description=f"Contact area fractions A/A0, increasing, up to {MAX_AREA_FRACTION}."
+    )
+    mean_separations: stops(Length, decreasing) | None = Field(
+        default=None, description="Mean separations with their unit, decreasing."
+    )
+
+    _check = model_validator(mode="after")(exactly_one)
+
+    @property
+    def last(self) -> tuple[str, float]:
+        """Kind and value (SI units) of the last stop."""
+        ((kinds, values),) = self.model_dump(exclude_none=True).items()
+        return kinds.removesuffix("s"), values[-1]
+
+
+class TurningPoint(Section):
+    """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
+
+    reduced_pressure: (
+        number(f"a number of at most {MAX_REDUCED_PRESSURE}, which the model covers", most=MAX_REDUCED_PRESSURE) | None
+    ) = Field(default=None, description="At this p/(E* h'rms).")
+    relative_load: number("a number") | None = Field(default=None, description="At this p/E* = F/(E* A0).")
+    area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
+    mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
+
+    _check = model_validator(mode="after")(exactly_one)
+
+    @property
+    def target(self) -> tuple[str, float]:
+        """Kind and value (SI units) of the state."""
+        ((kind, value),) = self.model_dump(exclude_none=True).items()
+        return kind, value
+
+
+def _scalars(*sections: type[Section]) -> dict[str, str]:
+    """Names of the parameters of some kinds of sections that a study may vary, and what they mean."""
+    found: dict[str, str] = {}
+    for section in sections:
+        for name, field in section.model_fields.items():
+            kinds = get_args(field.annotation) or (field.annotation,)
+            whole = any(get_origin(kind) is tuple or isinstance(kind, type(Section)) for kind in kinds)
+            if name not in ("kind", "path") and not whole:
+                found.setdefault(name, field.description)
+    return found
+
+
+SCALARS = _scalars(*SURFACE_KINDS.values(), MaterialSection)
+
+
+def _of_scalars(name, kind, doc, fields=None):
+    """A section with a key, of type `kind`, for every parameter that can be varied."""
+    scalars = {key: (kind | None, Field(default=None, description=text)) for key, text in SCALARS.items()}
+    return create_model(name, __base__=Section, __doc__=doc, __module__=__name__, **(fields or {}), **scalars)
+
+
+Vary = _of_scalars(
+    "Vary", Values, "Parameters of a study's surfaces and materials that it varies: a value each, or a list of them."
+)
+Scalar = Annotated[Any, WithJsonSchema({"type": ["string", "number", "boolean"]})]
+Case = _of_scalars(
+    "Case",
+    Scalar,
+    "One entry of an explicit list of runs; what it does not name is taken from the lists of its study.",
+    {
+        "surface": (Name | None, Field(default=None, description="Name of a surface.")),
+        "seed": (integer(0) | None, Field(default=None, description="Seed.")),
+        "rms_slope": (Slope | None, Field(default=None, description="Rms slope, or `measured`.")),
+        "material": (Name | None, Field(default=None, description="Name of a material.")),
+    },
+)
+
+
+class Study(Section):
+    """Every surface, seed, slope and material of the lists, each with each, along one path."""
+
+    surfaces: list_of_names("Names of surfaces.") = Field(default=[], description="Names of surfaces.")
+    seeds: Seeds = Field(
+        default=[1],
+        description="Seeds of the random phases: a list, or a range such as `1..50`. Surfaces read from a file have "
+        "none and are used once.",
+    )
+    rms_slopes: Slopes = Field(
+        default=[],
+        description="Rms slopes h'rms to which each topography's heights are scaled; `measured` is the slope that a "
+        "topography read from a file has.",
+    )
+    materials: list_of_names("Names of materials.") = Field(default=[], description="Names of materials.")
+    vary: Vary | None = Field(
+        default=None,
+        description="Parameters of the surfaces and materials that take other values in this study, each with each.",
+    )
+    zip: list[Annotated[list[Text], Field(min_length=2)]] = Field(
+        default=[],
+        description="Groups of lists that go along together, first with first and second with second, instead of each "
+        "with each: `[[rms_slopes, surface_energy]]`.",
+    )
+    cases: Annotated[list[Case], Field(min_length=1)] | None = Field(
+        default=None,
+        description="An explicit list of runs instead of the lists of the study, which serve for what a case does not "
+        "name.",
+    )
+    targets: Targets = Field(description="Stops of the loading path.")
+    snapshots: Annotated[list[Snapshot], AfterValidator(distinct)] | None = Field(
+        default=None,
+        description="States of which spots and distributions are kept; each is hit exactly. Left out: the last target.",
+    )
+    unload: Flag = Field(
+        default=False, description="Whether the surfaces are pulled apart again, until nothing touches any more."
+    )
+    turning_points: list[TurningPoint] = Field(
+        default=[],
+        description="States at which the path turns after its last target: the first ends unloading, the second "
+        "loading again, and so on.",
+    )
+    control: Literal["separation", "load"] = Field(
+        default="separation",
+        description="What is imposed: the mean separation, or the load, under which the state jumps where the curve "
+        "turns back; then all targets and turning points are loads.",
+    )
+    united_until: Literal["detachment", "overlap"] = Field(
+        default="detachment",
+        description="Until when coalesced spots stay one on the way back: until they detach as a whole and fall back "
+        "into their asperities, or until the two spots that they were made of would no longer overlap.",
+    )
+    max_step: number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
+        default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
+    )
+
+    def check_path(self, snapshots: list[tuple[str, float]] | None) -> None:
+        """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
+        Path(**self.path_settings(snapshots))
+
+    def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
+        """Arguments of the path of its runs (`icha.Path`); those that are left at their defaults are left out."""
+        settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
+        if self.unload or self.turning_points:
+            settings |= {
+                "unload": self.unload,
+                "turning_points": [point.target for point in self.turning_points],
+                "control": self.control,
+                "united_until": self.united_until,
+            }
+        elif self.control != "separation":
+            settings["control"] = self.control
+        return settings
+
+    def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
+        """What keeps it from being run with these snapshots (`Campaign.snapshots_of`)."""
+        yield from self._load_problems()
+        yield from self._path_problems(snapshots)
+
+    def _load_problems(self):
+        """Loads that a slope makes too large for the model."""
+        for key in ("snapshots", "turning_points"):
+            for index, state in enumerate(getattr(self, key) or []):
+                for slope in self.rms_slopes:
+                    if (state.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
+                        yield (
+                            (key, index, "relative_load"),
+                            state.relative_load,
+                            f"at rms slope {slope:g} is a reduced pressure of {state.relative_load / slope:g}; "
+                            f"allowed: relative loads up to {MAX_REDUCED_PRESSURE * min(self.rms_slopes):g}",
+                        )
+
+    def _path_problems(self, snapshots):
+        """What keeps the way back from being a path."""
+        if not (self.unload or self.turning_points or self.control != "separation"):
+            return
+        try:
+            self.check_path(snapshots)
+        except ValueError as error:
+            key, _, reason = str(error).partition(": ")
+            name, _, index = key.partition("[")
+            place, value = (name,), getattr(self, name)
+            if index:
+                kind, value = value[int(index.rstrip("]"))].target
+                place = (name, int(index.rstrip("]")), kind)
+            yield place, value, reason.removeprefix(f"{value!r} ")
