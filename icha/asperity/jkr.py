@@ -13,6 +13,9 @@ import numpy as np
 
 from icha.asperity.material import Material
 
+# Wu's jump-in formula was verified between these Tabor parameters.
+WU_RANGE = (2.0, 5.0)
+
 _MAX_NEWTON_STEPS = 200
 
 
@@ -109,6 +112,11 @@ class JKR:
             return np.zeros(np.shape(R))
         wu = (1 - 2.641 * self.material.tabor_parameter(R) ** (3 / 7)) * self.material.interaction_range
         return np.clip(wu, self.jump_off_approach(R), 0.0)
+
+    def is_jump_in_verified(self, R):
+        """Whether Wu's formula was verified at the Tabor parameter of these paraboloids."""
+        mu = self.material.tabor_parameter(R)
+        return (mu >= WU_RANGE[0]) & (mu <= WU_RANGE[1])
 
     # --- the half-space around the spot ---------------------------------------------------------------------
 

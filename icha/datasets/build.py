@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,3 +41,34 @@ def variable(description: Variable, values: Any) -> xr.Variable:
     """A variable with the dimensions, type and attributes of its description."""
     dtype = object if description.dtype is str else description.dtype
     return xr.Variable(description.dims, np.asarray(values, dtype), description.attributes)
+
+
+def of(thing: Any, *names: str) -> dict[str, Any]:
+    """Values that a surface, a material or a spectrum has under the names of their variables."""
+    return {name: getattr(thing, name) for name in names}
+
+
+def stacked(
+    table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
+) -> dict[str, np.ndarray]:
+    """Rows of values, one for each position along a dimension, as arrays of all variables that begin with it.
+
+    Parameters
+    ----------
+    sizes : of further dimensions.
+    """
+    names = [name for name, own in table.items() if own.dims[:1] == (dim,) and name != dim]
+    shapes = {name: (len(rows), *(sizes[each] for each in table[name].dims[1:])) for name in names}
+    values = {name: np.array([row[name] for row in rows]).reshape(shapes[name]) for name in names}
+    return values | ({dim: np.arange(len(rows))} if dim in table else {})
+
+
+def joined(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
+    """The variables of a table along a ragged dimension, of which every row has as many values as it likes.
+
+    They stand one after the other, and `<dim>_<instance>` says to which row each belongs.
+    """
+    index = f"{dim}_{instance}"
+    names = [name for name, own in table.items() if own.dims == (dim,) and name != index]
+    values = {name: np.concatenate([np.empty(0), *(row[name] for row in rows)]) for name in names}
+    return values | {index: np.repeat(np.arange(len(rows)), [len(row[names[0]]) for row in rows])}

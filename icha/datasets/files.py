@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from icha.datasets.attributes import INPUT, discovery
-from icha.datasets.build import build
+from icha.datasets.build import build, of
 from icha.datasets.netcdf import (
     COMPRESSION,
     FLOAT_FILL,
@@ -29,6 +29,7 @@ from icha.datasets.netcdf import (
     is_text,
 )
 from icha.datasets.variables.surface import SURFACE
+from icha.datasets.variables.terms import ROUGHNESS
 from icha.support.atomic_files import whole_file
 from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, ring_edges, spectral_moments
 from icha.surfaces.surface import PERIODIC, Surface
@@ -250,12 +251,8 @@ def write_surface(
         "y": nodes,
         "psd_wavevector": wave_number,
         "height": surface.heights,
-        "period": surface.period,
-        "grid": n,
         "seed": seed,
-        "rms_slope": surface.rms_slope,
-        "rms_height": surface.rms_height,
-        "rms_curvature": surface.rms_curvature,
+        **of(surface, "period", "grid", *ROUGHNESS),
         "spectral_moment_0": moments.m0,
         "spectral_moment_2": moments.m2,
         "spectral_moment_4": moments.m4,
@@ -264,7 +261,7 @@ def write_surface(
         "power_spectrum": power,
     }
     if spectrum is not None:
-        values |= {name: getattr(spectrum, name) for name in ("rolloff_wavelength", "short_wavelength", "hurst")}
+        values |= of(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
     if measured is not None:
         values["measured_rms_slope"] = measured.rms_slope
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}

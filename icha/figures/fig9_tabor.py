@@ -6,12 +6,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from icha.asperity.jkr import WU_RANGE
 from icha.datasets.campaign import find_snapshot
 from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL, bars_handle
 from icha.figures.scale import MOST_COLOURS, places_scale
 from icha.figures.select import NothingToDraw, snapshot_label, study_runs
 from icha.figures.style import COLOURS, GREY, MARKERS, TWO_COLUMNS, new_figure, panel_label, quantity, styled
-from icha.simulation import WU_RANGE
 from icha.support.statistics import ensemble
 
 CAPTION = (

@@ -31,8 +31,9 @@ from icha.asperity.material import Material
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.datasets.bins import bin_values
-from icha.datasets.build import build
+from icha.datasets.build import build, of
 from icha.datasets.variables.boundary_elements import SOLUTION
+from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
 from icha.support.validation import integer, positive
 from icha.surfaces.surface import Surface
 
@@ -420,8 +421,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "tolerance": tolerance,
         "solve_count": state.solves,
         "refinement": fine.grid // surface.grid,
-        "grid": fine.grid,
-        "spacing": fine.spacing,
+        **of(fine, "grid", "spacing"),
         "longest_spacing": longest_spacing(material) if adhesive else 0.0,
         "strength_number": strength_number(material, fine.spacing),
         "gap_density": gaps / nodes / np.diff(GAP_BINS * height),
@@ -430,14 +430,9 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "pressure_bin_mean": np.divide(load, count, out=np.zeros(len(load)), where=count > 0) * unit,
         **bin_values("pressure", PRESSURE_BINS * unit),
         "contact": contact,
-        "contact_modulus": material.contact_modulus,
-        "surface_energy": material.surface_energy,
-        "interaction_range": material.interaction_range,
-        "rms_slope": surface.rms_slope,
-        "rms_height": height,
-        "rms_curvature": surface.rms_curvature,
+        **of(material, *MATERIAL),
+        **of(surface, *ROUGHNESS, "period"),
         "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
-        "period": surface.period,
         "seed": seed,
     }
     attrs = discovery(

@@ -44,8 +44,9 @@ from icha.asperity.coalescence import covering_spot
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
-from icha.datasets.build import build
+from icha.datasets.build import build, of
 from icha.datasets.variables.error_sources import ERROR_SOURCES
+from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
 from icha.equilibrium.distributions import contact_cover
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import ContactState
@@ -668,13 +669,8 @@ def _dataset(surface, material, pressures, states, parts, seed, solver):
         "contact_area_fraction": area,
         "mean_separation": separation,
         "reduced_separation": separation / surface.rms_height,
-        "contact_modulus": material.contact_modulus,
-        "surface_energy": material.surface_energy,
-        "interaction_range": material.interaction_range,
-        "rms_slope": surface.rms_slope,
-        "rms_height": surface.rms_height,
-        "rms_curvature": surface.rms_curvature,
-        "period": surface.period,
+        **of(material, *MATERIAL),
+        **of(surface, *ROUGHNESS, "period"),
         "grid": surface.grid,
         "seed": seed,
         **solver,

@@ -19,8 +19,9 @@ import xarray as xr
 from icha.asperity.cohesive_zone import longest_spacing, strength_number
 from icha.asperity.material import Material
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
-from icha.datasets.build import build
+from icha.datasets.build import build, of
 from icha.datasets.variables.boundary_elements import LOOP
+from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
 from icha.references.boundary_elements import (
     DEFAULT_TOLERANCE,
     REFERENCES,
@@ -298,18 +299,12 @@ def _dataset(surface, way, legs, separation_step, seed):
         "solve_count": way.contact.solves,
         "tolerance": way.tolerance,
         "refinement": fine.grid // surface.grid,
-        "grid": fine.grid,
-        "spacing": fine.spacing,
+        **of(fine, "grid", "spacing"),
         "longest_spacing": longest_spacing(material) if adhesive else 0.0,
         "strength_number": strength_number(material, fine.spacing),
-        "contact_modulus": material.contact_modulus,
-        "surface_energy": material.surface_energy,
-        "interaction_range": material.interaction_range,
-        "rms_slope": surface.rms_slope,
-        "rms_height": surface.rms_height,
-        "rms_curvature": surface.rms_curvature,
+        **of(material, *MATERIAL),
+        **of(surface, *ROUGHNESS, "period"),
         "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
-        "period": surface.period,
         "seed": seed,
         "branch": np.array(["loading", "unloading"], dtype=object)[leg],
     }

@@ -26,8 +26,9 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import Control
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
-from icha.datasets.build import build
+from icha.datasets.build import build, of
 from icha.datasets.variables.one_asperity import ONE_ASPERITY
+from icha.datasets.variables.terms import MATERIAL
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.interaction import displacement_at
 from icha.references.boundary_elements import (
@@ -247,13 +248,9 @@ def _comparison(
         "zero_gap_area_error_at_load": area_at_load / zero_gap[at] - 1,
         "approach_error_at_load": (approach_at_load - approach[at]) / length,
         "tabor_parameter": float(material.tabor_parameter(_RADIUS)),
-        "contact_modulus": material.contact_modulus,
-        "surface_energy": material.surface_energy,
-        "interaction_range": material.interaction_range,
+        **of(material, *MATERIAL),
         "radius_of_curvature": _RADIUS,
-        "period": surface.period,
-        "grid": surface.grid,
-        "spacing": surface.spacing,
+        **of(surface, "period", "grid", "spacing"),
         "strength_number": strength_number(material, surface.spacing),
         "tolerance": tolerance,
     }
