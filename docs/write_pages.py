@@ -1,9 +1,14 @@
-"""Write the pages of the documentation that are made of the results of the campaigns `validation` or `hysteresis`."""
+"""Write the pages of the documentation that are made of the results of the campaigns `validation` or `hysteresis`.
+
+Their words are in docs/templates, the numbers in them computed by the functions of docs/pages.
+"""
 
 import argparse
+import re
 import shutil
 from pathlib import Path
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from pages import error_sources, hysteresis, one_asperity, validation
 
 from icha.configuration.cases import asperity_cases, loop_cases, source_cases
@@ -11,84 +16,82 @@ from icha.configuration.load import load_configuration
 from icha.datasets.files import read_campaign, read_dataset
 from icha.support.atomic_files import whole_file
 
-DOCS = Path("docs")
+DOCS = Path(__file__).parent
+TEMPLATES = Environment(
+    loader=FileSystemLoader(DOCS / "templates"),
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    autoescape=False,  # Markdown, of our own results
+)
+for functions in (error_sources, hysteresis, one_asperity, validation):
+    TEMPLATES.globals[functions.__name__.rpartition(".")[2]] = functions
 
 
-def write_pages(name):
-    """Write the pages that are made of a campaign's results, and copy their figures."""
-    campaign = load_configuration(Path(f"config/campaigns/{name}.yaml")).campaign
-    pages, figures = PAGES[name](campaign, Path("results", name), f"make {name}")
-    for figure in figures:
-        with whole_file(DOCS / f"images/{figure}.png") as temporary:
-            shutil.copyfile(f"results/{name}/figures/{figure}.png", temporary)
-    for page, text in pages.items():
-        with whole_file(DOCS / f"{page}.md") as temporary:
-            temporary.write_text(text, encoding="utf-8")
+def render(page, **given):
+    """The text of a page, in Markdown, from its template and datasets."""
+    return TEMPLATES.get_template(f"{page}.md.jinja").render(given).rstrip() + "\n"
 
 
-def validation_pages(campaign, results, command):
+def validation_pages(campaign, results):
     """How far the model is from boundary elements, and why."""
-
-    def sources(entry):
-        cases = [case for case in source_cases(campaign) if case.entry == entry]
-        return [read_dataset(results / f"references/error_sources/{case.path}.nc") for case in cases]
-
+    cases = source_cases(campaign)
+    sources = {
+        entry: [
+            read_dataset(results / f"references/error_sources/{case.path}.nc") for case in cases if case.entry == entry
+        ]
+        for entry in ("adhesionless", "adhesive")
+    }
     asperities = {
         name: read_dataset(results / f"references/one_asperity/{name}.nc") for name in asperity_cases(campaign)
     }
-    hertz = asperities.pop("hertz")
-    pages = {
-        "validation": validation.page(
-            read_campaign(results / "aggregated/model_error.nc"),
-            entries={"adhesionless": "Without adhesion", "adhesive": "With adhesion"},
-            grids={"adhesionless": "2 cells", "coarse": "1 cell", "fine": "4 cells"},
-            ranges={"adhesionless": ["ranges", "shortest_range"]},
-            figures={
-                "images/fig10_model_error.png": "Relative error of contact area and mean separation against load; with "
-                "adhesion dotted against the energetic area. Coarse and fine: of one seed, on other grids",
-                "images/fig11_distribution_error.png": "Distances of the distributions of pressure and of gap, and "
-                "overlap of the contact maps",
-            },
-            command=command,
-            further=one_asperity.section(list(asperities.values()), hertz),
-        ),
-        "error_sources": error_sources.page(
-            sources("adhesionless"), sources("adhesive"), figure="images/fig12_error_sources.png", command=command
-        ),
+    errors = read_campaign(results / "aggregated/model_error.nc")
+    return {
+        "validation": {
+            "model_error": {name: entry.to_dataset() for name, entry in errors.children.items()},
+            "hertz": asperities.pop("hertz"),
+            "adhesive": list(asperities.values()),
+        },
+        "error_sources": sources,
     }
-    return pages, ("fig10_model_error", "fig11_distribution_error", "fig12_error_sources")
 
 
-def hysteresis_pages(campaign, results, command):
+def hysteresis_pages(campaign, results):
     """Pull-off and what is lost on the way back."""
     cases = loop_cases(campaign)
-    loops = {
-        entry.study: [
-            read_dataset(results / f"references/loops/{case.path}.nc") for case in cases if case.entry == name
-        ]
-        for name, entry in campaign.boundary_element_loops.items()
+    tree = read_campaign(results / f"dataset/{campaign.name}.nc")
+    studies = {name: study.to_dataset() for name, study in tree.children.items()}
+    return {
+        "hysteresis": {
+            "campaign": tree,
+            "studies": studies,
+            "load_studies": [studies[name] for name in campaign.figures.fig14_pull_off.load_studies],
+            "loops": {
+                entry.study: [
+                    read_dataset(results / f"references/loops/{case.path}.nc") for case in cases if case.entry == name
+                ]
+                for name, entry in campaign.boundary_element_loops.items()
+            },
+        }
     }
-    page = hysteresis.page(
-        read_campaign(results / f"dataset/{campaign.name}.nc"),
-        slopes="slopes",
-        detachment="detachment",
-        loads=campaign.figures.fig14_pull_off.load_studies,
-        load_control="load_control",
-        loops=loops,
-        figures={
-            "images/fig13_loops.png": "Pressure and contact area against mean separation, in and back",
-            "images/fig14_pull_off.png": "Pull-off against rms slope, and against the largest load",
-            "images/fig15_loss.png": "Energy lost against contact area, and what it was lost in",
-            "images/fig16_snap_map.png": "Where and when spots snap into and out of contact",
-        },
-        command=command,
-    )
-    return {"hysteresis": page}, ("fig13_loops", "fig14_pull_off", "fig15_loss", "fig16_snap_map")
 
 
 PAGES = {"validation": validation_pages, "hysteresis": hysteresis_pages}
 
+
+def write_pages(name):
+    """Write the pages that are made of a campaign's results, and copy the figures that they show."""
+    campaign = load_configuration(Path(f"config/campaigns/{name}.yaml")).campaign
+    for page, given in PAGES[name](campaign, Path("results", name)).items():
+        text = render(page, command=f"make {name}", **given)
+        for figure in re.findall(r"\]\(images/(.*?\.png)\)", text):
+            with whole_file(DOCS / "images" / figure) as temporary:
+                shutil.copyfile(f"results/{name}/figures/{figure}", temporary)
+        with whole_file(DOCS / f"{page}.md") as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("campaign", choices=PAGES)
     write_pages(parser.parse_args().campaign)

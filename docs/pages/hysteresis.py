@@ -1,113 +1,24 @@
-"""The page of the documentation on pull-off and hysteresis: words, and tables from the campaign dataset."""
+"""Numbers of the page on pull-off and hysteresis, from studies of the campaign dataset."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
 from icha.analysis.model_error import run_of_same_contact
 from icha.datasets.campaign import run_labels, select_run
-from pages.tables import means, table
-
-_TITLE = """# Pull-off and adhesion hysteresis
-
-Ways in and back of the campaign `{campaign}`: on a self-affine surface of {period:g} µm, with roll-off and short
-cut-off as in its configuration, E\\* = {modulus:g} MPa, {seeds} seeds. Numbers are means over the seeds and their
-standard deviations. Pull-off is the largest tension on the way back, in Pa of nominal area; loss is ∮p dū.
-"""
-
-_RULES = """## What undoing coalescence assumes
-
-On the way in, overlapping spots become one equivalent spot of the same area. The model says nothing of the way back.
-Two rules are there (`united_until` of a study):
-
-- `detachment`: a united spot keeps its identity until it detaches as a whole; then the asperities that it was made of
-  that still have a stable state stay in contact.
-- `overlap`: a united spot comes apart into the two that it was made of as soon as its area has fallen to what it was
-  when they just touched: the mirror image of the union.
-
-The equivalent spot is one asperity that is taller, and rounder, than either of the two; down to small areas it carries
-more load than the two apart would. So under `detachment` the way back does not lie on the way in. The surfaces may give
-back more work than was put in, as two equal asperities do, and the loss come out negative, which no passive contact can
-do; or, where asperities are unequal, the united spot may let go early, and work is lost for nothing.
-Without adhesion nothing should be lost at all; what the loop of the bare surface loses or gains is the error of the
-rule, and the table has it in per cent of the largest work done on the way in. With adhesion, the two rules' pull-off
-and loss are side by side.
-"""
-
-_LOADS = """## Against the largest load
-
-Violano & Afferrante (Lubricants 9 (2021) 7, doi:10.3390/lubricants9010007) report, for self-affine surfaces with the
-adhesion of Johnson, Kendall and Roberts, a loss that is linear in the true contact area reached, and a pull-off that
-hardly depends on the largest load. Here both are measured: the exponent n of loss ∝ (A/A₀)ⁿ and the coefficient of
-determination r² of a straight line, through the means over the seeds, and how far the pull-off varies between the
-loads (largest over smallest, less one).
-"""
-
-_CONTROL = """## Under load control
-
-The state runs along the same curve and jumps, at constant load, where the load would have to turn back; the last
-contacts break together at the largest tension. First seed.
-"""
-
-_ELEMENTS = """## Beside boundary elements
-
-On a small surface boundary elements follow the same path: minimum after minimum of the energy at given mean gaps, down
-and up. Their range of attraction must be resolved by their grid, so it is long ({tabor}); the contact is then far from
-the limit of Johnson, Kendall and Roberts that ICHA's spots obey, and jumps are much smaller than in that limit.
-"""
+from pages.tables import Table, means
 
 
-def page(
-    campaign: xr.DataTree,
-    *,
-    slopes: str,
-    detachment: str,
-    loads: Sequence[str],
-    load_control: str,
-    loops: Mapping[str, Sequence[xr.Dataset]],
-    figures: Mapping[str, str],
-    command: str,
-) -> str:
-    """The page, in Markdown.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    slopes, detachment : studies of the same surfaces under the rules `overlap` and `detachment`.
-    loads : studies that differ in their largest load.
-    load_control : study under load control of a part of `slopes`.
-    loops : for studies that boundary elements stand beside, their datasets.
-    figures : paths, relative to the page, and what they show.
-    command : by which the page is written again.
-    """
-    study = campaign[slopes].to_dataset()
-    title = _TITLE.format(
-        campaign=campaign.attrs["campaign"],
-        period=1e6 * float(study["period"][0]),
-        modulus=1e-6 * float(study["contact_modulus"][0]),
-        seeds=study.sizes["seed"],
-    )
-    parts = [
-        title,
-        f"Every number on this page is computed, and the page written, by `{command}`.\n",
-        *(f"![{what}]({path})\n\n*{what}.*\n" for path, what in figures.items()),
-        "## Against rms slope and surface energy\n",
-        summary(study),
-        _RULES,
-        rules(study, campaign[detachment].to_dataset()),
-        _LOADS,
-        largest_loads([campaign[name].to_dataset() for name in loads]),
-        _CONTROL,
-        controls(study, campaign[load_control].to_dataset()),
-    ]
-    for name, solved in loops.items():
-        if solved:
-            tabor = ", ".join(f"μ = {float(one['tabor_parameter']):.2g}" for one in solved)
-            parts += [_ELEMENTS.format(tabor=tabor), elements(campaign, name, solved)]
-    return "\n".join(parts)
+def cell(study: xr.Dataset) -> dict:
+    """Period in µm, contact modulus in MPa and number of seeds of a study."""
+    return {
+        "period": f"{1e6 * float(study['period'][0]):g}",
+        "modulus": f"{1e-6 * float(study['contact_modulus'][0]):g}",
+        "seeds": study.sizes["seed"],
+    }
 
 
 def _cells(study):
@@ -130,7 +41,7 @@ def _energy(one):
     return f"{1e3 * float(one['surface_energy']):g}"
 
 
-def summary(study: xr.Dataset) -> str:
+def summary(study: xr.Dataset) -> Table:
     """Pull-off and loss for every slope and surface energy."""
     head = [
         "h′rms",
@@ -156,10 +67,10 @@ def summary(study: xr.Dataset) -> str:
                 _mean(one["loss_by_jump_in"].values / one["loss_by_jump_off"].values, "{:.1f}"),
             ]
         )
-    return table(head, rows)
+    return Table(head, rows)
 
 
-def rules(overlap: xr.Dataset, detachment: xr.Dataset) -> str:
+def rules(overlap: xr.Dataset, detachment: xr.Dataset) -> Table:
     """The two rules side by side: pull-off and loss; without adhesion the loss over the largest work."""
     head = ["h′rms", "Δγ, mJ/m²", "pull-off, Pa: overlap", "detachment", "loss, µJ/m²: overlap", "detachment"]
     rows = []
@@ -176,12 +87,17 @@ def rules(overlap: xr.Dataset, detachment: xr.Dataset) -> str:
                     part = 100 * each[name].values / each["work"].max("step").values
                     row.append(f"{_mean(part, '{:+.3f}')} % of the work")
         rows.append(row)
-    return table(head, rows)
+    return Table(head, rows)
 
 
-def largest_loads(studies: Sequence[xr.Dataset]) -> str:
+def common_slope(studies: Sequence[xr.Dataset]) -> float:
+    """The least rms slope that all studies have."""
+    return min(set.intersection(*(set(study["rms_slope"].values.tolist()) for study in studies)))
+
+
+def largest_loads(studies: Sequence[xr.Dataset]) -> Table:
     """Pull-off and loss against the largest load, for the first slope that all studies have."""
-    slope = min(set.intersection(*(set(study["rms_slope"].values.tolist()) for study in studies)))
+    slope = common_slope(studies)
     studies = [study.sel(rms_slope=slope).isel(surface=0) for study in studies]
     studies.sort(key=lambda study: float(study["largest_reduced_pressure"].mean()))
     head = ["Δγ, mJ/m²", "", *(f"p\\* = {float(s['largest_reduced_pressure'].mean()):.2g}" for s in studies), ""]
@@ -214,10 +130,10 @@ def largest_loads(studies: Sequence[xr.Dataset]) -> str:
                 f"varies by {100 * (pull.max() / pull.min() - 1):.0f} %",
             ],
         ]
-    return f"h′rms = {slope:g}.\n\n" + table(head, rows)
+    return Table(head, rows)
 
 
-def controls(separation: xr.Dataset, load: xr.Dataset) -> str:
+def controls(separation: xr.Dataset, load: xr.Dataset) -> Table:
     """The same runs under separation and under load control."""
     head = [
         "Δγ, mJ/m²",
@@ -240,10 +156,10 @@ def controls(separation: xr.Dataset, load: xr.Dataset) -> str:
         ):
             row += [form.format(float(each[name])) for each in (other, one)]
         rows.append(row)
-    return table(head, rows)
+    return Table(head, rows)
 
 
-def elements(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) -> str:
+def elements(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) -> Table:
     """Boundary elements both ways, and the study's run of the same contact."""
     head = ["", "A/A₀ at the largest load", "pull-off, Pa", "at ū/h_rms", "loss, µJ/m²", "loss/Δγ"]
     rows = []
@@ -263,4 +179,9 @@ def elements(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) -> 
                     f"{loss / gamma:.4f}" if gamma else "–",
                 ]
             )
-    return table(head, rows)
+    return Table(head, rows)
+
+
+def tabor_parameters(loops: Sequence[xr.Dataset]) -> str:
+    """Tabor parameters of boundary elements both ways."""
+    return ", ".join(f"μ = {float(one['tabor_parameter']):.2g}" for one in loops)

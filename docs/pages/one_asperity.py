@@ -1,4 +1,4 @@
-"""The section of the documentation on one asperity: words, and a table from the datasets."""
+"""Numbers of the section on one asperity, from the datasets of `icha.references.one_asperity`."""
 
 from __future__ import annotations
 
@@ -7,33 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from pages.tables import table
-
-_TITLE = """## One asperity
-
-On a paraboloid in a periodic cell nothing is rough, so that ICHA's law of an asperity and the effect of its images are
-seen alone. The paraboloid is pressed on and, with adhesion, drawn off until its tension is largest. ICHA and boundary
-elements are compared at the same approach of the summit to the mean plane, and at the same load.
-
-With adhesion two areas of the boundary elements can stand for contact. The *area of zero gap* is what one sees. The
-*energetic area* is the integral of exp(−u/ρ) over the surface: times Δγ it is the energy of adhesion, so that it is
-minus the derivative of the energy by Δγ at fixed mean gap. It is the area to compare with that of Johnson, Kendall and
-Roberts, whose adhesion has the energy Δγ A. The area of zero gap lacks the cohesive zone, a rim around the contact that
-narrows as the range ρ falls, that is as the Tabor parameter μ = (Δγ² R/E\\*²)^⅓/ρ grows. Both areas tend to that of
-Johnson, Kendall and Roberts, the energetic one sooner.
-"""
-
-_CAPTION = """Errors of ICHA in per cent, least to largest, at approaches of {approaches} and that of pull-off, in
-units of (Δγ² R/E\\*²)^⅓, in a cell of side {period:g} in the same; at the same load without pull-off. Errors of areas
-are relative, those of the force are over the larger of force and pull-off force, those of the approach over the unit of
-length, those of the pull-off force over 3/2 π Δγ R. The grid has n × n nodes; its strength number, (Δγ Δx/E\\*)^½/ρ,
-must stay below one half.
-"""
-
-_HERTZ = """Without adhesion, contact radii from {least:.2g} to {most:.2g} R on {grid} × {grid} nodes, errors of ICHA in
-per cent: area {area} at the same load, {area_at_approach} at the same approach; approach {approach}; force {force}. The
-smaller the contact, the less certain is the area of the boundary elements, which is counted in nodes.
-"""
+from pages.tables import Table
 
 # The columns of errors: of what, and where, by the name of the variable.
 _ERRORS = {
@@ -47,39 +21,37 @@ _ERRORS = {
 }
 
 
-def section(adhesive: Sequence[xr.Dataset], hertz: xr.Dataset) -> str:
-    """The section, in Markdown.
-
-    Parameters
-    ----------
-    adhesive : datasets of `icha.references.one_asperity.one_asperity`, of different Tabor parameters in any order.
-    hertz : dataset of `icha.references.one_asperity.hertz_asperity`.
+def cell(adhesive: Sequence[xr.Dataset]) -> dict:
+    """Side of the cell and approaches, the same for all Tabor parameters.
 
     Raises
     ------
     ValueError
-        If approaches or cells are not the same for all Tabor parameters.
+        If they are not.
     """
     cases = {(float(one["period"]), tuple(np.round(one["approach"].values[:-1], 6))) for one in adhesive}
     if len(cases) != 1:
         raise ValueError(f"one_asperity: periods and approaches are not the same for all, {sorted(cases)}")
     ((period, approaches),) = cases
+    return {"period": f"{period:g}", "approaches": [f"{approach:g}" for approach in approaches]}
+
+
+def without_adhesion(hertz: xr.Dataset) -> dict:
+    """Range of contact radii over that of curvature, and errors in per cent, of `hertz_asperity`."""
     radii = np.sqrt(hertz["area_icha_at_load"].values / np.pi) / float(hertz["radius_of_curvature"])
-    numbers = {
-        "least": radii.min(),
-        "most": radii.max(),
+    return {
+        "least": f"{radii.min():.2g}",
+        "most": f"{radii.max():.2g}",
         "grid": int(hertz["grid"]),
         "area": _range(hertz["zero_gap_area_error_at_load"], "{:+.2f}"),
         "area_at_approach": _range(hertz["zero_gap_area_error"], "{:+.2f}"),
         "approach": _range(hertz["approach_error_at_load"], "{:+.2f}"),
         "force": _range(hertz["force_error"], "{:+.2f}"),
     }
-    caption = _CAPTION.format(approaches=", ".join(f"{approach:g}" for approach in approaches), period=period)
-    return "\n".join([_TITLE, caption, errors(adhesive), _HERTZ.format(**numbers)])
 
 
-def errors(adhesive: Sequence[xr.Dataset]) -> str:
-    """Table of the errors with adhesion, a row for every Tabor parameter."""
+def errors(adhesive: Sequence[xr.Dataset]) -> Table:
+    """Errors with adhesion, a row for every Tabor parameter."""
     rows = [
         [
             f"{float(one['tabor_parameter']):g}",
@@ -89,7 +61,7 @@ def errors(adhesive: Sequence[xr.Dataset]) -> str:
         ]
         for one in sorted(adhesive, key=lambda one: float(one["tabor_parameter"]))
     ]
-    return table(["μ", "n", "strength number", *_ERRORS.values()], rows)
+    return Table(["μ", "n", "strength number", *_ERRORS.values()], rows)
 
 
 def _range(error, form):

@@ -1,16 +1,22 @@
-"""Markdown tables of numbers with their scatter."""
+"""Tables of numbers with their scatter."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table, with an empty line after it."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+class Table(NamedTuple):
+    """Headings of the columns, and rows of cells; as text, Markdown."""
+
+    head: list[str]
+    rows: list[list[str]]
+
+    def __str__(self) -> str:
+        """The table in Markdown."""
+        return "\n".join(f"| {' | '.join(line)} |" for line in (self.head, ["---"] * len(self.head), *self.rows))
 
 
 def means(values: Sequence[np.ndarray], form: str) -> list[str]:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import xarray as xr
-from pages.error_sources import page, ratios, split
 
 import icha
 from icha.asperity.jkr import JKR
@@ -12,7 +11,6 @@ from icha.figures import fig12_error_sources
 from icha.path.follow import follow
 from icha.references.boundary_elements import NodalState, contact_state, perimeter_correction
 from icha.references.error_sources import (
-    ADHESIVE_CHAIN,
     CATEGORIES,
     Discs,
     chain,
@@ -302,7 +300,7 @@ def test_odd_refinements_are_refused(surface):
         error_sources(surface, HARD, PRESSURES, refinement=3)
 
 
-# --- figure and page --------------------------------------------------------------------------------------------
+# --- figure -----------------------------------------------------------------------------------------------------
 
 
 def test_figure_shows_the_ratios(sources):
@@ -329,25 +327,3 @@ def test_medians_of_equally_filled_bins():
     at, middle = fig12_error_sources.medians(x[::-1], np.where(x < 50, np.nan, 3.0)[::-1])
     assert at == pytest.approx(np.arange(8) * 10 + 4.5)
     assert middle == pytest.approx([np.nan] * 5 + [3.0] * 3, nan_ok=True)
-
-
-def test_page_has_means_and_deviations_of_the_datasets(sources):
-    other = sources.copy(deep=True).assign(seed=4)
-    factor = xr.where(other["variant"] == "icha", 1.1, 1.0)
-    other["contact_area_fraction"] = other["contact_area_fraction"] * factor
-    area = sources["contact_area_fraction"].isel(reduced_pressure=0)
-    ratio = float(area.sel(variant="icha") / area.sel(variant="boundary_elements"))
-    row = ratios([sources, other], "contact_area_fraction").splitlines()[2]
-    assert row.startswith(f"| ICHA | {1.05 * ratio:.3f} ± {0.1 * ratio / np.sqrt(2):.3f} |")
-    text = page([sources, other], figure="images/some.png", command="some command")
-    assert "`some command`" in text and "(images/some.png)" in text and "seed 3, 4" in text
-    assert "nan" not in text
-    adhesive = sources.sel(variant=["icha", *list(ADHESIVE_CHAIN)[1:]]).assign(surface_energy=1.0)
-    with_adhesion = page([sources], [adhesive], figure="a.png", command="b")
-    assert "## With adhesion" in with_adhesion
-
-
-def test_table_of_the_split_has_the_whole_load(sources):
-    rows = [line.split("|")[1:-1] for line in split([sources]).splitlines()[2:]]
-    loads = np.array([[cell.split("/") for cell in row[1:]] for row in rows if "load" in row[0]], dtype=float)
-    assert loads.sum(axis=0) == pytest.approx(np.full((len(PRESSURES), 2), 100), abs=0.3)

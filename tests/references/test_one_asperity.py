@@ -1,4 +1,4 @@
-"""One asperity by the model and by boundary elements: what the dataset holds, and what the page says of it.
+"""One asperity by the model and by boundary elements: what the dataset holds.
 
 That the two agree is tested in test_boundary_elements.py, at a Tabor parameter large enough for it.
 """
@@ -6,7 +6,6 @@ That the two agree is tested in test_boundary_elements.py, at a Tabor parameter 
 import numpy as np
 import pytest
 from half_space import jkr_force
-from pages import one_asperity as page
 
 import icha
 from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
@@ -125,25 +124,6 @@ def test_files_hold_every_value(long_ranges, hertzian, tmp_path):
         assert read_dataset(tmp_path / "one.nc").identical(one)
         assert all({"units", "long_name"} <= set(variable.attrs) for variable in one.variables.values())
         assert {"title", "summary", "Conventions", "source", "references"} <= set(one.attrs)
-
-
-def test_the_section_has_a_row_for_every_tabor_parameter(long_ranges, hertzian):
-    text = page.section(long_ranges[::-1], hertzian)
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line[:1] == "|"]
-    assert [row[0] for row in rows] == ["μ", "---", "1.25", "2"]
-    for row, one in zip(rows[2:], long_ranges, strict=True):
-        cells = dict(zip(rows[0], row, strict=True))
-        assert cells["n"] == f"{int(one.grid)}"
-        least, largest = (100 * float(end) for end in (one.force_error.min(), one.force_error.max()))
-        assert cells["force, same approach"] == f"{least:+.1f} to {largest:+.1f}"
-        assert cells["pull-off force"] == f"{100 * float(one.pull_off_error):+.1f}"
-    assert "approaches of 3, 1.5 and that of pull-off" in text
-    assert "from 0.5 to 1 R on 128 × 128 nodes" in text
-
-
-def test_the_section_compares_like_with_like(long_ranges, hertzian):
-    with pytest.raises(ValueError, match="periods and approaches are not the same for all"):
-        page.section([long_ranges[0], at(1.25, approaches=[2.0])], hertzian)
 
 
 @pytest.mark.parametrize(
