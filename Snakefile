@@ -16,6 +16,18 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/publish.smk"
 
 
+# Jobs end with this process, however it does: see workflow/scripts/job.py.
+os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
+
+if workflow.is_main_process:
+    here = before_jobs.Campaign(RESULTS, dry_run=workflow.output_settings.dryrun)
+
+
+onstart:
+    here.refuse_second()
+    here.refuse_unwritable()
+
+
 # On a cluster these are run where Snakemake runs, and not submitted: targets, and what is soon done.
 localrules:
     all,
@@ -37,14 +49,21 @@ localrules:
     deposit,
 
 
+# What is lost or set aside is made again when it is asked for: a target asks for all that it is made of.
 rule all:
     default_target: True
     input:
         CONFIG_USED,
+        list(COPIED),
+        SURFACES,
+        RUNS,
         REFERENCES,
-        FIGURES,
         DATASET,
+        COMPARISON,
+        MODEL_ERROR,
+        CHECKS,
         VERDICT,
+        FIGURES,
         REPORT,
 
 
@@ -55,20 +74,24 @@ rule surfaces:
 
 rule runs:
     input:
+        SURFACES,
         RUNS,
 
 
 rule references:
     input:
+        SURFACES,
         REFERENCES,
 
 
 rule dataset:
     input:
+        rules.runs.input,
         DATASET,
         COMPARISON,
-        VERDICT,
         MODEL_ERROR,
+        CHECKS,
+        VERDICT,
 
 
 rule figures:
@@ -83,5 +106,6 @@ rule report:
 
 rule publish:
     input:
+        rules.all.input,
         f"{DEPOSIT}/SHA256SUMS",
         f"{DEPOSIT}.zip",

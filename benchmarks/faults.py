@@ -77,7 +77,8 @@ class Place:
     def start(self, way: str = "snakemake", *arguments: str, before: Iterable[str] = ()) -> subprocess.Popen:
         """Start a call in a session of its own; what it says goes to a file outside of the place."""
         name, _, value = self.mark.partition("=")
-        environment = os.environ | {"PYTHONPATH": str(self.project), "OMP_NUM_THREADS": "1", name: value}
+        found = os.pathsep.join([str(self.project), str(self.project / "workflow/plugins")])
+        environment = os.environ | {"PYTHONPATH": found, "OMP_NUM_THREADS": "1", name: value}
         said = tempfile.TemporaryFile("w+", encoding="utf-8")
         process = subprocess.Popen(
             [*before, *self.command(way, *arguments)],
@@ -138,16 +139,14 @@ class Place:
     def server(self) -> list[int]:
         """The process with everything imported."""
         there = self.processes()
-        warm = {pid for pid, (_, line) in there.items() if any(part.endswith("/warm.py") for part in line)}
+        warm = {pid for pid, (_, line) in there.items() if any("multiprocessing.forkserver" in part for part in line)}
         return [pid for pid in warm if there[pid][0] not in warm]
 
     def jobs(self) -> list[int]:
-        """Processes in which jobs do their work, or wait for the fork that does it."""
-        there = self.processes()
-        scripts = [pid for pid, (_, line) in there.items() if any("/.snakemake/scripts/" in part for part in line)]
-        server = set(self.server())
-        attendants = {pid for pid, (parent, _) in there.items() if parent in server}
-        return sorted([*scripts, *(pid for pid, (parent, _) in there.items() if parent in attendants)])
+        """Processes in which jobs do their work: forks, and those that run by themselves."""
+        there, server = self.processes(), set(self.server())
+        alone = [pid for pid, (_, line) in there.items() if any("/.snakemake/scripts/" in part for part in line)]
+        return sorted([*alone, *(pid for pid, (parent, _) in there.items() if parent in server)])
 
     def contents(self) -> dict[str, str]:
         """Checksums of all results that anybody would take for whole."""

@@ -35,9 +35,14 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: rank.get(item.path.name, len(LONG)))
 
 
+def modules_of(project):
+    """Where Python finds the package and the plugins of a copy of the project."""
+    return os.pathsep.join([str(project), str(project / "workflow/plugins")])
+
+
 def snakemake_command(*arguments, configuration=SMOKE):
     """Command and environment of a call of Snakemake in a copy of the project, with that copy's package."""
-    environment = os.environ | {"PYTHONPATH": ".", "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
     chosen = ["--configfile", str(configuration)] if configuration else []
     return [sys.executable, "-m", "snakemake", *arguments, *chosen], environment
 
@@ -45,7 +50,7 @@ def snakemake_command(*arguments, configuration=SMOKE):
 def snakemake(project, *arguments, configuration=SMOKE):
     """Call Snakemake in a copy of the project; return the finished process with all that it said as `stdout`."""
     command, environment = snakemake_command(*arguments, configuration=configuration)
-    environment["PYTHONPATH"] = str(project)
+    environment["PYTHONPATH"] = modules_of(project)
     return subprocess.run(
         command, cwd=project, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )

@@ -1,94 +1,77 @@
-"""What is done before Snakemake looks at the results that are there, and before it starts its jobs."""
+"""What is done before Snakemake decides on its jobs, and before it starts them."""
 
-import functools
 import json
 import os
 from base64 import urlsafe_b64decode
+from collections.abc import Iterator
 from pathlib import Path
 
+from campaign_lock import hold_lock
 from snakemake.logging import logger
 
 from icha.support import checksums
 from icha.support.atomic_files import why_not_writable
 
+RECORDS = Path(".snakemake/metadata")
 
-def before_execution(workflow, results: str, prepare) -> None:
-    """Have `prepare(dry_run)` called before the jobs of this call of Snakemake are planned.
 
-    Snakemake has a hook for what is done before its jobs start, but none before it has decided on them. Calls that only
-    report or clean up do not come here, nor do those that Snakemake makes of itself.
+class Campaign:
+    """A campaign in this working directory that is about to be run: its results looked at, its lock held.
 
-    What `prepare` returns are files that are made in any case. Where nothing can be written, the call ends well only if
-    there is nothing to do.
+    The Snakefile is read before all else, also for calls that only report or clean up. Those are not kept from it by
+    the lock: what has jobs to start is (`refuse_second`).
     """
-    execute = workflow.execute
 
-    @functools.wraps(execute)
-    def prepared(executor_plugin, *args, **kwargs):
-        settings = executor_plugin.common_settings
-        if not workflow.is_main_process or settings.touch_exec:
-            return execute(executor_plugin, *args, **kwargs)
-        forced = prepare(settings.dryrun_exec)
-        workflow.dag_settings.forcerun = frozenset([*workflow.dag_settings.forcerun, *forced])
-        try:
-            return execute(executor_plugin, *args, **kwargs)
-        except Exception:
-            if not settings.dryrun_exec:
-                refuse_unwritable(results)
-            raise
+    def __init__(self, results: str, *, dry_run: bool):
+        self.results = results
+        self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
+        not_whole = checksums.damaged(results)
+        unknown = [path for path in _of_unknown_origin(results) if path not in not_whole]
+        if self._other and (not_whole or unknown):
+            self.refuse_second()
+        for path in not_whole:
+            self._set_aside(path, "damaged", dry_run)
+        for path in unknown:
+            self._set_aside(path, "Snakemake's record of it is damaged", dry_run)
+        if not dry_run and not RECORDS.is_dir():
+            self.refuse_unwritable()  # nothing was computed yet, so there is something to do
 
-    workflow.execute = prepared
-
-
-def set_damaged_aside(results: str, dry_run: bool) -> list[str]:
-    """Rename the results of a campaign that are not what was written, and say so; list the files to be made again.
-
-    These are the damaged ones and those that are lost. Snakemake by itself makes lost files again only if they are
-    asked for, and takes what was made of them for up to date. A result of which Snakemake's record cannot be read is
-    not known to be up to date, and counts as one whose job was killed.
-    """
-    damaged = checksums.damaged(results)
-    for path in damaged:
-        file = f"{results}/{path}"
-        if dry_run:
-            _tell(f"damaged, to be made again: {file}")
-            continue
-        try:
-            aside = checksums.set_aside(results, path)
-        except OSError as error:
-            raise SystemExit(
-                f"{file} is not what was written, by its checksum, and cannot be set aside: {error.strerror}. "
-                f"Make {os.path.dirname(file)} writable, or copy the results elsewhere."
-            ) from None
-        _tell(f"damaged, to be made again: {file} (what was there is {aside.name} now)")
-    for record, file in _unreadable_records(results):
-        _tell(f"to be made again, for Snakemake's record of it is damaged: {file}")
+    def _set_aside(self, path: str, why: str, dry_run: bool) -> None:
+        """Rename a result that cannot be trusted, so that it is made again, and say so."""
+        file = f"{self.results}/{path}"
+        aside = ""
         if not dry_run:
-            unfinished = Path(".snakemake/incomplete", record.relative_to(".snakemake/metadata"))
-            unfinished.parent.mkdir(parents=True, exist_ok=True)
-            unfinished.write_text(json.dumps({"external_jobid": None}), encoding="ascii")
-            record.unlink()
-    return [f"{results}/{path}" for path in {*damaged, *checksums.lost(results)}]
+            try:
+                aside = f" (what was there is {checksums.set_aside(self.results, path).name} now)"
+            except OSError as error:
+                raise SystemExit(
+                    f"{file} is not what was written, by its checksum, and cannot be set aside: {error.strerror}. "
+                    f"Make {os.path.dirname(file)} writable, or copy the results elsewhere."
+                ) from None
+        text = f"{why}, to be made again: {file}{aside}"
+        logger.warning(text, extra={"remark": text})
 
+    def refuse_second(self) -> None:
+        """End the program with a message if another one runs the campaign."""
+        if self._other:
+            raise SystemExit(
+                f"Process {self._other} is running this campaign in this directory; wait for it to end, or end it "
+                f"first."
+            )
 
-def jobs_end_with_this_process() -> None:
-    """Tell jobs which process wants them: they end with it, however that does (see scripts/job.py)."""
-    os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
-
-
-def refuse_unwritable(results: str) -> None:
-    """End the program with a message if jobs could not write their results."""
-    for folder in (results, ".snakemake"):
-        try:
-            Path(folder).mkdir(parents=True, exist_ok=True)
-            reason = why_not_writable(Path(folder))
-        except OSError as error:
-            reason = error
-        if reason is not None:
-            raise SystemExit(_unwritable(folder, reason.strerror))
-    for folder, _, _ in os.walk(results):
-        if not os.access(folder, os.W_OK | os.X_OK):
-            raise SystemExit(_unwritable(folder, "Permission denied"))
+    def refuse_unwritable(self) -> None:
+        """End the program with a message if jobs could not write their results."""
+        for folder in (self.results, ".snakemake"):
+            try:
+                Path(folder).mkdir(parents=True, exist_ok=True)
+                reason = why_not_writable(Path(folder))
+            except OSError as error:
+                reason = error
+            if reason is not None:
+                raise SystemExit(_unwritable(folder, reason.strerror))
+        for folder, _, _ in os.walk(self.results):
+            if not os.access(folder, os.W_OK | os.X_OK):
+                raise SystemExit(_unwritable(folder, "Permission denied"))
 
 
 def _unwritable(folder, reason):
@@ -98,30 +81,26 @@ def _unwritable(folder, reason):
     )
 
 
-def _tell(text):
-    logger.warning(text, extra={"remark": text})
+def _of_unknown_origin(results: str) -> Iterator[str]:
+    """Results of which Snakemake's record is none, as it may be after a full disk: not known to be up to date.
 
-
-def _unreadable_records(results):
-    """Snakemake's records of results of a campaign that are no records, with the files that they are of."""
-    for folder, _, names in os.walk(".snakemake/metadata"):
+    Snakemake takes such a result for up to date, or breaks off; it has no public reader that would say which those are.
+    """
+    for folder, _, names in os.walk(RECORDS):
         for name in names:
             record = Path(folder, name)
             try:
-                # Long names go on in folders, each part with @ before it; see `snakemake.persistence.file`.
-                parts = record.relative_to(".snakemake/metadata").parts
+                # Long names go on in folders, each part with @ before it.
+                parts = record.relative_to(RECORDS).parts
                 file = urlsafe_b64decode("".join(part.removeprefix("@") for part in parts)).decode()
             except ValueError:
                 continue  # not of ours
-            if file.startswith(f"{results}/") and not _is_record(record):
-                yield record, file
+            if file.startswith(f"{results}/") and os.path.exists(file) and not _is_record(record):
+                yield os.path.relpath(file, results)
 
 
 def _is_record(file: Path) -> bool:
-    from snakemake.persistence import MetadataRecord
-
     try:
-        MetadataRecord.model_validate(json.loads(file.read_bytes()))
+        return isinstance(json.loads(file.read_bytes()), dict)
     except ValueError:
         return False
-    return True

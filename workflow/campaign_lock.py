@@ -1,7 +1,8 @@
 """One run of a campaign at a time in a working directory.
 
 Snakemake's own lock is a file, which stays behind when the program is killed; every later call then asks for an
-`--unlock` that nobody dares to give. This lock belongs to the process and ends with it, however it ends.
+`--unlock` that nobody dares to give. This lock belongs to the process and ends with it, however it ends. (`filelock`
+holds the same kind of lock, but does not tell who has it.)
 """
 
 import contextlib
@@ -12,26 +13,24 @@ from pathlib import Path
 _held = []
 
 
-def hold_lock(path: str) -> None:
-    """Hold the lock `path` until this process ends; end it now, with a message, if another one holds it."""
+def hold_lock(path: str) -> str | None:
+    """Hold the lock `path` until this process ends; return the process that holds it if that is another one."""
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         # Opened so that starting jobs do not inherit it: what they leave behind must not keep the lock.
         file = open(path, "a+", encoding="ascii")
     except OSError:
-        return  # where nothing can be written nothing will be computed
+        return None  # where nothing can be written nothing will be computed
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         file.seek(0)
-        other = file.read().strip()
-        raise SystemExit(
-            f"Process {other} is running this campaign in this directory; wait for it to end, or end it first."
-        ) from None
+        return file.read().strip() or "?"
     except OSError:
-        return  # a file system without locks: nothing to hold
+        return None  # a file system without locks: nothing to hold
     _held.append(file)
     with contextlib.suppress(OSError):  # a full disk
         file.truncate(0)
         file.write(f"{os.getpid()}\n")
         file.flush()
+    return None

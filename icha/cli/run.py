@@ -20,7 +20,6 @@ from icha.cli.options import Cores, Folder
 from icha.cli.project import DEFAULT, FAILED, Mistake, configuration_path, counted, project, read_configuration, shown
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
-PLUGINS = Path(__file__).parent / "plugin"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # Lines of a reason that are printed at the end.
 _MOST_LINES = 12
@@ -176,7 +175,8 @@ def _follow(command: list[str], home: Path, log: Path, watch, view) -> tuple[int
     """
     stopped = []
     reading, writing = os.pipe()
-    found = [str(PLUGINS), *filter(None, [os.environ.get("PYTHONPATH")])]
+    # The project's own, whatever is installed.
+    found = [str(home / "workflow/plugins"), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = os.environ | {"ICHA_EVENTS": str(writing), "PYTHONPATH": os.pathsep.join(found)}
     with view, log.open("w", encoding="utf-8") as said:
         # In a process group of its own, so that Ctrl-C comes to it and its jobs once, from here.

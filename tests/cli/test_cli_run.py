@@ -8,7 +8,7 @@ import sys
 import time
 
 import pytest
-from conftest import REPOSITORY, copy_project
+from conftest import REPOSITORY, copy_project, modules_of
 
 from icha.cli.run import _last_words
 
@@ -36,7 +36,7 @@ CRASH = '    if material["surface_energy"] == 0:\n        raise RuntimeError("a 
 
 def command(project, *arguments):
     program = [sys.executable, "-c", "from icha.cli import main; main()", "run", "tiny", *arguments]
-    environment = os.environ | {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = os.environ | {"PYTHONPATH": modules_of(project), "PYTHONDONTWRITEBYTECODE": "1"}
     return program, {"cwd": project, "env": environment, "stdout": subprocess.PIPE, "text": True}
 
 

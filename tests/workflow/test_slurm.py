@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from conftest import REPOSITORY, copy_project, snakemake
+from conftest import REPOSITORY, copy_project, modules_of, snakemake
 from slurm.single_node import FOLDER, SYSTEM_CONFIGURATION, single_node, why_not
 
 PYTHON = REPOSITORY / ".venv-slurm/bin/python"
@@ -100,7 +100,7 @@ def call_with_profile(node, project, *arguments):
         [PYTHON, "-m", "snakemake", "--workflow-profile", "slurm", "--configfile", CONFIGURATION,
          "--slurm-batches-init-seconds-before-status-checks", "1", *arguments],
         cwd=project,
-        env=node.environment | {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"},
+        env=node.environment | {"PYTHONPATH": modules_of(project), "PYTHONDONTWRITEBYTECODE": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -171,7 +171,7 @@ def test_killed_runs_are_finished_with_the_same_bytes(smoke, tmp_path):
     project = shutil.copytree(smoke, tmp_path / "project", ignore=shutil.ignore_patterns("results", ".snakemake"))
     pause = random.Random(1)
     command, environment = snakemake_command("all", "references", "publish")
-    environment["PYTHONPATH"] = str(project)
+    environment["PYTHONPATH"] = modules_of(project)
     for attempt in range(4):
         run = subprocess.Popen(
             command,
@@ -200,7 +200,7 @@ def test_two_calls_at_once_are_refused(smoke, project, monkeypatch):
 
     monkeypatch.chdir(project)
     (project / "results/smoke/verdict.txt").unlink()
-    hold_lock(".snakemake/smoke.lock")
+    assert hold_lock(".snakemake/smoke.lock") is None
     refused = snakemake(project)
     assert refused.returncode != 0
     assert f"Process {os.getpid()} is running this campaign" in refused.stdout

@@ -1,15 +1,14 @@
 # What all rules share: the campaign, the names of its results, and the fingerprints of the code.
 
+import os
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(workflow.basedir, "workflow")))
 
-import warm
-from before_jobs import before_execution, jobs_end_with_this_process, refuse_unwritable, set_damaged_aside
-from campaign_lock import hold_lock
+import before_jobs
 from command_line import campaign_configuration
-from fingerprint import code_fingerprint, imported_modules
+from fingerprint import code_fingerprint
 from publishable import refuse_unpublishable
 
 from icha.configuration.cases import asperity_cases, loop_cases, map_solution, run_cases, solution_cases, source_cases, surface_cases
@@ -247,34 +246,3 @@ def what_is_published(wildcards):
         *REFERENCES,
         *MODEL_ERROR,
     ]
-
-
-def warm_modules():
-    """Modules that the jobs of the campaign import, and those that libraries import when they are first used."""
-    modules = imported_modules(*sorted(Path(workflow.basedir, "workflow/scripts").glob("*.py")))
-    figures = [f"icha.figures.{name}" for name in CAMPAIGN.figures.drawn()]
-    late = ["pint", "PIL.PngImagePlugin", "matplotlib.style", "matplotlib.backends.backend_pdf", "fontTools.subset"]
-    return ["snakemake.logging", "snakemake.iocontainers", *modules, *late, *figures]
-
-
-def prepare(dry_run):
-    """Take hold of the campaign, and see whether what is there is what was written; what is to be made again."""
-    if not dry_run:
-        hold_lock(f".snakemake/{CAMPAIGN.name}.lock")
-    # Others, of which nothing is made but the deposit, are made again when they are asked for.
-    made_of = {CONFIG_USED, *COPIED, *SURFACES, *RUNS, *REFERENCES, DATASET, COMPARISON, *MODEL_ERROR, CHECKS}
-    return made_of.intersection(set_damaged_aside(RESULTS, dry_run))
-
-
-before_execution(workflow, RESULTS, prepare)
-jobs_end_with_this_process()
-
-# On a node of a cluster, where no hooks are called, for the jobs of one batch.
-if workflow.remote_exec:
-    warm.start(warm_modules())
-
-
-onstart:
-    refuse_unwritable(RESULTS)
-    if workflow.local_exec:
-        warm.start(warm_modules())

@@ -20,7 +20,7 @@ def _jobs_of(submission):
 
 
 class Executor(SlurmExecutor):
-    """Submits jobs and groups of jobs; on the node, Snakemake's own local executor runs them."""
+    """Submits jobs and groups of jobs; on the node, they are forks of one process (workflow/plugins)."""
 
     def run_job_pre(self, job):
         """Remove the outdated results of a job before it is submitted.
@@ -39,7 +39,7 @@ class Executor(SlurmExecutor):
 
     def additional_general_args(self):
         """How the Snakemake on the node is to run it."""
-        return "--executor local --keep-going --show-failed-logs"
+        return "--executor icha --keep-going --show-failed-logs"
 
     async def check_active_jobs(self, active_jobs):
         """Ask Slurm how the submissions are; no less often than six times the first interval, however long they run."""

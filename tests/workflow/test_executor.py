@@ -1,0 +1,161 @@
+"""The executor that forks jobs, on a workflow of a few scripts and with a package that is soon imported."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from conftest import REPOSITORY
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="jobs are forked on Linux only")
+
+SNAKEFILE = """
+rule all:
+    input: "told.txt", "again.txt", "alone.txt"
+
+rule told:
+    output: "{name}.txt"
+    log: "{name}.log"
+    benchmark: "{name}.jsonl"
+    params: colour="red"
+    script: "workflow/scripts/tell.py"
+
+use rule told as alone with:
+    output: "alone.txt"
+    log: "alone.log"
+    benchmark: "alone.jsonl"
+    threads: 2
+
+ruleorder: alone > told
+
+rule wrong:
+    output: "wrong{how}"
+    script: "workflow/scripts/wrong.py"
+
+rule long:
+    output: "long.txt"
+    script: "workflow/scripts/long.py"
+"""
+TELL = """
+import os, sys
+from beside import WORD
+known = "icha.asked" in sys.modules
+facts = known, WORD, len(sys.argv), os.environ["OMP_NUM_THREADS"], snakemake.params.colour, snakemake.rule
+print(*facts, os.getcwd(), os.getppid(), snakemake.log[0], file=open(snakemake.output[0], "w"))
+"""
+WRONG = """
+import os, signal, sys
+if snakemake.wildcards.how == "3":
+    sys.exit(3)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+# Only the first one takes long.
+LONG = """
+import os, time
+first = not os.path.exists("pids")
+print(os.getpid(), os.getppid(), file=open("pids.part", "w"))
+os.rename("pids.part", "pids")
+time.sleep(600 * first)
+open(snakemake.output[0], "w").close()
+"""
+
+
+@pytest.fixture(scope="module")
+def workflow(tmp_path_factory):
+    """Start Snakemake on this workflow."""
+    folder = tmp_path_factory.mktemp("executor")
+    files = {"Snakefile": SNAKEFILE, "icha/__init__.py": "", "icha/asked.py": "", "icha/broken.py": "raise OSError"}
+    scripts = {"tell": TELL, "wrong": WRONG, "long": LONG, "beside": "WORD = 'beside'"}
+    for name, text in (files | {f"workflow/scripts/{name}.py": text for name, text in scripts.items()}).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    command = [sys.executable, "-m", "snakemake", "--executor", "icha", "--cores", "2", "--keep-going", "--nolock"]
+    found = os.pathsep.join([str(folder), str(REPOSITORY / "workflow/plugins")])
+
+    def start(*targets):
+        return subprocess.Popen(
+            [*command, *targets],
+            cwd=folder,
+            env=os.environ | {"PYTHONPATH": found},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    start.folder = folder
+    return start
+
+
+def alive(pid):
+    """Whether a process runs: one that has ended and that nobody asked for its status does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def wait_until(condition):
+    for _ in range(1000):
+        if condition():
+            return
+        time.sleep(0.02)
+    raise AssertionError("this never came")
+
+
+def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow):
+    said = workflow().communicate(timeout=120)[0]
+    assert (workflow.folder / "alone.txt").exists(), said
+    told, again, alone = ((workflow.folder / f"{name}.txt").read_text().split() for name in ("told", "again", "alone"))
+    assert told[:7] == ["True", "beside", "1", "1", "red", "told", str(workflow.folder)], said
+    assert again[7] == told[7] and (told[8], again[8]) == ("told.log", "again.log")
+    # A job of two threads runs by itself.
+    assert alone[:1] == ["False"] and alone[3] == "2" and alone[7] != told[7]
+    assert float((workflow.folder / "told.jsonl").read_text().split('"max_rss": ')[1].split(",")[0]) > 1
+
+
+def test_jobs_that_fail_are_told_with_how_they_ended(workflow):
+    process = workflow("wrong3", "wrong9")
+    said = process.communicate(timeout=120)[0]
+    assert process.returncode == 1
+    assert "wrong.py ended with status 3." in said and "wrong.py was killed by signal 9." in said
+    assert "Traceback" not in said
+
+
+@pytest.fixture
+def long(workflow):
+    """A call whose job takes long; its process and that which it was forked from."""
+    for name in ("pids", "long.txt"):
+        (workflow.folder / name).unlink(missing_ok=True)
+    process = workflow("long.txt")
+    wait_until((workflow.folder / "pids").exists)
+    job, server = map(int, (workflow.folder / "pids").read_text().split())
+    yield process, job, server
+    process.kill()
+    process.communicate()
+
+
+def test_all_processes_end_with_snakemake(long):
+    process, job, server = long
+    assert alive(job) and alive(server)
+    process.kill()
+    wait_until(lambda: not alive(job) and not alive(server))
+
+
+def test_a_job_whose_fork_server_is_killed_ends_and_is_run_again(workflow, long):
+    process, job, server = long
+    os.kill(server, signal.SIGKILL)
+    wait_until(lambda: not alive(job))
+    said = process.communicate(timeout=120)[0]
+    assert process.returncode == 0, said
+    assert (workflow.folder / "long.txt").exists()
+
+
+def test_a_call_that_is_interrupted_ends_its_jobs(workflow, long):
+    process, job, _ = long
+    os.kill(job, signal.SIGINT)  # as from a terminal, to all processes
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=60)[0]
+    assert process.returncode and not alive(job) and "Traceback" not in said, said
