@@ -23,6 +23,7 @@ class Campaign:
     """
 
     def __init__(self, results: str, *, dry_run: bool):
+        """Look at the folder `results`; a dry run changes nothing."""
         self.results = results
         self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
         not_whole = checksums.damaged(results)

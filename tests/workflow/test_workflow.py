@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
-from conftest import FIGURES, REPOSITORY, SMOKE, copy_project, snakemake, snakemake_command
+from conftest import FIGURES, REPOSITORY, SMOKE, copy_project, modules_of, snakemake, snakemake_command
 from traces import traces
 
 from icha.configuration.load import load_configuration
@@ -167,6 +167,7 @@ def test_nothing_in_the_deposit_tells_where_or_when_it_was_made(smoke):
     assert traces(files, words, (now - 86400, now)) == []
 
 
+@pytest.mark.slow
 def test_killed_runs_are_finished_with_the_same_bytes(smoke, tmp_path):
     project = shutil.copytree(smoke, tmp_path / "project", ignore=shutil.ignore_patterns("results", ".snakemake"))
     pause = random.Random(1)

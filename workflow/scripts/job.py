@@ -1,9 +1,7 @@
 """What the scripts of all jobs share: where they say what they have to say, how they fail, checksums of results."""
 
 import contextlib
-import json
 import os
-import resource
 import select
 import sys
 import threading
@@ -12,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from icha.support import checksums
-from icha.support.atomic_files import whole_file
 
 # Set by the Snakefile: the process that wants the job.
 SNAKEMAKE = "ICHA_SNAKEMAKE"
@@ -33,8 +30,7 @@ def guarded(snakemake):
     """Surround the work of a job: its inputs must be what was written, its outputs get checksums, its errors are told.
 
     All output goes to the job's log; an error ends the job with its message there. The errors that users can mend say
-    all in their message. The traceback of any other one is for the developers and is kept beside the log; so is what
-    the job took, which Snakemake cannot see of one that was handed over.
+    all in their message. The traceback of any other one is for the developers and is kept beside the log.
     """
     _end_with_snakemake()
     log, results = snakemake.log[0], _results(snakemake)
@@ -63,11 +59,6 @@ def guarded(snakemake):
                 traceback.print_exc(file=details)
                 _say(f"Details for the developers: {log}.traceback", terminal)
         sys.exit(1)
-    finally:
-        took = resource.getrusage(resource.RUSAGE_SELF)
-        usage = {"cpu_seconds": round(took.ru_utime + took.ru_stime, 3), "megabytes": took.ru_maxrss // 1024}
-        with contextlib.suppress(OSError), whole_file(Path(log).with_suffix(".usage.json")) as temporary:
-            temporary.write_text(json.dumps(usage) + "\n", encoding="ascii")
 
 
 def attributes(snakemake):
