@@ -1,7 +1,6 @@
 """Coalescence: overlapping spots become one equivalent spot (Violano & Afferrante, section II; Afferrante et al. 2012).
 
-a_eq^2 = a_i^2 + a_j^2, R_eq = sqrt(R_i^2 + R_j^2), centre in the centroid of the caps' volumes pi a^4/(4 R). The
-height follows from the equilibrium at hand (see `icha.equilibrium.equilibrium`).
+The height follows from the equilibrium at hand (`icha.equilibrium.events.unions`).
 """
 
 from __future__ import annotations
@@ -9,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from icha.asperity.law import SpotLaw
 from icha.surfaces.square import periodic_difference
 
 
@@ -48,14 +48,22 @@ def disjoint_pairs(pairs):
     return np.array(chosen, dtype=int).reshape(-1, 2)
 
 
-def equivalent_spots(position_i, a_i, R_i, position_j, a_j, R_j, period):
-    """Centre (k, 2), contact radius and radius of curvature (k,) of the spots that replace pairs i, j, all in m."""
+def united_paraboloids(a_i, R_i, a_j, R_j):
+    """Contact radius, radius of curvature (m), and the centre's way from the first to the second, as part of it.
+
+    a_eq^2 = a_i^2 + a_j^2, R_eq^2 = R_i^2 + R_j^2, centre in the centroid of the caps' volumes pi a^4/(4 R).
+    """
     volume_i, volume_j = a_i**4 / R_i, a_j**4 / R_j
-    share = volume_j / (volume_i + volume_j)
+    return np.hypot(a_i, a_j), np.hypot(R_i, R_j), volume_j / (volume_i + volume_j)
+
+
+def equivalent_spots(law: SpotLaw, position_i, a_i, R_i, position_j, a_j, R_j, period):
+    """Centre (k, 2), contact radius and radius of curvature (k,) of the spots that replace pairs i, j, all in m."""
+    a, R, share = law.union(a_i, R_i, a_j, R_j)
     offset = periodic_difference(position_j, position_i, period)
     centre = np.mod(position_i + share[:, None] * offset, period)
     centre[centre >= period] = 0.0
-    return centre, np.hypot(a_i, a_j), np.hypot(R_i, R_j)
+    return centre, a, R
 
 
 def covering_spot(points, position, a, period, larger_than=None):

@@ -10,7 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import beta
 
+from icha.asperity.coalescence import united_paraboloids
 from icha.asperity.material import Material
 
 # Wu's jump-in formula was verified between these Tabor parameters.
@@ -21,7 +23,7 @@ _MAX_NEWTON_STEPS = 200
 
 @dataclass(frozen=True)
 class JKR:
-    """Contact of one paraboloid with an elastic half-space."""
+    """Contact of one paraboloid with an elastic half-space: an `icha.asperity.law.SpotLaw`."""
 
     material: Material
 
@@ -58,6 +60,10 @@ class JKR:
         if self.material.surface_energy > 0:
             slope = slope - np.sqrt(np.pi * self.material.adhesion_length / (2 * a))
         return slope
+
+    def radius_derivative(self, a, R):
+        """da/d(delta), bounded close to jump-off, where it is infinite; a > 0."""
+        return 1 / np.maximum(self.approach_derivative(a, R), 1e-3 * (a / R))
 
     def contact_radius(self, approach, R):
         """The larger (stable) root a of eq. (2), in m; the jump-off radius where the approach lies below jump-off.
@@ -176,6 +182,13 @@ class JKR:
         """Derivative of `fourth_moment` with respect to a, N m^3."""
         return a**3 * (self.repulsive_force(a, R) * (9 / 40) - self.adhesive_force(a) * (5.5 * 3 / 40))
 
+    def moments(self, a, R, count):
+        """Integrals of p (r/a)^(2k), k = 0 ... count-1, over spots a, R (m,): (m, count), N."""
+        order = np.arange(count)
+        # Means over Hertz's and over the flat punch's pressure.
+        hertz, punch = 1.5 * beta(order + 1, 1.5), 0.5 * beta(order + 1, 0.5)
+        return self.repulsive_force(a, R)[:, None] * hertz - self.adhesive_force(a)[:, None] * punch
+
     # --- the pressure inside the spot -----------------------------------------------------------------------
 
     def pressure_amplitudes(self, a, R):
@@ -183,6 +196,11 @@ class JKR:
         peak = 2 * self.material.contact_modulus * a / (np.pi * R)
         neck = np.sqrt(2 * self.material.contact_modulus * self.material.surface_energy / (np.pi * a))
         return peak, neck
+
+    def largest_pressure(self, a, R):
+        """Pressure in the middle of the spot, P - B, Pa."""
+        peak, neck = self.pressure_amplitudes(a, R)
+        return peak - neck
 
     def pressure(self, r, a, R):
         """Contact pressure at r < a in Pa, eq. (8)."""
@@ -203,3 +221,9 @@ class JKR:
             s = np.where(p >= 0, (p + root) / (2 * peak), np.where(root > p, 2 * neck / (root - p), 0.0))
         s = np.minimum(s, 1.0)
         return np.pi * a**2 * s**2, 2 * np.pi * a**2 * (peak * s**3 / 3 - neck * s)
+
+    # --- two that overlap -----------------------------------------------------------------------------------
+
+    def union(self, a_i, R_i, a_j, R_j):
+        """Contact radius and radius of curvature of the one that two become, and where between them its centre lies."""
+        return united_paraboloids(a_i, R_i, a_j, R_j)

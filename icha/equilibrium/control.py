@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from icha.asperity.jkr import JKR
+from icha.asperity.law import SpotLaw
 from icha.contact.model import PRESSURE
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.states import ContactState
@@ -32,9 +32,9 @@ def derivative(problem: Problem, quantity: str, state: ContactState) -> float:
     return float(np.sum(gradient_by_radius(problem, quantity, a, R) * growth))
 
 
-def radius_response(law: JKR, a, R, approach, jump_off):
+def radius_response(law: SpotLaw, a, R, approach, jump_off):
     """da/d(delta), zero for spots past jump-off; bounded close to it, where it is infinite."""
     slope = np.zeros(len(a))
     touching = (a > 0) & (approach >= jump_off)
-    slope[touching] = 1 / np.maximum(law.approach_derivative(a[touching], R[touching]), 1e-3 * (a / R)[touching])
+    slope[touching] = law.radius_derivative(a[touching], R[touching])
     return slope

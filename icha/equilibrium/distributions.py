@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.asperity.jkr import JKR
+from icha.asperity.law import SpotLaw
 from icha.contact.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
 from icha.equilibrium.states import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, displacement_field, row_blocks, windows
@@ -38,7 +38,7 @@ class PressureDistribution:
     mean: np.ndarray
 
 
-def displacement(law: JKR, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
+def displacement(law: SpotLaw, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
     """Displacement w of the half-space at the surface's nodes, (n, n), m: eq. 9, periodic and of zero mean, or free.
 
     `every` : only at every so-manieth node of both directions, a divisor of the grid. The values are the same; time
@@ -57,7 +57,7 @@ def displacement(law: JKR, surface: Surface, state: ContactState, every: int = 1
     )
 
 
-def gap(law: JKR, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
+def gap(law: SpotLaw, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
     """Gap u = mean separation + w - h at the nodes, (n, n), m; meaningful outside the spots, where the model's
     inexactness can make it negative. `every` as for `displacement`."""
     return displacement(law, surface, state, every) + (state.separation - surface.heights[::every, ::every])
@@ -91,7 +91,7 @@ def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndar
     return np.concatenate(parts)
 
 
-def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDistribution:
+def gap_distribution(law: SpotLaw, surface: Surface, state: ContactState) -> GapDistribution:
     """P(u) from the gap field; cells on the edge of a spot count with the part that lies outside.
 
     integral of P(u) + A/A0 + overlap = 1; of a free square 1 and what its spots have beyond the edges. The part outside
@@ -146,7 +146,7 @@ def _gap_bin(u, edges):
     return index
 
 
-def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> PressureDistribution:
+def pressure_distribution(law: SpotLaw, surface: Surface, spots: Spots) -> PressureDistribution:
     """P(p) over the nominal area from the closed form for every spot (no grid).
 
     integral of P(p) = A/A0; the sum of density, width and mean over the bins = F/A0.
@@ -160,9 +160,9 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> PressureD
     a, R = spots.contact_radius, spots.radius_of_curvature
     area, force = np.zeros(len(edges)), np.zeros(len(edges))
     if len(a):
-        peak, neck = law.pressure_amplitudes(a, R)
-        if np.max(peak - neck) > edges[-1]:
-            raise ValueError(f"pressure: {np.max(peak - neck):.3e} Pa exceeds the largest bin, {edges[-1]:.3e} Pa")
+        largest = np.max(law.largest_pressure(a, R))
+        if largest > edges[-1]:
+            raise ValueError(f"pressure: {largest:.3e} Pa exceeds the largest bin, {edges[-1]:.3e} Pa")
         for k, p in enumerate(edges):
             areas, forces = law.pressure_distribution(p, a, R)
             area[k], force[k] = np.sum(areas), np.sum(forces)

@@ -578,6 +578,7 @@ class _Search:
         pairs = disjoint_pairs(pairs)
         i, j = pairs.T
         centre, radius, R = equivalent_spots(
+            self.law,
             sites.position[i],
             a[i],
             sites.radius_of_curvature[i],

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from icha.asperity.jkr import JKR
+from icha.asperity.law import SpotLaw
 from icha.contact.unions import DETACHMENT
 from icha.surfaces.summits import Asperities
 
@@ -20,7 +20,7 @@ class Problem:
     jump_in: the asperities' jump-in approaches (n,), m.
     """
 
-    law: JKR
+    law: SpotLaw
     asperities: Asperities
     rms_height: float
     united_until: str = DETACHMENT

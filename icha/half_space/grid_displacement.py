@@ -19,9 +19,9 @@ from functools import cached_property
 import finufft
 import numpy as np
 import scipy.fft
-from scipy.special import beta, erf
+from scipy.special import erf
 
-from icha.asperity.jkr import JKR
+from icha.asperity.law import SpotLaw
 from icha.half_space.free_square import basis, image_field
 from icha.half_space.interaction import _short_mean, _smooth_mode
 from icha.support.parallel import blocks, on_cores
@@ -43,7 +43,7 @@ _SERIES_BELOW = 0.25
 _SERIES_LENGTH = 15
 
 
-def displacement_field(law: JKR, period: float, grid: int, centres, a, R, *, free: bool = False) -> np.ndarray:
+def displacement_field(law: SpotLaw, period: float, grid: int, centres, a, R, *, free: bool = False) -> np.ndarray:
     """Displacement w (grid, grid) in m at the nodes of a regular grid, eq. (9)'s sum.
 
     It is periodic and of zero mean; or, for a single square on a free half-space, the plain sum over the spots.
@@ -63,7 +63,7 @@ def row_blocks(grid: int) -> list[slice]:
 class DisplacementField:
     """Displacement w of the half-space at the nodes of a regular grid, by rows; arguments as `displacement_field`."""
 
-    law: JKR
+    law: SpotLaw
     period: float
     grid: int
     centres: np.ndarray
@@ -131,11 +131,9 @@ class DisplacementField:
     def _group(self, spots, reach):
         a, R, alpha = self.contact_radius[spots], self.radius_of_curvature[spots], _CUT / reach
         order = np.arange(_MOMENTS)
-        # Mean r^(2k) over a^(2k) of Hertz's and of the flat punch's pressure.
-        hertz, punch = 1.5 * beta(order + 1, 1.5), 0.5 * beta(order + 1, 0.5)
-        force = self.law.repulsive_force(a, R)[:, None] * hertz - self.law.adhesive_force(a)[:, None] * punch
         factorial = np.cumprod(np.maximum(order, 1))
-        return _Group(spots, reach, alpha, force * (0.25 * (alpha * a[:, None]) ** 2) ** order / factorial**2)
+        moments = self.law.moments(a, R, _MOMENTS) * (0.25 * (alpha * a[:, None]) ** 2) ** order / factorial**2
+        return _Group(spots, reach, alpha, moments)
 
     @cached_property
     def _short_mean(self):

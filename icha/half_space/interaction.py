@@ -27,7 +27,7 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 from scipy.special import erf, erfc
 
-from icha.asperity.jkr import JKR
+from icha.asperity.law import SpotLaw
 from icha.half_space.free_square import basis, image_field, interpolated
 from icha.surfaces.square import cell_of, periodic_difference
 
@@ -400,13 +400,13 @@ class Interaction:
     windows : of exact displacement.
     """
 
-    law: JKR
+    law: SpotLaw
     half_space: HalfSpace
     radius_of_curvature: np.ndarray
     windows: _Windows
 
     @classmethod
-    def between(cls, law: JKR, half_space: HalfSpace, radius_of_curvature, largest_radius) -> Interaction:
+    def between(cls, law: SpotLaw, half_space: HalfSpace, radius_of_curvature, largest_radius) -> Interaction:
         """With windows for contact radii up to `largest_radius` (n,), m; none where it is zero."""
         return cls(law, half_space, radius_of_curvature, _Windows.around(half_space, largest_radius))
 
@@ -464,7 +464,7 @@ class Tangent:
 
 
 def displacement_at(
-    law: JKR, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
+    law: SpotLaw, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
 ) -> np.ndarray:
     """Displacement w (n,) in m at any points (n, 2) by spots, eq. (9)'s sum.
 
