@@ -227,7 +227,7 @@ class _Search:
         part, R = self.status != GONE, self.sites.radius_of_curvature
         a = np.zeros(len(self.sites))
         a[part] = self.law.contact_radius(approach[part], R[part])
-        if self.interaction is None or np.any(a > self.interaction.windows.radius):
+        if self.interaction is None or np.any(a > self.interaction.pairs.largest_radius):
             ahead = np.where(part, approach + 0.02 * self.contact.rms_height, 0.0)
             largest = np.where(part, 1.2 * self.law.contact_radius(ahead, R), 0.0)
             self.interaction = Interaction.between(self.law, self.sites.half_space, R, largest)
@@ -374,7 +374,7 @@ class _Search:
                     continue
                 # Where one spot's edge runs through another the equations are singular: they must unite first.
                 self.approach = point.approach
-                windows = self.interaction.windows
+                windows = self.interaction.pairs
                 if not self._unite(point.a, windows, margin) and not self._unite(point.a, windows, deep=True):
                     raise NotConverged(
                         f"no descent from an equilibrium error of {size:.2e} h_rms with "
@@ -397,7 +397,7 @@ class _Search:
         changed = bool(off.any())
         if changed:
             self._jump_off(off)
-        windows = self.interaction.windows
+        windows = self.interaction.pairs
         # Without adhesion only who was not expected is missing, which may wait for the equilibrium.
         if self.adhesive or margin == 0:
             changed |= self._join(point, margin)
@@ -528,7 +528,7 @@ class _Search:
 
         The equations are singular where one spot's edge runs through another's centre.
         """
-        a, windows, known = point.a, self.interaction.windows, self.known
+        a, windows, known = point.a, self.interaction.pairs, self.known
         i, j = windows.target, windows.source
         inside = np.flatnonzero((windows.r < a[j]) & (a[i] > 0) & ~known[i])
         inside = inside[known[j[inside]] | (a[i[inside]] < a[j[inside]])]

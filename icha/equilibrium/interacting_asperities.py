@@ -13,7 +13,7 @@ from icha.equilibrium.control import derivative, held_value
 from icha.equilibrium.energy import stored_energy
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.states import ContactState, untouched
-from icha.half_space.interaction import mean_displacement
+from icha.half_space.free_square import mean_displacement
 
 # At such a rate to the separation the approach of a spot rises, as the surfaces part, on an unstable branch only.
 _RUNAWAY = 10.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.contact.events import Events
 from icha.equilibrium.problem import Problem
-from icha.half_space.interaction import HalfSpace
+from icha.half_space.ewald import HalfSpace
 
 # Status of a site: in contact; without adhesion, one that may come into contact; one that is no more.
 CONTACT, TRIAL, GONE = 1, 2, 3

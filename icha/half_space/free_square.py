@@ -1,4 +1,4 @@
-"""What the images of a periodic sum add within a quarter of its cell: what a free half-space must be rid of.
+"""A single square on a free half-space: the images of a periodic sum within a quarter of its cell, to be rid of.
 
 A square on a free half-space is put into a periodic cell of twice its side. There the nearest image of a point is as
 far from the square as the square is wide, so that the images' displacement is smooth: Lagrange's polynomials through a
@@ -74,11 +74,11 @@ def _table():
     nodes, _, _ = _chebyshev()
     ways, index = np.unique(np.round(np.abs(nodes[:, None] - nodes), 15), return_inverse=True)
     index = index.reshape(_NODES, _NODES)
-    potential = _image_potential(ways[:, None], ways)
+    potential = image_potential(ways[:, None], ways)
     return potential[index[:, None, :, None], index[None, :, None, :]].reshape(_NODES**2, _NODES**2)
 
 
-def _image_potential(y, x):
+def image_potential(y, x):
     """Sum of 1/r over all images of a unit cell but the own one, less the uniform background; |x|, |y| <= 1/2."""
     r = np.hypot(y, x)
     safe = np.where(r > 0, r, 1.0)
@@ -94,3 +94,20 @@ def _image_potential(y, x):
                 k = np.hypot(m, n)
                 potential += erfc(np.pi * k / _ALPHA) / k * np.cos(2 * np.pi * m * y) * np.cos(2 * np.pi * n * x)
     return potential - 2 * np.sqrt(np.pi) / _ALPHA
+
+
+def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
+    """Mean displacement of a square of a free half-space by point forces (n,) at (n, 2) in it, m.
+
+    By reciprocity it is that of the points under an even pressure on the square, whose four rectangles around a point
+    give x asinh(y/x) + y asinh(x/y) each.
+    """
+    x, y = ([along, side - along] for along in np.clip(position.T, 0.0, side))
+    potential = sum(_corner(one, other) for one in x for other in y)
+    return float(np.sum(force * potential)) / (np.pi * contact_modulus * side**2)
+
+
+def _corner(x, y):
+    """Integral of 1/r over a rectangle, r from one of its corners."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(x > 0, x * np.arcsinh(y / x), 0.0) + np.where(y > 0, y * np.arcsinh(x / y), 0.0)

@@ -1,6 +1,6 @@
 """Displacement of the half-space at all nodes of a grid, and the spots around which something changes there.
 
-The sum over spots and images is split as in `icha.half_space.interaction`: a smooth half through its Fourier series and
+The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half through its Fourier series and
 a short-ranged half around every spot. A field has as many targets as nodes, so that the area of the windows around the
 spots is what it costs, and many moments of a spot's pressure pay: four of them represent it from five radii on. In
 return the smooth half of a large spot must be smooth on the scale of that spot: spots are put into groups of like
@@ -22,8 +22,8 @@ import scipy.fft
 from scipy.special import erf
 
 from icha.asperity.law import SpotLaw
+from icha.half_space.ewald import short_mean, smooth_mode
 from icha.half_space.free_square import basis, image_field
-from icha.half_space.interaction import _short_mean, _smooth_mode
 from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 
@@ -138,7 +138,7 @@ class DisplacementField:
     @cached_property
     def _short_mean(self):
         modulus = self.law.material.contact_modulus
-        return sum(np.sum(g.moments[:, 0]) * _short_mean(g.alpha, modulus, self._cell) for g in self._groups)
+        return sum(np.sum(g.moments[:, 0]) * short_mean(g.alpha, modulus, self._cell) for g in self._groups)
 
     @cached_property
     def _smooth_half(self):
@@ -174,7 +174,7 @@ class DisplacementField:
             strength += factor * (-0.5j * (c - mirrored))
             factor *= -q2 / group.alpha**2
         q2[highest, 0] = 1.0
-        strength *= _smooth_mode(np.sqrt(q2), group.alpha, self.law.material.contact_modulus, self._cell)
+        strength *= smooth_mode(np.sqrt(q2), group.alpha, self.law.material.contact_modulus, self._cell)
         strength[highest, 0] = 0.0
         return strength
 

@@ -1,339 +1,26 @@
-"""Elastic interaction of contact spots on a periodic half-space of zero mean displacement.
-
-A point force F displaces the half-space by F/(pi E* r); summed over all periodic images, with the uniform
-counter-pressure that keeps the mean displacement zero, the sum is split as Ewald's: the smooth part
-erf(alpha r)/r goes through its Fourier series, (2/(E* q)) erfc(q/(2 alpha)) per mode and cell area, by non-uniform
-FFTs; the rest is short-ranged and pairwise.
+"""Elastic interaction of contact spots: the displacement at every one by all others and all images, eq. (4)'s sum.
 
 A spot is no point. Within eight of its radii its exact displacement is taken; farther away an axisymmetric pressure
 acts by its moments, integral of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4, 9/64, whose fields fall as 1/r, 1/r^3
 and 1/r^5. The third is only needed where the field is summed pairwise. Images farther than half the cell act by the
-first two. What depends on the positions alone, nearly everything, is computed once; only the windows of exact
-displacement follow the radii.
-
-A square on a free half-space, which goes on beyond it and is pressed by nothing else, is put into a cell of twice its
-side, where all ways between its points are the shortest; what images and counter-pressure do there is taken off again
-(`icha.half_space.free_square`), and the plain sum of F/(pi E* r) is left.
+first two. What depends on the positions alone, nearly everything, is computed once (`icha.half_space.ewald`); only the
+windows of exact displacement follow the radii.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
-import finufft
 import numpy as np
-import scipy.sparse
 from scipy.spatial import cKDTree
-from scipy.special import erf, erfc
 
 from icha.asperity.law import SpotLaw
-from icha.half_space.free_square import basis, image_field, interpolated
-from icha.surfaces.square import cell_of, periodic_difference
+from icha.half_space.ewald import NEIGHBOURS_ONCE, Ewald, HalfSpace
 
-# Cut of both halves of the Ewald sum: erfc(4.3) = 1.2e-9.
-_CUT = 4.3
-_NUFFT_TOLERANCE = 1e-9
-# The same for the operator of a linear solve, which only has to bring the next iterate closer: erfc(2.75) = 1e-4.
-_LOOSE_CUT = 2.75
-_LOOSE_NUFFT_TOLERANCE = 1e-4
 # Radii of a spot within which its displacement is exact, and beyond which force and second moment suffice: in both
 # cases the remainder is below 1e-6 of the spot's displacement at the place, and below 1e-7 of its own approach.
 _WINDOW = 8.0
 _WINDOW_OF_MOMENTS = 16.0
-# Points within the near field where the pairs serve many sums, and where they serve one.
-_NEIGHBOURS = 60
-_NEIGHBOURS_ONCE = 20
-# Where the window holds the exact displacement, the moments' fields, which it replaces, stay at their values at this
-# distance, in mean spacings of the points: they are singular at r = 0.
-_FLOOR = 0.05
-
-
-def _smooth(r, alpha):
-    """erf(alpha r)/r and its plane Laplacian; r >= 0."""
-    x = alpha * r
-    tiny = x < 0.05
-    safe = np.where(tiny, 1.0, r)
-    value = erf(alpha * safe) / safe
-    gauss = 2 * alpha / np.sqrt(np.pi) * np.exp(-((alpha * safe) ** 2))
-    laplacian = value / safe**2 - gauss * (1 / safe**2 + 2 * alpha**2)
-    x2 = np.where(tiny, x, 0.0) ** 2
-    scale = 2 * alpha / np.sqrt(np.pi)
-    value = np.where(tiny, scale * (1 - x2 / 3 + x2**2 / 10 - x2**3 / 42), value)
-    # Laplacian of r^(2k) in the plane is 4 k^2 r^(2k-2).
-    laplacian = np.where(tiny, scale * alpha**2 * (-4 / 3 + 16 / 10 * x2 - 36 / 42 * x2**2), laplacian)
-    return value, laplacian
-
-
-def _smooth_mode(q, alpha, contact_modulus, period):
-    """Displacement of a mode of wave number q > 0 by a unit point force and its images, the smooth half."""
-    return 2 / (contact_modulus * q * period**2) * erfc(q / (2 * alpha))
-
-
-def _short_mean(alpha, contact_modulus, period):
-    """Mean displacement by a unit point force and its images, the short-ranged half; the smooth half has none."""
-    return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
-
-
-def _distance(first, second, period):
-    difference = periodic_difference(first, second, period)
-    return np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)
-
-
-class _SmoothSum:
-    """The smooth half of the Ewald sum as non-uniform FFTs between points.
-
-    The plans are expensive and depend on the number of modes alone; points are set when they change.
-    """
-
-    def __init__(self, period, alpha, contact_modulus, cut, tolerance):
-        self._period = period
-        highest = int(np.ceil(cut * alpha * period / np.pi))
-        k = np.arange(-highest, highest + 1) * (2 * np.pi / period)
-        q2 = k[:, None] ** 2 + k[None, :] ** 2
-        q2[highest, highest] = 1.0
-        self._green = _smooth_mode(np.sqrt(q2), alpha, contact_modulus, period)
-        self._green[highest, highest] = 0.0
-        self._laplacian = -q2 * self._green
-        # One thread: the order of summation, and with it every bit of the result, is then fixed.
-        self._plans = [
-            finufft.Plan(
-                kind,
-                q2.shape,
-                eps=tolerance,
-                isign=sign,
-                nthreads=1,
-                upsampfac=1.25,
-                dtype="complex128",
-            )
-            for kind, sign in ((1, -1), (2, 1))
-        ]
-        self._points = [None, None]
-
-    def _set_points(self, which, points):
-        if self._points[which] is not points:
-            angle = points * (2 * np.pi / self._period)
-            self._plans[which].setpts(np.ascontiguousarray(angle[:, 1]), np.ascontiguousarray(angle[:, 0]))
-            self._points[which] = points
-
-    def __call__(self, sources, targets, force, moment=None):
-        """Displacement (m) at the targets, of forces (N) and second moments (N m^2) at the sources."""
-        if not len(sources) or not len(targets):
-            return np.zeros(len(targets))
-        self._set_points(0, sources)
-        self._set_points(1, targets)
-        collect, distribute = self._plans
-        if moment is None:
-            modes = collect.execute(force.astype(complex))
-            modes *= self._green
-        else:
-            # Both real sets travel as one complex set: its spectrum c holds F as the part with c(-k) = conj c(k).
-            sizes = [np.max(np.abs(each), initial=0.0) for each in (force, moment)]
-            scale = sizes[0] / sizes[1] if all(sizes) else 1.0
-            c = collect.execute(force + 1j * (scale * moment))
-            mirrored = np.conj(c[::-1, ::-1])
-            modes = (0.5 * self._green) * (c + mirrored) + (-0.5j / scale * self._laplacian) * (c - mirrored)
-        return distribute.execute(modes).real
-
-
-def _point_kernels(r, alpha, contact_modulus):
-    """Short-ranged displacement at distances r > 0 by unit moments k = 0, 1, 2: three arrays like r.
-
-    erfc(alpha r)/r, its plane Laplacian, and 1/r^5.
-    """
-    scale = 1 / (np.pi * contact_modulus)
-    inverse, x2 = 1 / r, (alpha * r) ** 2
-    gauss = 2 * alpha / np.sqrt(np.pi) * scale * np.exp(-x2)
-    force = erfc(alpha * r)
-    force *= scale * inverse
-    inverse *= inverse
-    moment = (force + gauss) * inverse
-    moment += 2 * alpha**2 * gauss
-    return force, moment, scale * inverse**2 / r
-
-
-@dataclass(frozen=True, eq=False)
-class Ewald:
-    """How the sum is split: reach of the near field and floor of the moments' fields (m), and the smooth sums.
-
-    period: of the sum, m. free: whether only the quarter [0, period/2]^2 counts, and what its images do is taken off.
-    """
-
-    period: float
-    contact_modulus: float
-    reach: float
-    floor: float
-    free: bool = False
-
-    @classmethod
-    def of(cls, period, contact_modulus, count, neighbours, free=False):
-        """A split that suits a number of points; the near field is never wider than half the cell.
-
-        period: side of the square, m; free: whether it is single.
-        """
-        spacing = period / np.sqrt(max(count, 1))
-        cell = cell_of(period, free)
-        reach = min(0.5 * cell, np.sqrt(neighbours / np.pi) * spacing)
-        return cls(cell, contact_modulus, reach, _FLOOR * min(spacing, 0.1 * period), free)
-
-    @property
-    def side(self):
-        """Side of the square, m."""
-        return 0.5 * self.period if self.free else self.period
-
-    def bases(self, points):
-        """What the images' displacement at points (n, 2), or by spots there, is made of; None if images count."""
-        return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
-
-    def by_images(self, sources, targets, moments):
-        """Displacement (n,) at the targets by the images of the sources, both as `bases` gives them."""
-        field = image_field(*sources, moments, self.period, self.contact_modulus)
-        return interpolated(field, *targets)
-
-    @cached_property
-    def alpha(self):
-        """Wave number of the split, 1/m."""
-        return _CUT / self.reach
-
-    @cached_property
-    def smooth(self):
-        """The smooth sum, accurate."""
-        return _SmoothSum(self.period, self.alpha, self.contact_modulus, _CUT, _NUFFT_TOLERANCE)
-
-    @cached_property
-    def loose(self):
-        """The smooth sum, to a thousandth."""
-        return _SmoothSum(self.period, self.alpha, self.contact_modulus, _LOOSE_CUT, _LOOSE_NUFFT_TOLERANCE)
-
-    @property
-    def loose_reach(self):
-        """Radius of the near field that matters to the loose sum, m."""
-        return self.reach * _LOOSE_CUT / _CUT
-
-    @cached_property
-    def once(self):
-        """The split for a sum whose pairs serve only once."""
-        return replace(self, reach=self.reach * np.sqrt(_NEIGHBOURS_ONCE / _NEIGHBOURS))
-
-    @cached_property
-    def mean(self):
-        """Mean displacement of the short-ranged half by a unit force, m/N."""
-        return _short_mean(self.alpha, self.contact_modulus, self.period)
-
-    @cached_property
-    def own_smooth(self):
-        """Smooth parts at r = 0, which the sum over modes holds for a point's own site."""
-        value, laplacian = _smooth(np.zeros(1), self.alpha)
-        scale = 1 / (np.pi * self.contact_modulus)
-        return scale * value[0], scale * laplacian[0]
-
-    def kernels(self, r):
-        """Short-ranged displacement at distances r by unit moments k = 0, 1, 2."""
-        return _point_kernels(np.maximum(r, self.floor), self.alpha, self.contact_modulus)
-
-    def replaced(self, r):
-        """Displacement at distances r by unit moments k = 0, 1, 2 in all, as the sum over points gives it."""
-        held = np.maximum(r, self.floor)
-        force, moment = 1 / held, 1 / held**3
-        fourth = np.where(r <= self.reach, 1 / held**5, 0.0)
-        low = np.flatnonzero(r < self.floor)
-        if len(low):
-            # Below the floor only the short-ranged part stays at its value there.
-            here, there = _smooth(r[low], self.alpha), _smooth(held[low], self.alpha)
-            force[low] += here[0] - there[0]
-            moment[low] += here[1] - there[1]
-        scale = 1 / (np.pi * self.contact_modulus)
-        return scale * force, scale * moment, scale * fourth
-
-
-@dataclass(frozen=True, eq=False)
-class HalfSpace:
-    """The displacement at points by forces and moments at the same points, each without its own field.
-
-    Parameters
-    ----------
-    ewald : the split of the sum.
-    points : (n, 2), m.
-    pairs : near pairs as (later, earlier, distance), each pair once.
-    near : three (n, n) lower triangular matrices, the short-ranged displacement by the moments k = 0, 1, 2.
-    near_transposed : their transposes.
-    near_loose : the displacement by forces, what matters to a thousandth, and its transpose.
-    bases : of the points, for their images on a free half-space.
-    """
-
-    ewald: Ewald
-    points: np.ndarray
-    pairs: tuple
-    near: tuple
-    near_transposed: tuple
-    near_loose: tuple
-    bases: tuple | None = None
-
-    @classmethod
-    def at(cls, points, period, contact_modulus, free=False) -> HalfSpace:
-        """The half-space with (n, 2) points in m, in a square of side `period` (m) that repeats or is single (free)."""
-        ewald = Ewald.of(period, contact_modulus, len(points), _NEIGHBOURS, free)
-        points = np.mod(points, ewald.period)
-        found = cKDTree(points, boxsize=ewald.period).query_pairs(ewald.reach, output_type="ndarray")
-        return cls._assembled(ewald, points, None, found.max(axis=1), found.min(axis=1))
-
-    def extended(self, points) -> HalfSpace:
-        """With more points (k, 2) after the present ones."""
-        known, period = len(self.points), self.ewald.period
-        points = np.mod(points, period)
-        tree = cKDTree(points, boxsize=period)
-        across = tree.sparse_distance_matrix(
-            cKDTree(self.points, boxsize=period), self.ewald.reach, output_type="ndarray"
-        )
-        among = tree.query_pairs(self.ewald.reach, output_type="ndarray")
-        later = np.concatenate([across["i"], among.max(axis=1)]) + known
-        earlier = np.concatenate([across["j"], among.min(axis=1) + known])
-        return self._assembled(self.ewald, np.concatenate([self.points, points]), self, later, earlier)
-
-    @classmethod
-    def _assembled(cls, ewald, points, before, later, earlier):
-        """Append the pairs of the points that the half-space `before` does not have."""
-        n, known = len(points), 0 if before is None else len(before.points)
-        r = _distance(points[later], points[earlier], ewald.period)
-        rows = scipy.sparse.coo_matrix((r, (later - known, earlier)), shape=(n - known, n)).tocsr()
-        later, earlier, r = np.repeat(np.arange(known, n), np.diff(rows.indptr)), rows.indices, rows.data
-        start, kernels = rows.indptr, ewald.kernels(r)
-        if before is not None:
-            old = before.near[0]
-            start = np.concatenate([old.indptr, old.nnz + start[1:]])
-            kernels = [np.concatenate([m.data, k]) for m, k in zip(before.near, kernels, strict=True)]
-            later, earlier, r = (np.concatenate(p) for p in zip(before.pairs, (later, earlier, r), strict=True))
-        near = tuple(scipy.sparse.csr_matrix((k, earlier, start), shape=(n, n)) for k in kernels)
-        counts = r <= ewald.loose_reach
-        ends = np.append(0, np.cumsum(counts))[start]
-        loose = scipy.sparse.csr_matrix((kernels[0][counts], earlier[counts], ends), shape=(n, n))
-        transposed = tuple(matrix.T for matrix in near)
-        bases = ewald.bases(points)
-        return cls(ewald, points, (later, earlier, r), near, transposed, (loose, loose.T), bases)
-
-    def displacement(self, force, moment, fourth):
-        """Displacement (n,) in m by forces (N), second (N m^2) and fourth moments (N m^4), each (n,)."""
-        w = self.ewald.smooth(self.points, self.points, force, moment)
-        for lower, upper, strength in zip(self.near, self.near_transposed, (force, moment, fourth), strict=True):
-            w += lower @ strength
-            w += upper @ strength
-        own = self.ewald.own_smooth
-        w -= own[0] * force + own[1] * moment
-        w -= self.ewald.mean * np.sum(force)
-        if self.bases is not None:
-            w -= self.ewald.by_images(self.bases, self.bases, (force, moment))
-        return w
-
-    def nearly(self, force):
-        """Displacement by forces alone, to a thousandth: enough for the operator of a linear solve."""
-        w = self.ewald.loose(self.points, self.points, force)
-        for half in self.near_loose:
-            w += half @ force
-        w -= self.ewald.own_smooth[0] * force
-        w -= self.ewald.mean * np.sum(force)
-        if self.bases is not None:
-            w -= self.ewald.by_images(self.bases, self.bases, (force,))
-        return w
 
 
 def _pairs_beyond(points, position, radius, ewald):
@@ -355,22 +42,22 @@ def _pairs_beyond(points, position, radius, ewald):
 
 
 @dataclass(frozen=True, eq=False)
-class _Windows:
+class NearPairs:
     """The pairs at which a spot acts with its exact displacement, for spots up to given radii.
 
-    target, source: (k,) indices of points; r: (k,) distances, m; radius: (n,) radii up to which the windows hold, m.
-    replaced: the displacement by unit moments that the windows replace, three (k,).
+    target, source: (k,) indices of points; r: (k,) distances, m. largest_radius: (n,) up to which they suffice, m.
+    replaced: the displacement by unit moments that is replaced there, three (k,).
     """
 
     target: np.ndarray
     source: np.ndarray
     r: np.ndarray
-    radius: np.ndarray
+    largest_radius: np.ndarray
     replaced: tuple
 
     @classmethod
-    def around(cls, half_space: HalfSpace, radius) -> _Windows:
-        """Windows for spots of up to `radius` (n,) at the half-space's points; none where it is zero."""
+    def around(cls, half_space: HalfSpace, radius) -> NearPairs:
+        """Pairs for spots of up to `radius` (n,) at the half-space's points; none where it is zero."""
         ewald = half_space.ewald
         later, earlier, r = half_space.pairs
         window = np.where(radius > 0, np.maximum(_WINDOW * radius, ewald.floor), -1.0)
@@ -397,45 +84,45 @@ class Interaction:
     law : the law of one spot.
     half_space : with a point at every spot.
     radius_of_curvature : (n,) R of the spots, m.
-    windows : of exact displacement.
+    pairs : at which a spot acts with its exact displacement.
     """
 
     law: SpotLaw
     half_space: HalfSpace
     radius_of_curvature: np.ndarray
-    windows: _Windows
+    pairs: NearPairs
 
     @classmethod
     def between(cls, law: SpotLaw, half_space: HalfSpace, radius_of_curvature, largest_radius) -> Interaction:
-        """With windows for contact radii up to `largest_radius` (n,), m; none where it is zero."""
-        return cls(law, half_space, radius_of_curvature, _Windows.around(half_space, largest_radius))
+        """With pairs for contact radii up to `largest_radius` (n,), m; none where it is zero."""
+        return cls(law, half_space, radius_of_curvature, NearPairs.around(half_space, largest_radius))
 
     def displacement(self, a):
         """Displacement w at the spots, m, for contact radii a (n,), each without its own (but with its images')."""
-        law, R, windows = self.law, self.radius_of_curvature, self.windows
+        law, R, pairs = self.law, self.radius_of_curvature, self.pairs
         moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
-        j, r = windows.source, windows.r
+        j, r = pairs.source, pairs.r
         exact = law.displacement(r, a[j], R[j])
-        for moment, replaced in zip(moments, windows.replaced, strict=True):
+        for moment, replaced in zip(moments, pairs.replaced, strict=True):
             exact -= moment[j] * replaced
-        return self.half_space.displacement(*moments) + np.bincount(windows.target, exact, len(a))
+        return self.half_space.displacement(*moments) + np.bincount(pairs.target, exact, len(a))
 
     def tangent(self, a) -> Tangent:
         """The linear map from changes of the contact radii a (n,), m, to changes of `displacement`.
 
         Spots of zero radius have none: their change does not count.
         """
-        law, R, windows = self.law, self.radius_of_curvature, self.windows
+        law, R, pairs = self.law, self.radius_of_curvature, self.pairs
         there = a > 0
         safe = np.where(there, a, 1.0)
         moments = [
             np.where(there, derivative(safe, R), 0.0)
             for derivative in (law.force_derivative, law.second_moment_derivative, law.fourth_moment_derivative)
         ]
-        counts = np.flatnonzero(there[windows.source])
-        j, r, target = windows.source[counts], windows.r[counts], windows.target[counts]
+        counts = np.flatnonzero(there[pairs.source])
+        j, r, target = pairs.source[counts], pairs.r[counts], pairs.target[counts]
         exact = law.displacement_derivative(r, a[j], R[j])
-        fields = [moment[j] * replaced[counts] for moment, replaced in zip(moments, windows.replaced, strict=True)]
+        fields = [moment[j] * replaced[counts] for moment, replaced in zip(moments, pairs.replaced, strict=True)]
         nearly = exact - fields[0]
         near = nearly - fields[1] - fields[2]
         return Tangent(self.half_space, tuple(moments), target, j, near, nearly)
@@ -477,7 +164,7 @@ def displacement_at(
     w = np.zeros(len(points))
     if not len(points) or not len(a):
         return w
-    ewald = ewald or Ewald.of(period, law.material.contact_modulus, len(a), _NEIGHBOURS_ONCE, free)
+    ewald = ewald or Ewald.of(period, law.material.contact_modulus, len(a), NEIGHBOURS_ONCE, free)
     period = ewald.period
     points, position = np.mod(points, period), np.mod(position, period)
     moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
@@ -499,20 +186,3 @@ def displacement_at(
     if ewald.free:
         w -= ewald.by_images(ewald.bases(position), ewald.bases(points), moments[:2])
     return w
-
-
-def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
-    """Mean displacement of a square of a free half-space by point forces (n,) at (n, 2) in it, m.
-
-    By reciprocity it is that of the points under an even pressure on the square, whose four rectangles around a point
-    give x asinh(y/x) + y asinh(x/y) each.
-    """
-    x, y = ([along, side - along] for along in np.clip(position.T, 0.0, side))
-    potential = sum(_corner(one, other) for one in x for other in y)
-    return float(np.sum(force * potential)) / (np.pi * contact_modulus * side**2)
-
-
-def _corner(x, y):
-    """Integral of 1/r over a rectangle, r from one of its corners."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(x > 0, x * np.arcsinh(y / x), 0.0) + np.where(y > 0, y * np.arcsinh(x / y), 0.0)

@@ -50,7 +50,8 @@ from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
 from icha.equilibrium.distributions import contact_cover
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import ContactState
-from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
+from icha.half_space.ewald import HalfSpace
+from icha.half_space.interaction import Interaction, displacement_at
 from icha.path.follow import follow
 from icha.path.targets import Path
 from icha.references.boundary_elements import (

@@ -14,7 +14,8 @@ from icha.contact.failures import NotConverged
 from icha.contact.model import Control
 from icha.equilibrium.equilibrium import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
+from icha.half_space.ewald import HalfSpace
+from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.square import periodic_difference
 from icha.surfaces.summits import Asperities, find_summits
 

@@ -13,9 +13,10 @@ from icha.asperity.jkr import JKR
 from icha.contact.model import Control
 from icha.equilibrium.distributions import contact_cover, covered_nodes, displacement, gap, gap_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.half_space.free_square import _image_potential
+from icha.half_space.ewald import HalfSpace
+from icha.half_space.free_square import image_potential, mean_displacement
 from icha.half_space.grid_displacement import DisplacementField, displacement_field
-from icha.half_space.interaction import HalfSpace, Interaction, displacement_at, mean_displacement
+from icha.half_space.interaction import Interaction, displacement_at
 from icha.references.boundary_elements import boundary_elements
 from icha.references.error_sources import error_sources
 from icha.surfaces.summits import Asperities, find_summits
@@ -103,7 +104,7 @@ def test_field_is_the_plain_sum_at_the_nodes(energy, grid):
 
 
 def test_images_sum_to_the_madelung_constant():
-    assert _image_potential(np.zeros(1), np.zeros(1))[0] == pytest.approx(MADELUNG, abs=1e-13)
+    assert image_potential(np.zeros(1), np.zeros(1))[0] == pytest.approx(MADELUNG, abs=1e-13)
 
 
 # --- spots in equilibrium ------------------------------------------------------------------------------------

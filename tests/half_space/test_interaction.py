@@ -6,7 +6,8 @@ from half_space import periodic_displacement, periodic_point_load, spectral_disp
 
 from icha import Material
 from icha.asperity.jkr import JKR
-from icha.half_space.interaction import HalfSpace, Interaction, displacement_at
+from icha.half_space.ewald import HalfSpace
+from icha.half_space.interaction import Interaction, displacement_at
 
 MODULUS, RANGE = 2.0, 1e-3
 CENTRES = np.array([[0.2, 0.3], [0.6, 0.55], [0.9, 0.85]])
