@@ -19,6 +19,7 @@ from icha.contact.model import ContactModel
 from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.bins import bin_values
 from icha.datasets.build import build, described, joined, of, stacked
+from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.variables.run import CYCLE, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
 from icha.equilibrium.interacting_asperities import InteractingAsperities
@@ -40,7 +41,7 @@ _HIGHEST_SNAPSHOT = 20.0
 PULL_OFF = "pull_off"
 
 REFERENCES = (
-    "G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media with an advanced asperity model; "
+    f"{MODEL_PAPER.line}; "
     "L. Afferrante, G. Carbone and G. Demelio, Wear 278-279 (2012) 28-33, doi:10.1016/j.wear.2011.12.013; "
     "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303; "
     "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"

@@ -68,19 +68,19 @@ def reproduce(
 
     Exit status: 0 if all is identical or within tolerance, 1 if not, 2 if the deposit is damaged or there is none.
     """
-    from icha.publication.deposit import CHECKSUMS, verify_deposit
+    from icha.publication.deposit_files import CHECKSUMS, contents, read_file, verify_deposit
 
     if not deposit.exists():
         raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")
     if wrong := verify_deposit(deposit):
         raise Mistake(f"{deposit}: the deposit is damaged; needed: a whole one:\n" + "\n".join(wrong))
-    names, checksums = _names(deposit, CHECKSUMS)
+    names = contents(deposit)
     campaign, runs = _campaign(deposit, names), _asked_runs(only, deposit, names)
     temporary = folder is None
     if temporary:
         folder = Path(tempfile.mkdtemp(prefix="icha-reproduce-"))
     folder = folder.resolve()
-    _begin(folder, deposit, checksums)
+    _begin(folder, deposit, read_file(deposit, CHECKSUMS))
     goes_on = f"the same command with --folder {shown(folder)} goes on from here"
     try:
         with _stopped_by_signals():
@@ -98,7 +98,7 @@ def reproduce(
             shutil.rmtree(folder)
         raise
     if json:
-        from icha.publication.comparison import write_json
+        from icha.publication.rerun_comparison import write_json
 
         write_json(comparison, json)
     good = _tell(comparison, status)
@@ -134,32 +134,16 @@ def _stopped_by_signals():
 # What is asked.
 
 
-def _names(deposit: Path, checksums: str) -> tuple[dict[str, int], bytes]:
-    """Bytes of every file of the deposit by its path, and the list of their checksums."""
-    from icha.publication.deposit import contents
-
-    return contents(deposit), _read(deposit, checksums)
-
-
-def _read(deposit: Path, name: str) -> bytes:
-    if deposit.is_dir():
-        return (deposit / name).read_bytes()
-    with zipfile.ZipFile(deposit) as archive:
-        return archive.read(f"{_top(archive)}/{name}")
-
-
-def _top(archive: zipfile.ZipFile) -> str:
-    return archive.namelist()[0].split("/", 1)[0]
-
-
 def _campaign(deposit: Path, names) -> str:
     """The name of the campaign."""
     import yaml
 
+    from icha.publication.deposit_files import read_file
+
     for needed in (CONFIGURATION, "source/Snakefile", "source/Makefile", "source/uv.lock"):
         if needed not in names:
             raise Mistake(f"{deposit}: has no {needed}, so it cannot be computed again")
-    return yaml.safe_load(_read(deposit, CONFIGURATION))["name"]
+    return yaml.safe_load(read_file(deposit, CONFIGURATION))["name"]
 
 
 def _asked_runs(only: list[str] | None, deposit: Path, names: dict[str, int]) -> list[str]:
@@ -205,7 +189,9 @@ def _outcome(deposit: Path, run: str) -> tuple[int, str]:
     """Number of steps of a run, and why it is incomplete; an empty text if it is complete."""
     import netCDF4
 
-    with netCDF4.Dataset(run, memory=_read(deposit, run)) as file:
+    from icha.publication.deposit_files import read_file
+
+    with netCDF4.Dataset(run, memory=read_file(deposit, run)) as file:
         steps = file.dimensions.get("step")
         return (len(steps) if steps is not None else 0), str(getattr(file, "incomplete", ""))
 
@@ -353,7 +339,7 @@ def _call(command: list[str], **how) -> int:
 
 
 def _compared(original: Path, made: Path, runs: list[str], names):
-    from icha.publication.comparison import compare_folders
+    from icha.publication.rerun_comparison import compare_folders
 
     paths = None
     if runs:
@@ -363,7 +349,7 @@ def _compared(original: Path, made: Path, runs: list[str], names):
 
 def _tell(comparison, status: int) -> bool:
     """Print the comparison; return whether all is reproduced."""
-    from icha.publication.comparison import DIFFERENT, IDENTICAL, TOLERANCE, table
+    from icha.publication.rerun_comparison import DIFFERENT, IDENTICAL, TOLERANCE, table
 
     typer.echo(f"\nthe deposit, and what was computed again:\n\n{table(comparison)}\n")
     files = counted(len(comparison.files), "file")

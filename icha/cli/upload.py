@@ -6,10 +6,8 @@ import contextlib
 import json
 import os
 import re
-import shutil
 import sys
 import tempfile
-import zipfile
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +19,7 @@ from icha.support import in_words
 TOKEN = "ZENODO_TOKEN"
 # Beside the archive, where Zenodo shows them.
 _BESIDE = ("README.md", "ro-crate-metadata.json")
+_METADATA = ".zenodo.json"
 
 
 def upload(
@@ -106,7 +105,7 @@ def _token(address: str) -> str:
 
 def _archive(deposit: Path) -> Path:
     """The zip of a deposit, verified."""
-    from icha.publication.deposit import CHECKSUMS, verify_deposit
+    from icha.publication.deposit_files import CHECKSUMS, read_file, verify_deposit
 
     archive = deposit
     if deposit.is_dir():
@@ -116,32 +115,24 @@ def _archive(deposit: Path) -> Path:
     if not archive.is_file():
         raise Mistake(f"{deposit}: no such file or folder")
     wrong = verify_deposit(archive)
-    if not wrong and deposit.is_dir():
-        with zipfile.ZipFile(archive) as content:
-            if content.read(_member(content, CHECKSUMS)) != (deposit / CHECKSUMS).read_bytes():
-                wrong = ["its zip has other checksums than the folder has"]
+    if not wrong and deposit.is_dir() and read_file(archive, CHECKSUMS) != read_file(deposit, CHECKSUMS):
+        wrong = ["its zip has other checksums than the folder has"]
     if wrong:
         raise Mistake(f"{deposit}: the deposit is damaged, and nothing is sent:\n" + "\n".join(wrong))
     return archive
 
 
-def _member(content: zipfile.ZipFile, name: str) -> str:
-    """The name in the archive of a file at the top of the deposit."""
-    for member in content.namelist():
-        if member.split("/", 1)[1:] == [name]:
-            return member
-    raise Mistake(f"{content.filename}: has no {name}, as a deposit has")
-
-
 def _contents(archive: Path, folder: Path) -> tuple[list[Path], dict]:
     """The files that are sent, and the metadata for Zenodo."""
-    files = [archive]
-    with zipfile.ZipFile(archive) as content:
-        for name in _BESIDE:
-            with content.open(_member(content, name)) as source, (folder / name).open("wb") as target:
-                shutil.copyfileobj(source, target)
-            files.append(folder / name)
-        return files, json.loads(content.read(_member(content, ".zenodo.json")))
+    from icha.publication.deposit_files import contents, read_file
+
+    there = contents(archive)
+    for name in (*_BESIDE, _METADATA):
+        if name not in there:
+            raise Mistake(f"{archive}: has no {name}, as a deposit has")
+    for name in _BESIDE:
+        (folder / name).write_bytes(read_file(archive, name))
+    return [archive, *(folder / name for name in _BESIDE)], json.loads(read_file(archive, _METADATA))
 
 
 def _refuse_foreign_doi(metadata: dict, draft: str | None) -> None:

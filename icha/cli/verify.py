@@ -18,7 +18,7 @@ def verify(
 
     Exit status: 0 if it is whole, 1 if not (each flaw is printed), 2 if there is no such file or folder.
     """
-    from icha.publication.deposit import contents, verify_deposit
+    from icha.publication.deposit_files import contents, verify_deposit
 
     if not deposit.exists():
         raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from icha.configuration.publication import Publication
+from icha.configuration.publication import Funding, Publication
 
 
 def discovery_attributes(publication: Publication) -> dict[str, str]:
@@ -19,12 +19,14 @@ def discovery_attributes(publication: Publication) -> dict[str, str]:
         "creator_institution": [author.affiliation or "" for author in authors],
         "keywords": [", ".join(publication.keywords)],
         "product_version": [publication.version or ""],
-        "acknowledgement": [_acknowledged(each) for each in publication.funding],
+        "acknowledgement": [acknowledgement(each) for each in publication.funding],
         "metadata_link": [f"https://doi.org/{publication.doi}" if publication.doi else ""],
     }
     return {name: "; ".join(values) for name, values in found.items() if any(values)}
 
 
-def _acknowledged(funding) -> str:
-    award = f" (award {funding.award_number})" if funding.award_number else ""
-    return f"Funded by {funding.funder}{award}"
+def acknowledgement(funding: Funding) -> str:
+    """Who paid, in words."""
+    number = f"award {funding.award_number}" if funding.award_number else ""
+    award = ": ".join(filter(None, (number, funding.award_title)))
+    return f"Funded by {funding.funder}{f' ({award})' if award else ''}"

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from html import escape
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
 
 from icha.configuration.publication import Author, Funding, Publication
+from icha.datasets.model_paper import MODEL_PAPER
+from icha.publication.attributes import acknowledgement
 from icha.publication.licences import known_licence
 
 # Types of Zenodo for what is related, by DataCite's names (https://developers.zenodo.org, deposit metadata).
@@ -51,25 +53,6 @@ _ZENODO_FUNDERS = frozenset(
 )
 _ROR = "https://ror.org/"
 _ZENODO_DOI = "10.5281/zenodo."
-
-
-class Paper(NamedTuple):
-    """A paper without an identifier; the authors by given and family names."""
-
-    authors: tuple[tuple[str, str], ...]
-    title: str
-
-    @property
-    def line(self) -> str:
-        """The paper as it is cited in a text."""
-        return f"{' and '.join(f'{given[0]}. {family}' for given, family in self.authors)}, {self.title}"
-
-
-# That of the model: whoever uses data of the model builds on it.
-MODEL_PAPER = Paper(
-    (("Guido", "Violano"), ("Luciano", "Afferrante")),
-    "Modeling the adhesive contact of rough soft media with an advanced asperity model",
-)
 
 
 def web_address(identifier: str) -> str:
@@ -135,7 +118,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
     Funding stands among the grants where Zenodo knows the funder's, and always in the notes; there, too, are the
     runs that are published although a check fails.
     """
-    notes = [funding_line(funding) for funding in publication.funding]
+    notes = [f"{acknowledgement(funding)}." for funding in publication.funding]
     notes += [f"Published with a failed check: {each.run}. {each.reason}" for each in publication.known_failures]
     grants = [
         {"id": f"{funding.funder_id}::{funding.award_number}"}
@@ -284,12 +267,6 @@ def _datacite_funding(funding: Funding) -> dict[str, Any]:
             "awardUri": funding.award_url and web_address(funding.award_url),
         }
     )
-
-
-def funding_line(funding: Funding) -> str:
-    """Who paid, as a sentence."""
-    award = ", ".join(filter(None, (funding.award_number, funding.award_title)))
-    return f"Funded by {funding.funder}{f' ({award})' if award else ''}."
 
 
 def paragraphs(text: str) -> list[str]:

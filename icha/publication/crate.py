@@ -23,7 +23,8 @@ from rocrate.model import ContextEntity, Dataset, Entity, File
 from rocrate.rocrate import ROCrate
 
 from icha.configuration.publication import Author, Publication
-from icha.publication.citation import MODEL_PAPER, web_address
+from icha.datasets.model_paper import MODEL_PAPER
+from icha.publication.citation import web_address
 from icha.publication.licences import known_licence
 from icha.support.atomic_files import whole_file
 

@@ -9,12 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 import shutil
 import zipfile
-from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path, PurePosixPath
-from typing import BinaryIO
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import xarray as xr
 
@@ -25,6 +23,7 @@ from icha.datasets.files import read_campaign
 from icha.planning.costs import Cost
 from icha.publication.citation import citation_cff, datacite_metadata, zenodo_metadata
 from icha.publication.crate import METADATA, Job, write_crate
+from icha.publication.deposit_files import CHECKSUMS, files_of
 from icha.publication.dictionary import data_dictionary, dictionary_csv
 from icha.publication.licences import known_licence, licence_page
 from icha.publication.readme import readme
@@ -32,9 +31,7 @@ from icha.publication.source import Source
 from icha.support.atomic_files import whole_file
 from icha.support.checksums import is_whole
 
-CHECKSUMS = "SHA256SUMS"
 SOURCE = "source"
-_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _BLOCK = 2**20
 # The earliest time that a zip can hold.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
@@ -83,7 +80,7 @@ def make_deposit(
             _copy(results / file, part / file)
         source.export(part / SOURCE)
         _describe(part, files, publication, campaign, source.commit, cost)
-        checksums = {path: _sha256(part / path) for path in _files(part)}
+        checksums = {path: _sha256(part / path) for path in files_of(part)}
         write_crate(part, publication, jobs, campaign=campaign.name, commit=source.commit, checksums=checksums)
         (part / METADATA).chmod(0o644)
         checksums[METADATA] = _sha256(part / METADATA)
@@ -118,36 +115,6 @@ def _refuse_changed(results: Path, files: Iterable[str]) -> None:
         )
 
 
-def verify_deposit(path: str | os.PathLike) -> list[str]:
-    """What is wrong with a deposit, a line each: files that differ, are missing, or were added. Empty if it is whole.
-
-    A deposit is its files, as for git and in the list of checksums: folders without any are of no account.
-
-    Parameters
-    ----------
-    path : its folder or its zip.
-    """
-    path = Path(path)
-    if path.is_dir():
-        return _problems_of_folder(path)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return _problems_of_zip(archive)
-    except FileNotFoundError:
-        return [f"{path.name}: no such file or folder"]
-    except (zipfile.BadZipFile, ValueError, NotImplementedError, EOFError, OSError) as error:
-        return [f"{path.name}: no readable zip archive: {error}"]
-
-
-def contents(path: str | os.PathLike) -> dict[str, int]:
-    """Bytes of every file of a deposit that is whole, by its path in the deposit."""
-    path = Path(path)
-    if path.is_dir():
-        return {name: (path / name).stat().st_size for name in _files(path)}
-    with zipfile.ZipFile(path) as archive:
-        return {info.filename.split("/", 1)[1]: info.file_size for info in archive.infolist() if not info.is_dir()}
-
-
 def _describe(part: Path, files: Sequence[str], publication: Publication, campaign: Campaign, commit, cost) -> None:
     """Write all that says what the deposit is."""
     licence = known_licence(publication.license)
@@ -169,7 +136,7 @@ def _describe(part: Path, files: Sequence[str], publication: Publication, campai
             checks=read_checks(part / "checks.json"),
             model_error=read_campaign(error) if error.is_file() else None,
             dictionary=dictionary,
-            sizes={path: (part / path).stat().st_size for path in _files(part)},
+            sizes={path: (part / path).stat().st_size for path in files_of(part)},
             cost=cost,
         )
     _write(part / "README.md", page)
@@ -200,11 +167,6 @@ def _remove(folder: Path) -> None:
         shutil.rmtree(old)
 
 
-def _files(folder: Path) -> list[str]:
-    """Paths of all files below a folder, sorted."""
-    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir())
-
-
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
@@ -213,7 +175,7 @@ def _sha256(path: Path) -> str:
 def _write_zip(path: Path, folder: Path, name: str) -> None:
     """Write all files of a folder to a zip, in a folder of the given name. They are stored: nothing depends on zlib."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-        for file in _files(folder):
+        for file in files_of(folder):
             status = (folder / file).stat()
             entry = zipfile.ZipInfo(f"{name}/{file}", date_time=_NO_TIME)
             entry.create_system = 3  # Unix, of which the mode is
@@ -221,76 +183,3 @@ def _write_zip(path: Path, folder: Path, name: str) -> None:
             entry.file_size = status.st_size
             with (folder / file).open("rb") as content, archive.open(entry, "w") as stored:
                 shutil.copyfileobj(content, stored, _BLOCK)
-
-
-def _problems_of_folder(folder: Path) -> list[str]:
-    links = [name for name in _files(folder) if (folder / name).is_symlink() or not (folder / name).is_file()]
-    if not (folder / CHECKSUMS).is_file():
-        return [f"{CHECKSUMS}: is missing, so this is no whole deposit"]
-    there = {name: folder / name for name in _files(folder) if name not in links}
-    return [
-        *(f"{name}: is no file of its own" for name in links),
-        *_problems(there, lambda name: there[name].open("rb"), set(links)),
-    ]
-
-
-def _problems_of_zip(archive: zipfile.ZipFile) -> list[str]:
-    names = [info.filename for info in archive.infolist() if not info.is_dir()]
-    tops = {name.split("/", 1)[0] for name in names}
-    if len(tops) != 1 or any("/" not in name for name in names):
-        return [f"holds {', '.join(sorted(tops)) or 'nothing'}; allowed: a single folder, the deposit"]
-    twice = sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else []
-    (top,) = tops
-    there = {name.removeprefix(f"{top}/"): name for name in names}
-    if CHECKSUMS not in there:
-        return [f"{CHECKSUMS}: is missing, so this is no whole deposit"]
-    return [
-        *(f"{name}: is there more than once" for name in twice),
-        *_problems(there, lambda name: archive.open(there[name])),
-    ]
-
-
-def _problems(there: Iterable[str], opened, others: Iterable[str] = ()) -> Iterator[str]:
-    """What is wrong with files, of which `opened` gives the content, by the list of checksums among them."""
-    try:
-        with opened(CHECKSUMS) as file:
-            lines = file.read().decode("utf-8").splitlines()
-    except Exception as error:  # whatever a damaged archive may lead to
-        yield f"{CHECKSUMS}: cannot be read: {error}"
-        return
-    expected: dict[str, str] = {}
-    for number, line in enumerate(lines, 1):
-        found = _LINE.fullmatch(line)
-        if found is None or not _is_inside(found[2]):
-            yield f"{CHECKSUMS}, line {number}: {line[:80]!r} is no checksum of a file in this folder"
-        elif found[2] in expected:
-            yield f"{CHECKSUMS}, line {number}: {found[2]} is named twice"
-        else:
-            expected[found[2]] = found[1]
-    for name, digest in expected.items():
-        if name not in there:
-            if name not in others:
-                yield f"{name}: is missing"
-            continue
-        try:
-            with opened(name) as file:
-                same = _digest(file) == digest
-        except Exception as error:
-            yield f"{name}: cannot be read: {error}"
-        else:
-            if not same:
-                yield f"{name}: is not what it was: its checksum is another one"
-    for name in sorted(set(there) - set(expected) - {CHECKSUMS}):
-        yield f"{name}: was added: it is not in {CHECKSUMS}"
-
-
-def _is_inside(name: str) -> bool:
-    path = PurePosixPath(name)
-    return not path.is_absolute() and ".." not in path.parts and str(path) == name
-
-
-def _digest(file: BinaryIO) -> str:
-    digest = hashlib.sha256()
-    while block := file.read(_BLOCK):
-        digest.update(block)
-    return digest.hexdigest()

@@ -20,8 +20,10 @@ from icha.configuration.surfaces import SelfAffineSurface
 from icha.datasets.campaign_file import LABELS
 from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.datasets.labels import RunLabels
+from icha.datasets.model_paper import MODEL_PAPER
 from icha.planning.costs import Cost
-from icha.publication.citation import MODEL_PAPER, paragraphs, web_address
+from icha.publication.attributes import acknowledgement
+from icha.publication.citation import paragraphs, web_address
 from icha.publication.dictionary import Entry
 from icha.publication.licences import Licence
 from icha.support import in_words
@@ -138,6 +140,7 @@ def readme(
     )
     environment.filters |= {
         "text": markdown,
+        "acknowledgement": acknowledgement,
         "link": _link,
         "number": "{:.4g}".format,
         "value": "{:z.2g}".format,

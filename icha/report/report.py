@@ -28,6 +28,7 @@ from icha.analysis.common_loads import at_round_pressures
 from icha.analysis.model_error import SUMMARISED
 from icha.datasets.campaign import LABELS, RAGGED, RunLabels, loading_stops, select_run
 from icha.datasets.files import COMPLETE, INCOMPLETE, MISSING
+from icha.datasets.model_paper import MODEL_PAPER
 from icha.figures.scale import Scale
 from icha.figures.style import COLOURS, quantity, unit_for
 from icha.report.inline_svg import Curve, Node, flow_graph, logarithmic_chart
@@ -35,9 +36,6 @@ from icha.support import in_words
 from icha.support.atomic_files import whole_file
 from icha.support.statistics import ensemble
 
-PAPER = (
-    "G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media with an advanced asperity model"
-)
 SOFTWARE = ("icha", "numpy", "scipy", "finufft", "tamaas", "xarray", "netCDF4", "matplotlib", "snakemake")
 
 
@@ -150,7 +148,7 @@ def write_report(
         results=link(results) if results is not None else None,
         most_rows=MOST_ROWS,
         folded=_FOLDED,
-        paper=PAPER,
+        paper=MODEL_PAPER.line,
         citations=citations,
         references=_references(campaign, model_error),
         software={name: _version(name) for name in SOFTWARE},

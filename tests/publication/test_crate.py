@@ -14,7 +14,7 @@ from outside_validators import validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import Author
-from icha.publication.citation import MODEL_PAPER
+from icha.datasets.model_paper import MODEL_PAPER
 from icha.publication.crate import METADATA, Job, write_crate
 
 SCRIPTS = "source/workflow/scripts"
@@ -242,6 +242,7 @@ def test_jobs_that_make_no_sense_are_refused(deposit):
             write_crate(deposit, ALL, jobs, campaign="mine", commit=COMMIT, checksums=checksums_of(deposit))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLICATIONS)
 def test_it_is_a_provenance_run_crate_and_can_be_read(name, deposit, tmp_path):
     folder = deposit if name == "all" else written(tmp_path, PUBLICATIONS[name])
@@ -251,6 +252,7 @@ def test_it_is_a_provenance_run_crate_and_can_be_read(name, deposit, tmp_path):
     assert f"runcrate: passed; {len(JOBS) + 1} actions" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_crate_that_lacks_something_is_refused(deposit, tmp_path):
     folder = shutil.copytree(deposit, tmp_path / "deposit")
     content = json.loads((folder / METADATA).read_bytes())

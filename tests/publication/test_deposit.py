@@ -45,7 +45,8 @@ from icha.planning.plan import whole_cost
 from icha.publication import deposit as deposits
 from icha.publication import dictionary
 from icha.publication.attributes import discovery_attributes
-from icha.publication.deposit import contents, make_deposit, verify_deposit
+from icha.publication.deposit import make_deposit
+from icha.publication.deposit_files import contents, verify_deposit
 from icha.publication.dictionary import data_dictionary, kind_of
 from icha.publication.environment import differences, refuse_other_environment
 from icha.publication.licences import known_licence, licence_page
@@ -694,6 +695,7 @@ def test_whole_deposits_are_said_to_be_whole(published):
     assert nothing.exit_code == 2 and "nothing.zip: no such file or folder" in nothing.output
 
 
+@pytest.mark.slow
 def test_computed_again_it_has_the_same_bytes(published, tmp_path):
     """By its own source, elsewhere, without the repository: every file of the results."""
     archive = published.with_name(f"{published.name}.zip")

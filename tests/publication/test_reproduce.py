@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from icha.cli import app
-from icha.publication.deposit import verify_deposit
+from icha.publication.deposit_files import verify_deposit
 
 NAME = "mine-1.0.0"
 SOFT, HARD = "load/rough/seed1/slope1/soft", "load/rough/seed2/slope1/hard"
@@ -273,6 +273,7 @@ def test_the_environment_that_is_here_has_to_agree_with_the_lock_file(deposit, r
     assert list(reproduce.temporary.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_was_stopped_goes_on(made, reproduce, tmp_path):
     folder = tmp_path / "again"
     # What was left by one that was killed while it copied is no part of it.

@@ -406,6 +406,7 @@ def test_a_server_that_is_not_there(server, deposit):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the system does not tell how much memory was taken")
+@pytest.mark.slow
 def test_a_file_is_not_read_into_memory(server, tmp_path):
     """What is sent is read in pieces: a file of 200 MB that takes no room on the disk, and not in memory either."""
     large = tmp_path / "large.bin"

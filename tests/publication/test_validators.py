@@ -8,6 +8,8 @@ import netCDF4
 import pytest
 from outside_validators import validated
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("sha256sum", "compliance-checker", "cf-units")
 
 

@@ -7,7 +7,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from icha.publication.comparison import (
+from icha.publication.rerun_comparison import (
     DIFFERENT,
     EXTRA,
     FLOOR,
