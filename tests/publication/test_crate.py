@@ -221,10 +221,10 @@ def test_the_paper_of_the_model_is_cited_beside_what_the_publication_names(entit
 
 def test_the_same_deposit_has_the_same_bytes(deposit, tmp_path):
     code = (
-        "import sys; sys.path.insert(0, sys.argv[1]); from pathlib import Path; from test_crate import *; "
-        "written(Path(sys.argv[2]), ALL, reversed(JOBS))"
+        "import sys; sys.path[:0] = sys.argv[2:]; from pathlib import Path; from test_crate import *; "
+        "written(Path(sys.argv[1]), ALL, reversed(JOBS))"
     )
-    command = [sys.executable, "-c", code, str(Path(__file__).parent), str(tmp_path)]
+    command = [sys.executable, "-c", code, tmp_path, Path(__file__).parent, Path(__file__).parents[1]]
     subprocess.run(command, check=True, env={"PYTHONHASHSEED": "7", "LC_ALL": "C"})
     assert (tmp_path / METADATA).read_bytes() == (deposit / METADATA).read_bytes()
 
