@@ -1,0 +1,66 @@
+"""The page on the layout is true, and folders import in its order only."""
+
+import importlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from conftest import REPOSITORY
+
+PAGE = (REPOSITORY / "docs/layout.md").read_text(encoding="utf-8")
+CONTRACTS = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+    "contracts"
+]
+LAYERS = [{name.strip() for name in layer.split("|")} for layer in CONTRACTS[0]["layers"]]
+
+
+def test_every_folder_has_its_line_in_the_order_of_the_imports():
+    table = re.findall(r"^\| `(icha/\w+(?:\.py)?)` \|", PAGE, re.MULTILINE)
+    named = [name.removesuffix(".py").replace("/", ".") for name in table]
+    folders = {f"icha.{path.parent.name}" for path in REPOSITORY.glob("icha/*/__init__.py")}
+    alone = {f"icha.{path.stem}" for path in REPOSITORY.glob("icha/*.py")} - {"icha.__init__"}
+    assert set(named) == folders | alone == set.union(*LAYERS) and len(named) == len(set(named))
+    level = [next(n for n, layer in enumerate(reversed(LAYERS)) if name in layer) for name in named]
+    assert level == sorted(level)
+
+
+def test_all_that_is_named_is_there():
+    code = re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", PAGE, flags=re.DOTALL | re.MULTILINE))
+    files = {each for each in code if "<" not in each and re.fullmatch(r"[.\w]+(/[\w.]+)+|\w+\.toml", each)}
+    assert len(files) > 30
+    assert not [file for file in files if not (REPOSITORY / file).exists()]
+    for name in (each for each in code if each.startswith("icha.")):
+        module, _, last = name.rpartition(".")
+        try:
+            importlib.import_module(name)
+        except ModuleNotFoundError:
+            assert hasattr(importlib.import_module(module), last), name
+
+
+@pytest.mark.parametrize(
+    ("module", "line", "broken"),
+    [
+        ("path/targets.py", "import icha.simulation", "Data flows one way"),
+        ("simulation.py", "import snakemake", "The physics knows nothing of the workflow"),
+    ],
+)
+def test_an_arrow_turned_round_is_refused(module, line, broken, tmp_path):
+    shutil.copytree(REPOSITORY / "icha", tmp_path / "icha", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copyfile(REPOSITORY / "pyproject.toml", tmp_path / "pyproject.toml")
+    with (tmp_path / "icha" / module).open("a", encoding="utf-8") as file:
+        file.write(f"\n\ndef turned_round():\n    {line}\n")
+    done = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 1
+    assert re.search(rf"{broken}.* BROKEN", done.stdout), done.stdout
+    assert done.stdout.count("BROKEN") == 1
