@@ -29,7 +29,7 @@ from icha.path.hysteresis import hysteresis
 from icha.path.limits import MAX_REDUCED_PRESSURE
 from icha.path.targets import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
 from icha.path.waypoints import Waypoint
-from icha.support.validation import integer
+from icha.support.rules import Integer
 from icha.surfaces.moments import spectral_moments
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
@@ -94,7 +94,7 @@ def simulate(
         If an equilibrium is not found or a target cannot be reached; its `dataset` holds the stops before.
     """
     _check_arguments(surface, material, path)
-    seed = integer("seed", seed, -1)
+    seed = Integer(-1).checked("seed", seed)
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
         contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, path.united_until)

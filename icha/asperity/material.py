@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.support.validation import not_negative, positive
+from icha.support.rules import CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class Material:
 
     def __post_init__(self):
         """Check the values."""
-        object.__setattr__(self, "contact_modulus", positive("contact_modulus", self.contact_modulus, "Pa"))
-        object.__setattr__(self, "surface_energy", not_negative("surface_energy", self.surface_energy, "J/m^2"))
-        object.__setattr__(self, "interaction_range", positive("interaction_range", self.interaction_range, "m"))
+        object.__setattr__(self, "contact_modulus", CONTACT_MODULUS.checked("contact_modulus", self.contact_modulus))
+        object.__setattr__(self, "surface_energy", SURFACE_ENERGY.checked("surface_energy", self.surface_energy))
+        object.__setattr__(self, "interaction_range", LENGTH.checked("interaction_range", self.interaction_range))
 
     @property
     def adhesion_length(self) -> float:

@@ -13,9 +13,9 @@ from pydantic import (
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
-from icha.configuration.values import MAX_GRID
-from icha.path.limits import MAX_STEP
+from icha.path.limits import STEP
 from icha.path.states import ReducedPressure
+from icha.support.rules import GRID, REFINEMENT, TOLERANCE, Real
 from icha.support.values import (
     Label,
     Name,
@@ -49,9 +49,7 @@ class BesideStudy(Section):
         description="Materials, of the study's. Left out: all. With adhesion the grid must resolve their "
         "`interaction_range`.",
     )
-    tolerance: number("a number in [1e-12, 1e-4]", least=1e-12, most=1e-4) = Field(
-        default=1e-8, description="Relative error at which the solver may stop."
-    )
+    tolerance: number(TOLERANCE) = Field(default=1e-8, description="Relative error at which the solver may stop.")
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """What of the study is not there, or cannot be solved; of an `icha.configuration.campaign.Campaign`."""
@@ -78,8 +76,8 @@ class BesideStudy(Section):
                 continue
             yield from self._unresolved(campaign, name)
             nodes = campaign.grid(name) * self.refinement
-            if nodes > MAX_GRID:
-                reason = f"gives {nodes} nodes a side on {name!r}; allowed: {MAX_GRID} at most"
+            if nodes > GRID.most:
+                reason = f"gives {nodes} nodes a side on {name!r}; allowed: {GRID.most} at most"
                 yield ("refinement",), self.refinement, reason
 
     def _unresolved(self, campaign, surface):
@@ -98,7 +96,7 @@ Loads = Annotated[
     ),
 ]
 Refinement = Annotated[
-    integer(1, 16),
+    integer(REFINEMENT),
     Field(description="Cells per cell of the surface's own grid, along a side; heights are interpolated."),
 ]
 
@@ -119,7 +117,7 @@ class BoundaryElementLoops(BesideStudy):
     """Boundary elements from separation to the largest load of a study's runs and back."""
 
     refinement: Refinement = 1
-    separation_step: number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
+    separation_step: number(STEP) = Field(
         default=0.05, description="Change of the mean gap from one solution to the next, in units of h_rms."
     )
 
@@ -143,7 +141,7 @@ class ErrorSources(BesideStudy):
     """Variants between the model and boundary elements, each of which changes one thing."""
 
     reduced_pressures: Loads
-    refinement: integer(1, 16) = Field(
+    refinement: integer(REFINEMENT) = Field(
         default=2, description="Cells per cell of the surface's own grid, along a side: even, since half is tried too."
     )
 
@@ -164,7 +162,7 @@ class OneAsperity(Section):
     """One asperity by the model and by boundary elements, where the answer is known."""
 
     tabor_parameters: Annotated[
-        list[number("a number in [1.5, 6]", least=1.5, most=6)], Field(min_length=1), AfterValidator(increasing)
+        list[number(Real(least=1.5, most=6))], Field(min_length=1), AfterValidator(increasing)
     ] = Field(
         description="Tabor parameters, increasing; boundary elements take a grid that grows with their square, 800 "
         "nodes a side and some minutes at 4. Hertz's contact is always computed."

@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from icha.configuration.values import MAX_GRID
 from icha.support import in_words
+from icha.support.rules import GRID, Real
 from icha.support.units import PATTERN, conversion_factor, to_si
 from icha.support.values import File, Length, Section, Text, integer, number, quantity
 
@@ -31,7 +31,7 @@ def _unit_of_length(value: Any) -> float:
 UnitOfLength = Annotated[
     float, BeforeValidator(_unit_of_length), WithJsonSchema({"type": "string", "examples": ["um", "0.1 mm"]})
 ]
-Position = quantity("m", "20 um", minimum=0)
+Position = quantity(Real("m", least=0), "20 um")
 
 
 def _sides(value: Any) -> tuple[float, float]:
@@ -136,11 +136,11 @@ class MeasuredSurface(Section):
         "fall smoothly to their mean towards the edges, and it is repeated; `mirror`, it and its mirror images make a "
         "periodic cell of twice the side; `free`, nothing: one square on a half-space that goes on beyond it."
     )
-    taper: number("a number in (0, 0.5]", above=0, most=0.5) | None = Field(
+    taper: number(Real(above=0, most=0.5)) | None = Field(
         default=None,
         description="With `window`: the part of the side on which heights fall, at either edge. Left out: 0.1.",
     )
-    grid: integer(8, MAX_GRID) | None = Field(
+    grid: integer(GRID) | None = Field(
         default=None,
         description="Nodes along a side of the prepared surface, to which it is resampled by Fourier interpolation; a "
         "coarser one loses the shorter waves. Left out: those of the scan (`mirror`: twice).",

@@ -16,22 +16,23 @@ from pydantic import (
 from icha.configuration.materials import MaterialSection
 from icha.configuration.surfaces import SURFACE_KINDS
 from icha.configuration.values import Slope, Slopes, Values
-from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
+from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
 from icha.path.targets import Path
+from icha.support.rules import NUMBER, Real
 from icha.support.values import (
     Flag,
     Length,
     Name,
     Problem,
     Section,
+    Seed,
     Seeds,
     Text,
     decreasing,
     distinct,
     exactly_one,
     increasing,
-    integer,
     list_of_names,
     number,
     stops,
@@ -63,10 +64,10 @@ class Targets(Section):
 class TurningPoint(Section):
     """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
 
-    reduced_pressure: (
-        number(f"a number of at most {MAX_REDUCED_PRESSURE}, which the model covers", most=MAX_REDUCED_PRESSURE) | None
-    ) = Field(default=None, description="At this p/(E* h'rms).")
-    relative_load: number("a number") | None = Field(default=None, description="At this p/E* = F/(E* A0).")
+    reduced_pressure: number(Real(most=MAX_REDUCED_PRESSURE, model_ends=True)) | None = Field(
+        default=None, description="At this p/(E* h'rms)."
+    )
+    relative_load: number(NUMBER) | None = Field(default=None, description="At this p/E* = F/(E* A0).")
     area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
     mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
 
@@ -110,7 +111,7 @@ Case = _of_scalars(
     "One entry of an explicit list of runs; what it does not name is taken from the lists of its study.",
     {
         "surface": (Name | None, Field(default=None, description="Name of a surface.")),
-        "seed": (integer(0) | None, Field(default=None, description="Seed.")),
+        "seed": (Seed | None, Field(default=None, description="Seed.")),
         "rms_slope": (Slope | None, Field(default=None, description="Rms slope, or `measured`.")),
         "material": (Name | None, Field(default=None, description="Name of a material.")),
     },
@@ -169,7 +170,7 @@ class Study(Section):
         description="Until when coalesced spots stay one on the way back: until they detach as a whole and fall back "
         "into their asperities, or until the two spots that they were made of would no longer overlap.",
     )
-    max_step: number(f"a number in (0, {MAX_STEP}]", above=0, most=MAX_STEP) = Field(
+    max_step: number(STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
     )
 

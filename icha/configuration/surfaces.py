@@ -11,7 +11,7 @@ from pydantic import (
 )
 
 from icha.configuration.measured_surfaces import MeasuredSurface
-from icha.configuration.values import MAX_GRID
+from icha.support.rules import GRID, HURST
 from icha.support.units import conversion_factor
 from icha.support.values import (
     ROUNDING,
@@ -37,8 +37,8 @@ class SelfAffineSurface(Section):
         description="Short cut-off 2π/q1: there are no shorter waves. Less than the roll-off wavelength; at least 2 "
         "grid cells (an error below), better 4 (a warning below) or 8."
     )
-    hurst: number("a number in (0, 1]", above=0, most=1) = Field(description="Hurst exponent H, in (0, 1].")
-    grid: integer(8, MAX_GRID) = Field(description="Grid points along a side.")
+    hurst: number(HURST) = Field(description="Hurst exponent H, in (0, 1].")
+    grid: integer(GRID) = Field(description="Grid points along a side.")
     amplitudes: Literal["fixed", "gaussian"] = Field(
         default="fixed",
         description="Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and "

@@ -9,8 +9,6 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from icha.support.units import to_number
 from icha.support.values import distinct
 
-# Nodes along a side of a surface or of boundary elements.
-MAX_GRID = 32768
 # The slope of a topography as it was measured.
 MEASURED = "measured"
 

@@ -11,7 +11,7 @@ from icha.contact.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
 from icha.equilibrium.states import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, displacement_field, row_blocks, windows
 from icha.support.parallel import on_cores
-from icha.support.validation import integer
+from icha.support.rules import Integer
 from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
 
@@ -174,7 +174,7 @@ def pressure_distribution(law: SpotLaw, surface: Surface, spots: Spots) -> Press
 
 
 def _coarse_grid(surface, every):
-    if surface.grid % integer("every", every, 1):
+    if surface.grid % Integer(1).checked("every", every):
         raise ValueError(f"every: {every} does not divide the {surface.grid} nodes along a side")
     return surface.grid // every
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from icha.datasets.labels import RunLabels
 from icha.figures.declaration import Campaign, FigureOptions
 from icha.path.states import Snapshot
-from icha.support.values import Flag, Label, Name, Positive, Problem, integer, list_of_names, unknown
+from icha.support.values import Flag, Label, Name, Positive, Problem, Seed, list_of_names, unknown
 
 
 class StudyFigure(FigureOptions):
@@ -72,7 +72,7 @@ class RunFigure(StudyFigure):
     """A figure of one run; what is left out is the study's first."""
 
     surface: Label | None = Field(default=None, description="Surface that is shown.")
-    seed: integer(0) | None = Field(default=None, description="Seed that is shown.")
+    seed: Seed | None = Field(default=None, description="Seed that is shown.")
     rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
     material: Label | None = Field(
         default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
@@ -137,7 +137,7 @@ class SlopesFigure(StudyFigure):
     """A figure of the spots of all slopes, at the same load and at the same area."""
 
     surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
     material: Label | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
@@ -164,7 +164,7 @@ class LoopsFigure(StudyFigure):
     """A figure of the runs of a study both ways, for one topography."""
 
     surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: integer(0) | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """A study that does not come back is one more."""

@@ -1,4 +1,8 @@
-"""How far the model reaches."""
+"""How far the model reaches: rules for the states and the steps of a path."""
+
+from __future__ import annotations
+
+from icha.support.rules import LENGTH, POSITIVE, Real
 
 # Beyond these the spots have lost their identity: soon after, the computed mean planes of a surface without
 # adhesion meet.
@@ -7,3 +11,12 @@ MAX_AREA_FRACTION = 0.25
 # Longest step of the mean separation, in h_rms, that may be asked for, and the one taken if none is.
 MAX_STEP = 0.5
 DEFAULT_STEP = 0.15
+
+# By the kind of quantity.
+STATES = {
+    "reduced_pressure": Real(above=0, most=MAX_REDUCED_PRESSURE, model_ends=True),
+    "relative_load": POSITIVE,
+    "area_fraction": Real(above=0, most=MAX_AREA_FRACTION, model_ends=True),
+    "mean_separation": LENGTH,
+}
+STEP = Real("h_rms", above=0, most=MAX_STEP)

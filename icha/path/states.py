@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pydantic import Field, model_validator
 
-from icha.path.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
+from icha.path.limits import STATES
 from icha.support.values import Length, Positive, Section, exactly_one, number
 
-ReducedPressure = number(
-    f"a number in (0, {MAX_REDUCED_PRESSURE}], which the model covers", above=0, most=MAX_REDUCED_PRESSURE
-)
-AreaFraction = number(f"a number in (0, {MAX_AREA_FRACTION}], which the model covers", above=0, most=MAX_AREA_FRACTION)
+ReducedPressure = number(STATES["reduced_pressure"])
+AreaFraction = number(STATES["area_fraction"])
 
 
 class Snapshot(Section):

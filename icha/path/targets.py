@@ -6,8 +6,8 @@ import itertools
 from dataclasses import dataclass
 
 from icha.contact.unions import DETACHMENT, UNITED_UNTIL
-from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, MAX_STEP
-from icha.support.validation import number, positive
+from icha.path.limits import DEFAULT_STEP, STATES, STEP
+from icha.support.rules import NUMBER
 
 REDUCED_PRESSURE = "reduced_pressure"
 RELATIVE_LOAD = "relative_load"
@@ -97,9 +97,7 @@ class Path:
             raise ValueError(f"control: {control!r} must be one of {', '.join(CONTROLS)}")
         if united_until not in UNITED_UNTIL:
             raise ValueError(f"united_until: {united_until!r} must be one of {', '.join(UNITED_UNTIL)}")
-        max_step = positive("max_step", max_step, "h_rms")
-        if max_step > MAX_STEP:
-            raise ValueError(f"max_step: {max_step!r} must not exceed {MAX_STEP} (in h_rms)")
+        max_step = STEP.checked("max_step", max_step)
         values = _stops(LISTS[kind], kind, values)
         wanted = _wanted([(kind, values[-1])] if snapshots is None else snapshots)
         targets = [Target(kind, value, (kind, value) in wanted) for value in values]
@@ -136,7 +134,7 @@ def _wanted(snapshots):
     """Kinds and values of the snapshots."""
     wanted = []
     for label, kind, value in _pairs("snapshots", snapshots):
-        value = _covered(label, kind, value)
+        value = STATES[kind].checked(label, value)
         if (kind, value) in wanted:
             raise ValueError(f"{label}: {kind} {value!r} is given twice")
         wanted.append((kind, value))
@@ -178,7 +176,7 @@ def _turns(turning_points, last):
     turns, before = [], last
     for k, (label, kind, value) in enumerate(_pairs("turning_points", turning_points)):
         tensile = kind in LOADS and k % 2 == 0
-        value = number(label, value, "1") if tensile else _covered(label, kind, value)
+        value = (NUMBER if tensile else STATES[kind]).checked(label, value)
         if kind == before.kind:
             opened = value > before.value if kind == MEAN_SEPARATION else value < before.value
             if value == before.value or opened != (k % 2 == 0):
@@ -192,14 +190,6 @@ def _turns(turning_points, last):
     return tuple(turns)
 
 
-def _covered(name, kind, value):
-    value = positive(name, value, "m" if kind == MEAN_SEPARATION else "1")
-    limit = {REDUCED_PRESSURE: MAX_REDUCED_PRESSURE, AREA_FRACTION: MAX_AREA_FRACTION}.get(kind)
-    if limit is not None and value > limit:
-        raise ValueError(f"{name}: {value!r} lies beyond what the model covers (at most {limit})")
-    return value
-
-
 def _stops(name, kind, values):
     try:
         values = list(values)
@@ -207,7 +197,7 @@ def _stops(name, kind, values):
         raise ValueError(f"{name}: {values!r} is not a list of numbers") from None
     if not values:
         raise ValueError(f"{name}: the list is empty")
-    values = [_covered(f"{name}[{i}]", kind, v) for i, v in enumerate(values)]
+    values = [STATES[kind].checked(f"{name}[{i}]", v) for i, v in enumerate(values)]
     for i, (one, next_one) in enumerate(itertools.pairwise(values)):
         if not (next_one < one if kind == MEAN_SEPARATION else next_one > one):
             order = "decreasing" if kind == MEAN_SEPARATION else "increasing"

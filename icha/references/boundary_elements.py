@@ -34,7 +34,7 @@ from icha.datasets.bins import bin_values
 from icha.datasets.build import build, of
 from icha.datasets.variables.boundary_elements import SOLUTION
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
-from icha.support.validation import integer, positive
+from icha.support.rules import LENGTH, POSITIVE, REFINEMENT, TOLERANCE
 from icha.surfaces.surface import Surface
 
 # What is minimised is known to this relative error.
@@ -161,10 +161,10 @@ def contact_state(
     progress: Callable[[str], None] | None = None,
 ) -> NodalState:
     """The state of which `boundary_elements` makes a dataset, node by node; arguments and errors are the same."""
-    target = positive("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
+    target = POSITIVE.checked("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
     say = progress or _silent
     fine = resolved(surface, material, refinement, say)
-    state = _without_adhesion(fine, material, target, positive("tolerance", tolerance))
+    state = _without_adhesion(fine, material, target, TOLERANCE.checked("tolerance", tolerance))
     if material.surface_energy == 0:
         return state
     return _carrying(GapContact(fine, material, tolerance, state.gap), target, state.mean_separation, say)
@@ -196,8 +196,8 @@ def states_at_mean_separations(
     if material.surface_energy == 0:
         raise ValueError("surface_energy: 0; without adhesion the load is given, not the mean gap")
     fine = resolved(surface, material, refinement, progress or _silent)
-    separations = [positive("mean_separations", separation, "m") for separation in mean_separations]
-    contact = GapContact(fine, material, positive("tolerance", tolerance))
+    separations = [LENGTH.checked("mean_separations", separation) for separation in mean_separations]
+    contact = GapContact(fine, material, TOLERANCE.checked("tolerance", tolerance))
     return (contact.at(separation) for separation in separations)
 
 
@@ -208,7 +208,7 @@ def _silent(line):
 def resolved(surface, material, refinement, say):
     """The surface on the solution's grid, which has to resolve the attraction."""
     surface.require_periodic("the solution by boundary elements")
-    fine = surface.refined(integer("refinement", refinement, 1))
+    fine = surface.refined(REFINEMENT.checked("refinement", refinement))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
     if material.surface_energy > 0:
         numbers += (

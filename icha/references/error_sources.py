@@ -62,7 +62,7 @@ from icha.references.boundary_elements import (
     contact_state,
     perimeter_correction,
 )
-from icha.support.validation import integer
+from icha.support.rules import REFINEMENT, Integer
 from icha.surfaces.square import periodic_difference
 from icha.surfaces.summits import Asperities, find_summits
 from icha.surfaces.surface import Surface
@@ -188,7 +188,7 @@ def error_sources(
     surface.require_periodic("the comparison with boundary elements")
     path = Path(reduced_pressures=reduced_pressures)
     pressures = [target.value for target in path.targets]
-    if integer("refinement", refinement, 2) % 2:
+    if Integer(2, REFINEMENT.most).checked("refinement", refinement) % 2:
         raise ValueError(f"refinement: {refinement!r} must be even")
     say = progress or (lambda line: None)
     law = JKR(material)

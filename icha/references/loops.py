@@ -30,7 +30,7 @@ from icha.references.boundary_elements import (
     perimeter_correction,
     resolved,
 )
-from icha.support.validation import positive
+from icha.support.rules import POSITIVE, TOLERANCE
 from icha.surfaces.surface import Surface
 
 # Surfaces are apart where every gap exceeds this many ranges: nowhere more than 0.7 % of the interface's strength acts.
@@ -83,11 +83,11 @@ def boundary_element_loop(
     NotSolved
         If the solver does not reach its tolerance, or the load is not reached: it says how far the loop has come.
     """
-    target = positive("largest_reduced_pressure", largest_reduced_pressure)
-    step = positive("separation_step", separation_step) * surface.rms_height
+    target = POSITIVE.checked("largest_reduced_pressure", largest_reduced_pressure)
+    step = POSITIVE.checked("separation_step", separation_step) * surface.rms_height
     say = progress or _silent
     fine = resolved(surface, material, refinement, say)
-    way = _Way(fine, material, positive("tolerance", tolerance), say)
+    way = _Way(fine, material, TOLERANCE.checked("tolerance", tolerance), say)
     legs = _down_and_up(way, step, target * surface.rms_slope * material.contact_modulus)
     return _dataset(surface, way, legs, separation_step, seed)
 

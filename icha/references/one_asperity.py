@@ -38,7 +38,7 @@ from icha.references.boundary_elements import (
     perimeter_correction,
     states_at_mean_separations,
 )
-from icha.support.validation import integer, number, positive
+from icha.support.rules import GRID, LENGTH, POSITIVE, Real
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
 
@@ -112,11 +112,11 @@ def one_asperity(
     RuntimeError
         If the model is not in contact.
     """
-    material = Material(_MODULUS, _ENERGY, 1 / positive("tabor_parameter", tabor_parameter))
-    period = positive("period", period, "m")
+    material = Material(_MODULUS, _ENERGY, 1 / POSITIVE.checked("tabor_parameter", tabor_parameter))
+    period = LENGTH.checked("period", period)
     last = _pull_off_approach(JKR(material), period)
     approaches = _falling("approaches", approaches, last)
-    grid = resolving_grid(material, period) if grid is None else integer("grid", grid, 8)
+    grid = resolving_grid(material, period) if grid is None else GRID.checked("grid", grid)
     surface = paraboloid(grid, period)
     states = states_at_mean_separations(
         surface,
@@ -154,7 +154,7 @@ def hertz_asperity(
     """
     material = Material(_MODULUS, 0.0, 1.0)
     radii = _falling("contact_radii", contact_radii, 0.0)
-    surface = paraboloid(integer("grid", grid, 8), positive("period", period, "m"))
+    surface = paraboloid(GRID.checked("grid", grid), LENGTH.checked("period", period))
     unit = material.contact_modulus * surface.rms_slope * surface.period**2
     loads = [float(JKR(material).force(radius, _RADIUS)) / unit for radius in radii]
     states = (contact_state(surface, material, load, tolerance=tolerance) for load in loads)
@@ -162,7 +162,7 @@ def hertz_asperity(
 
 
 def _falling(name, values, least):
-    values = [number(name, value, "m") for value in values]
+    values = [Real("m").checked(name, value) for value in values]
     if not values or any(below >= above for above, below in itertools.pairwise([*values, least])):
         raise ValueError(f"{name}: {values} must be one or more numbers that fall and stay above {least:.4g} (in m)")
     return values

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
+from icha.support.rules import CONTACT_MODULUS, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, Integer, Real
 from icha.support.units import PATTERN, PHYSICAL_NAMES, to_number, to_si
 
 NAME_PATTERN = r"^[a-z0-9_-]+$"
@@ -17,22 +18,22 @@ NAME_PATTERN = r"^[a-z0-9_-]+$"
 ROUNDING = 1e-9
 
 
-def quantity(si_unit, example, minimum=None):
-    """Type of a value that is written with its unit and kept as a float in `si_unit`."""
-    allowed = f"{PHYSICAL_NAMES[si_unit]} with its unit"
-    allowed += {None: ", greater than 0", 0: ", 0 or greater"}[minimum] + f", such as {example!r}"
+def quantity(rule: Real, example: str):
+    """Type of a value that is written with its unit and kept as a float in that of `rule`."""
+    allowed = f"{PHYSICAL_NAMES[rule.unit]} with its unit"
+    allowed += f", {'greater than 0' if rule.least is None else '0 or greater'}, such as {example!r}"
 
     def read(value: Any) -> float:
         try:
-            result = to_si(value, si_unit)
+            result = to_si(value, rule.unit)
         except ValueError as error:
             raise ValueError(f"{error}; allowed: {allowed}") from None
-        if result < 0 or (result == 0 and minimum is None):
+        if not rule.holds(result):
             raise ValueError(f"is too small; allowed: {allowed}")
         return result
 
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), Unit(si_unit)]
+    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), Unit(rule.unit)]
 
 
 @dataclass(frozen=True)
@@ -42,32 +43,29 @@ class Unit:
     si: str
 
 
-def number(allowed, *, above=None, least=None, most=None):
-    """Type of a pure number within bounds; `1e-3`, which YAML takes for text, is one."""
+def number(rule: Real):
+    """Type of a pure number; `1e-3`, which YAML takes for text, is one."""
 
     def read(value: Any) -> float:
         try:
             result = to_number(value)
         except ValueError as error:
-            raise ValueError(f"{error}; allowed: {allowed}") from None
-        if (
-            (above is not None and result <= above)
-            or (least is not None and result < least)
-            or (most is not None and result > most)
-        ):
-            raise ValueError(f"is out of range; allowed: {allowed}")
+            raise ValueError(f"{error}; allowed: {rule.allowed}") from None
+        if not rule.holds(result):
+            raise ValueError(f"is out of range; allowed: {rule.allowed}")
         return result
 
-    bounds = {"exclusiveMinimum": above, "minimum": least, "maximum": most}
+    bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
     schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
     return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
 
 
-def integer(least, most=2**31 - 1):
-    """Type of an integer within bounds."""
+def integer(rule: Integer):
+    """Type of an integer."""
+    least, most = rule.least, rule.most
 
     def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        if not rule.holds(value):
             raise ValueError(f"is not an integer from {least} to {most}; allowed: {least}, {least + 1}, … {most}")
         return value
 
@@ -146,10 +144,11 @@ def _file(value: str) -> str:
 
 # The path of a file.
 File = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_file)]
-Length = quantity("m", "100 um")
-Modulus = quantity("Pa", "25 MPa")
-SurfaceEnergy = quantity("J/m^2", "50 mJ/m^2", minimum=0)
-Positive = number("a number greater than 0", above=0)
+Length = quantity(LENGTH, "100 um")
+Modulus = quantity(CONTACT_MODULUS, "25 MPa")
+SurfaceEnergy = quantity(SURFACE_ENERGY, "50 mJ/m^2")
+Positive = number(POSITIVE)
+Seed = integer(SEED)
 Flag = Annotated[bool, BeforeValidator(flag)]
 
 
@@ -170,7 +169,6 @@ class Section(BaseModel):
 
 
 _RANGE = re.compile(r"\s*(\d+)\s*\.\.\s*(\d+)\s*")
-_SEED = integer(0)
 # More are a slip of the pen.
 _MOST_SEEDS = 10**5
 
@@ -197,7 +195,7 @@ def _seeds(value: Any) -> Any:
 
 
 Seeds = Annotated[
-    list[_SEED],
+    list[Seed],
     Field(min_length=1),
     BeforeValidator(_seeds),
     AfterValidator(distinct),

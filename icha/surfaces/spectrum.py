@@ -16,7 +16,7 @@ import numpy as np
 import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
-from icha.support.validation import integer, number, positive
+from icha.support.rules import GRID, HURST, LENGTH, POSITIVE, SEED
 from icha.surfaces.surface import Surface
 
 # Wave numbers are compared in units of 2 pi / L; this keeps |k| = 64 out of a band that ends at L/lambda_s = 64
@@ -56,11 +56,9 @@ class SelfAffineSpectrum:
     def __post_init__(self):
         """Check the values."""
         for name in ("period", "rolloff_wavelength", "short_wavelength"):
-            object.__setattr__(self, name, positive(name, getattr(self, name), "metres"))
-        object.__setattr__(self, "rms_slope", positive("rms_slope", self.rms_slope))
-        object.__setattr__(self, "hurst", number("hurst", self.hurst))
-        if not 0 < self.hurst <= 1:
-            raise ValueError(f"hurst: {self.hurst!r} must lie in (0, 1]")
+            object.__setattr__(self, name, LENGTH.checked(name, getattr(self, name)))
+        object.__setattr__(self, "rms_slope", POSITIVE.checked("rms_slope", self.rms_slope))
+        object.__setattr__(self, "hurst", HURST.checked("hurst", self.hurst))
         if self.rolloff_wavelength > self.period * (1 + _ROUNDING):
             raise ValueError(
                 f"rolloff_wavelength: {self.rolloff_wavelength!r} m must not exceed the period {self.period!r} m"
@@ -158,8 +156,8 @@ class SelfAffineSpectrum:
         ValueError
             Naming the argument whose value is not allowed.
         """
-        grid = integer("grid", grid, 8)
-        seed = integer("seed", seed, 0)
+        grid = GRID.checked("grid", grid)
+        seed = SEED.checked("seed", seed)
         if amplitudes not in AMPLITUDES:
             raise ValueError(f"amplitudes: {amplitudes!r} must be one of {', '.join(AMPLITUDES)}")
         cells = self.cells_per_short_wave(grid)

@@ -13,7 +13,8 @@ import numpy as np
 import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
-from icha.support.validation import flaw_of_heights, integer, positive
+from icha.support.rules import LENGTH, POSITIVE, Integer
+from icha.surfaces.heights import flaw_of_heights
 
 # What lies beyond the square: the same square again and again, or nothing but the half-space.
 PERIODIC, FREE = "periodic", "free"
@@ -60,7 +61,7 @@ class Surface:
         heights -= heights.mean()
         heights.flags.writeable = False
         object.__setattr__(self, "heights", heights)
-        object.__setattr__(self, "period", positive("period", self.period, "metres"))
+        object.__setattr__(self, "period", LENGTH.checked("period", self.period))
         if self.boundary not in BOUNDARIES:
             raise ValueError(f"boundary: {self.boundary!r} must be one of {', '.join(BOUNDARIES)}")
 
@@ -149,7 +150,7 @@ class Surface:
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """The same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
-        rms_slope = positive("rms_slope", rms_slope, "1")
+        rms_slope = POSITIVE.checked("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
         # Known already; `cached_property` keeps its values there.
@@ -166,7 +167,7 @@ class Surface:
             If the factor is not an integer of at least 1, or the surface is a free square.
         """
         self.require_periodic("a trigonometric interpolant")
-        if integer("factor", factor, 1) == 1:
+        if Integer(1).checked("factor", factor) == 1:
             return self
         # Slow to import, and seldom needed.
         from scipy.signal import resample

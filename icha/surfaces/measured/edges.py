@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.fft
 
-from icha.support.validation import flaw_of_heights
+from icha.surfaces.heights import flaw_of_heights
 from icha.surfaces.measured.scan import Scan
 from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
 from icha.surfaces.surface import FREE, PERIODIC, Surface

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from icha.support.validation import flaw_of_heights
+from icha.surfaces.heights import flaw_of_heights
 
 _ALLOWED = "allowed: a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
 
