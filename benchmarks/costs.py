@@ -27,7 +27,8 @@ import numpy as np
 
 import icha
 from icha.asperity.cohesive_zone import shortest_range
-from icha.datasets.files import write_dataset, write_surface
+from icha.datasets.files import write_dataset
+from icha.datasets.surface_file import write_surface
 from icha.planning import costs
 from icha.references.boundary_elements import boundary_elements
 from icha.references.error_sources import error_sources

@@ -22,10 +22,11 @@ import netCDF4
 import numpy as np
 
 import icha
-from icha.datasets.campaign import RunLabels
-from icha.datasets.campaign_file import write_campaign
-from icha.datasets.files import write_dataset, write_surface
+from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.files import write_dataset
+from icha.datasets.labels import RunLabels
 from icha.datasets.netcdf import LEAST_COMPRESSED
+from icha.datasets.surface_file import write_surface
 
 REPEATS = 3
 SPECTRUM = icha.SelfAffineSpectrum(

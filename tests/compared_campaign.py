@@ -8,8 +8,8 @@ import small_campaign as small
 
 import icha
 from icha.analysis.model_error import SHARED, contact_of_spots, model_error, state_of
-from icha.datasets.campaign import RunLabels, campaign_tree, find_snapshot
-from icha.datasets.labels import SolutionLabels
+from icha.datasets.campaign import campaign_tree, find_snapshot
+from icha.datasets.labels import RunLabels, SolutionLabels
 
 PRESSURES = (3e-3, 1e-2)
 GRID = 96

@@ -5,7 +5,8 @@ from functools import cache
 import numpy as np
 import small_campaign as small
 
-from icha.datasets.campaign import RunLabels, campaign_tree
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.labels import RunLabels
 
 # In units of the largest pressure: by how much unloading with adhesion lies below loading; a tenth more for every step
 # between the stops, so that runs differ.

@@ -10,7 +10,8 @@ import xarray as xr
 
 import icha
 from icha.asperity.jkr import JKR
-from icha.datasets.campaign import RunLabels, campaign_tree
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.labels import RunLabels
 
 PERIOD, GRID, RMS_HEIGHT, RADIUS = 100e-6, 32, 0.5e-6, 4e-6
 COUNT = 30

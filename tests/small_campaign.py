@@ -3,7 +3,8 @@
 from functools import cache
 
 import icha
-from icha.datasets.campaign import RunLabels, campaign_tree
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.labels import RunLabels
 
 SPECTRUM = icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=40e-6, short_wavelength=100e-6 / 7, hurst=0.8)
 PRESSURES = [1e-3, 3e-3, 1e-2, 3e-2]

@@ -10,7 +10,7 @@ from icha.asperity.material import Material
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
 from icha.configuration.settings import run_settings
-from icha.datasets.files import read_surface
+from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path as LoadingPath
 from icha.simulation import simulate
 

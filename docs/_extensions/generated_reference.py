@@ -96,7 +96,8 @@ def comparison_variables() -> str:
 
 def surface_variables() -> str:
     """The variables of a surface's file."""
-    from icha.datasets.files import read_dataset, write_surface
+    from icha.datasets.files import read_dataset
+    from icha.datasets.surface_file import write_surface
 
     spectrum = _small_spectrum()
     with tempfile.TemporaryDirectory() as folder:

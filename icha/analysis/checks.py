@@ -16,8 +16,9 @@ import numpy as np
 import xarray as xr
 
 from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
-from icha.datasets.campaign import RunLabels, loading_stops, run_labels, select_run
-from icha.datasets.files import MISSING
+from icha.datasets.campaign import loading_stops, run_labels, select_run
+from icha.datasets.labels import RunLabels
+from icha.datasets.variables.campaign import MISSING
 from icha.path.targets import BETWEEN
 from icha.support.atomic_files import whole_file
 

@@ -10,8 +10,9 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
 from icha.datasets.attributes import DERIVED, collected
-from icha.datasets.campaign import LABELS, loading_stops, reduced_gap
-from icha.datasets.files import COMPLETE
+from icha.datasets.campaign import loading_stops, reduced_gap
+from icha.datasets.labels import LABELS
+from icha.datasets.variables.campaign import COMPLETE
 from icha.support.statistics import Ensemble, ensemble
 
 # Loads at which curves are compared, per decade.

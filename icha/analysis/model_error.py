@@ -15,9 +15,9 @@ from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.attributes import DERIVED, collected
 from icha.datasets.bins import bin_values
 from icha.datasets.build import described, variable
-from icha.datasets.campaign import LABELS, RAGGED, find_snapshot, select_run, spots_of
-from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, status_variable
-from icha.datasets.labels import RunLabels, SolutionLabels
+from icha.datasets.campaign import find_snapshot, select_run, spots_of
+from icha.datasets.labels import LABELS, RunLabels, SolutionLabels
+from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
 from icha.datasets.variables.model_error import ASKED, BINS, MODEL_ERROR
 from icha.datasets.variables.terms import MATERIAL, Variable
 from icha.equilibrium.distributions import nodes_in_discs
@@ -278,7 +278,7 @@ def _entry_dataset(campaign, entry, states):
     }
     coords["reduced_pressure"] = variable(ASKED, axes["reduced_pressure"])
     of_contact = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
-    variables = {"status": status_variable(LABELS, np.array(of_contact).reshape(shape)[..., 0])}
+    variables = {"status": variable(STATUS, np.array(of_contact).reshape(shape)[..., 0])}
     variables |= _along_axes([states.get(labels) for labels in grid], shape)
     variables |= _over_seeds(variables)
     bins = described(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))

@@ -123,7 +123,7 @@ def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope):
         except ValueError as error:
             raise ValueError(f"{file}: {error}") from None
     else:
-        from icha.datasets.files import read_surface
+        from icha.datasets.surface_file import read_surface
 
         found = read_surface(file)
     return found if rms_slope is None else found.scaled_to_rms_slope(rms_slope)

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from icha.datasets.campaign_file import LABELS, RAGGED, write_campaign
-from icha.datasets.files import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, read_campaign
-from icha.datasets.labels import RunLabels
+from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.files import read_campaign
+from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED
 from icha.path.targets import BETWEEN
 
 

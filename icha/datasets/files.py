@@ -1,4 +1,4 @@
-"""What is kept: surfaces, runs and whole campaigns as netCDF-4 files.
+"""Datasets as netCDF-4 files, written and read.
 
 A file appears whole or not at all, holds no value that is not finite except where it says that a run is
 missing or has no more steps, and has the same bytes whenever it is written from the same values.
@@ -7,15 +7,13 @@ missing or has no more steps, and has the same bytes whenever it is written from
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import netCDF4
 import numpy as np
 import xarray as xr
 
-from icha.datasets.attributes import INPUT, discovery
-from icha.datasets.build import build, of
 from icha.datasets.netcdf import (
     COMPRESSION,
     FLOAT_FILL,
@@ -27,35 +25,18 @@ from icha.datasets.netcdf import (
     define_numbers,
     define_text,
     is_text,
+    not_finite,
 )
-from icha.datasets.variables.surface import SURFACE
-from icha.datasets.variables.terms import ROUGHNESS
+from icha.datasets.variables.campaign import COMPLETE
 from icha.support.atomic_files import whole_file
-from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, ring_edges, spectral_moments
-from icha.surfaces.surface import PERIODIC, Surface
 
 # Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
 _COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 # Bytes of an array from which on it is not read as a whole.
 _LEFT_IN_FILE = 2**26
 
-COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN = range(4)
-STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design")
-STATUS_ATTRIBUTES = {
-    "units": "1",
-    "long_name": "status of the run",
-    "flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8),
-    "flag_meanings": " ".join(STATUS_MEANINGS),
-    "comment": "values that a run does not have are filled with _FillValue",
-}
-
 # Dimensions and values of variables by name; texts are characters, along a last dimension without a name.
 Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
-
-
-def status_variable(dims: tuple[str, ...], values: np.ndarray) -> xr.Variable:
-    """What became of every run, as positions in `STATUS_MEANINGS`. Those that are not complete may lack values."""
-    return xr.Variable(dims, values.astype(np.int8), STATUS_ATTRIBUTES)
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
@@ -128,11 +109,7 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
                 may_lack = may_lack | beyond.transpose(*variable.dims).values
             bad &= ~(may_lack & np.isnan(variable.values))
         if bad.any():
-            first = ", ".join(f"{dim}={index}" for dim, index in zip(variable.dims, np.argwhere(bad)[0], strict=True))
-            raise ValueError(
-                f"{where}: variable {name!r} holds {np.count_nonzero(bad)} of {bad.size} values that are not finite"
-                + (f", the first at {first}" if first else "")
-            )
+            raise ValueError(f"{where}: variable {not_finite(name, variable.dims, bad)}")
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
@@ -143,7 +120,8 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     ValueError
         If there is no such file or it cannot be read.
     """
-    return _read(xr.load_dataset, path)
+    with readable(path):
+        return xr.load_dataset(path, engine="netcdf4")
 
 
 def read_campaign(path: str | os.PathLike) -> xr.DataTree:
@@ -152,11 +130,11 @@ def read_campaign(path: str | os.PathLike) -> xr.DataTree:
     What takes more than 64 MB, as distributions of thousands of runs do, stays in the file until it is used; of a
     single run (`icha.datasets.campaign.select_run`) only its own part is then read.
     """
-    return _read(_load_small, path)
+    with readable(path):
+        return _load_small(xr.open_datatree(path, engine="netcdf4"))
 
 
-def _load_small(path, engine):
-    tree = xr.open_datatree(path, engine=engine)
+def _load_small(tree):
     variables = [variable for node in tree.subtree for variable in node.variables.values()]
     for variable in variables:
         if variable.nbytes <= _LEFT_IN_FILE:
@@ -166,14 +144,9 @@ def _load_small(path, engine):
     return tree
 
 
-def _read(load, path):
-    with _readable(path):
-        return load(path, engine="netcdf4")
-
-
 @contextmanager
-def _readable(path):
-    """Name the file that cannot be read."""
+def readable(path: str | os.PathLike) -> Iterator[None]:
+    """Name the file that cannot be read in a ValueError."""
     try:
         yield
     except FileNotFoundError:
@@ -203,7 +176,7 @@ def read_run_values(path: str | os.PathLike) -> tuple[Values, dict]:
     ValueError
         If the file cannot be read or is not a run dataset.
     """
-    with _readable(path), netCDF4.Dataset(path) as file:
+    with readable(path), netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
         file.set_auto_chartostring(False)
         _check_is_run(file.variables, path)
@@ -218,103 +191,3 @@ def _check_is_run(variables, path):
     for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
         if name not in variables:
             raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")
-
-
-def write_surface(
-    path: str | os.PathLike,
-    surface: Surface,
-    *,
-    name: str,
-    seed: int,
-    spectrum=None,
-    measured=None,
-    attrs: Mapping[str, str] = {},
-) -> None:
-    """Write a topography, its statistics and power spectrum, and where it comes from.
-
-    Parameters
-    ----------
-    path : the file.
-    surface : the topography; the campaigns keep it at rms slope 1.
-    name, seed : what the campaign calls it.
-    spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` that it realises, if any.
-    measured : the `icha.surfaces.measured.topography.PreparedTopography` whose heights, scaled, it has, if any.
-    attrs : further global attributes.
-    """
-    n = surface.grid
-    nodes = np.arange(n) * surface.spacing
-    moments = spectral_moments(surface)
-    wave_number, power = radial_power_spectrum(surface)
-    edges = ring_edges(surface)
-    values = {
-        "x": nodes,
-        "y": nodes,
-        "psd_wavevector": wave_number,
-        "height": surface.heights,
-        "seed": seed,
-        **of(surface, "period", "grid", *ROUGHNESS),
-        "spectral_moment_0": moments.m0,
-        "spectral_moment_2": moments.m2,
-        "spectral_moment_4": moments.m4,
-        "nayak_parameter": moments.nayak_parameter,
-        "psd_wavevector_bounds": np.column_stack([edges[:-1], edges[1:]]),
-        "power_spectrum": power,
-    }
-    if spectrum is not None:
-        values |= of(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
-    if measured is not None:
-        values["measured_rms_slope"] = measured.rms_slope
-    kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
-    if measured is not None:
-        kind = "Measured topography"
-        origin = {
-            "source_file": measured.source_file,
-            "source_sha256": measured.source_sha256,
-            "preparation": measured.description,
-        }
-    attributes = discovery(
-        f"Topography {name}, seed {seed}",
-        f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
-        INPUT,
-        keywords=["topography"],
-    )
-    origin |= {"surface": name, "boundary": surface.boundary}
-    write_dataset(build(SURFACE, values, attributes | origin | dict(attrs)), path)
-
-
-def read_surface(path: str | os.PathLike) -> Surface:
-    """Read the topography of a surface file.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, lacks heights or period, or its heights are not finite, not square or flat.
-    """
-    dataset = read_dataset(path)
-    for name in ("height", "period"):
-        if name not in dataset:
-            raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
-    try:
-        heights = dataset["height"].transpose("y", "x").values
-        return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC))
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
-
-
-def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
-    """Read the spectral moments of a surface file, without its heights.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or does not hold them.
-    """
-    names = [f"spectral_moment_{order}" for order in (0, 2, 4)]
-
-    def load(path, engine):
-        with xr.open_dataset(path, engine=engine) as dataset:
-            if missing := [name for name in names if name not in dataset]:
-                raise ValueError(f"{path}: not a surface file, it has no variable {missing[0]!r}")
-            return SpectralMoments(*(float(dataset[name]) for name in names))
-
-    return _read(load, path)

@@ -29,6 +29,10 @@ class RunLabels(NamedTuple):
         return self.path
 
 
+# Those of them that a study has as dimensions.
+LABELS = RunLabels._fields[1:]
+
+
 class ContactLabels(NamedTuple):
     """What an entry beside a study asks for: the entry, and what is pressed against what."""
 

@@ -70,6 +70,13 @@ def _define(group, name, dtype, dims, attrs, storage):
     return variable
 
 
+def not_finite(name: Hashable, dims: tuple[Hashable, ...], bad: np.ndarray) -> str:
+    """Name of a variable, how many of its values are not finite, and where the first is; `bad` says which are not."""
+    first = ", ".join(f"{dim}={index}" for dim, index in zip(dims, np.argwhere(bad)[0], strict=True))
+    text = f"{name!r} holds {np.count_nonzero(bad)} of {bad.size} values that are not finite"
+    return f"{text}, the first at {first}" if first else text
+
+
 def coordinates_of(
     variables: Mapping[Hashable, xr.Variable],
     coordinates: Collection[Hashable],

@@ -8,17 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.datasets.campaign import (
-    LABELS,
-    RAGGED,
-    RunLabels,
-    find_snapshot,
-    loading_stops,
-    reduced_gap,
-    run_labels,
-    select_run,
-)
-from icha.datasets.files import COMPLETE
+from icha.datasets.campaign import find_snapshot, loading_stops, reduced_gap, run_labels, select_run
+from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.variables.campaign import COMPLETE, RAGGED
 from icha.figures.style import number, slope_label
 
 

@@ -157,7 +157,7 @@ def _asperities(campaign: Campaign, name: str, folder: Path) -> float:
         return costs.self_affine_summits(
             surface.period, surface.rolloff_wavelength, surface.short_wavelength, surface.hurst
         )
-    from icha.datasets.files import read_spectral_moments
+    from icha.datasets.surface_file import read_spectral_moments
 
     for file in sorted(folder.glob("seed*.nc")):
         try:

@@ -17,10 +17,9 @@ from icha.analysis.checks import COMPLETED, Check, worst
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
 from icha.configuration.surfaces import SelfAffineSurface
-from icha.datasets.campaign_file import LABELS
-from icha.datasets.files import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
-from icha.datasets.labels import RunLabels
+from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.planning.costs import Cost
 from icha.publication.attributes import acknowledgement
 from icha.publication.citation import paragraphs, web_address

@@ -26,9 +26,10 @@ from markupsafe import Markup, escape
 from icha.analysis.checks import IDENTITY_LIMIT, Check, worst
 from icha.analysis.common_loads import at_round_pressures
 from icha.analysis.model_error import SUMMARISED
-from icha.datasets.campaign import LABELS, RAGGED, RunLabels, loading_stops, select_run
-from icha.datasets.files import COMPLETE, INCOMPLETE, MISSING
+from icha.datasets.campaign import loading_stops, select_run
+from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, RAGGED
 from icha.figures.scale import Scale
 from icha.figures.style import COLOURS, quantity, unit_for
 from icha.report.inline_svg import Curve, Node, flow_graph, logarithmic_chart

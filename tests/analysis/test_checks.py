@@ -16,7 +16,8 @@ from icha.analysis.checks import (
     worst,
     write_checks,
 )
-from icha.datasets.campaign import RunLabels, campaign_tree
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.labels import RunLabels
 from icha.references.boundary_elements import boundary_elements
 
 

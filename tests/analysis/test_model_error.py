@@ -19,9 +19,9 @@ from icha.analysis.model_error import (
     state_of,
 )
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
-from icha.datasets.campaign import RunLabels, campaign_tree, find_snapshot
+from icha.datasets.campaign import campaign_tree, find_snapshot
 from icha.datasets.files import read_campaign, write_dataset
-from icha.datasets.labels import SolutionLabels
+from icha.datasets.labels import RunLabels, SolutionLabels
 from icha.references.boundary_elements import boundary_elements
 
 

@@ -19,7 +19,8 @@ from icha.cli.show import sparkline
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
 from icha.configuration.settings import run_sha256
-from icha.datasets.files import write_dataset, write_surface
+from icha.datasets.files import write_dataset
+from icha.datasets.surface_file import write_surface
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
 from icha.support.checksums import damaged, write_checksum
 

@@ -8,11 +8,12 @@ import small_campaign as small
 import xarray as xr
 
 from icha import Surface
-from icha.datasets import campaign_file
-from icha.datasets import files as records
+from icha.datasets import files
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
-from icha.datasets.campaign_file import write_campaign
-from icha.datasets.files import read_campaign, read_dataset, read_run, read_surface, write_dataset, write_surface
+from icha.datasets.campaign_file import group, write
+from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
+from icha.datasets.surface_file import read_surface, write_surface
 
 
 def simple(values=(1.0, 2.0)):
@@ -244,8 +245,9 @@ def test_blocks_of_runs_leave_no_seams(tmp_path, monkeypatch, runs):
     members = {**cyclic.runs(), **dict(small.runs())}
     del members[next(iter(cyclic.runs()))]
     write_campaign(members.items(), tmp_path / "whole.nc")
-    monkeypatch.setattr(campaign_file, "_RUNS_IN_BLOCK", runs)
-    monkeypatch.setattr(campaign_file, "_VALUES_IN_BLOCK", 2000)
+    monkeypatch.setattr(group, "_RUNS_IN_BLOCK", runs)
+    monkeypatch.setattr(group, "VALUES_IN_BLOCK", 2000)
+    monkeypatch.setattr(write, "VALUES_IN_BLOCK", 2000)
     write_campaign(members.items(), tmp_path / "blocks.nc")
     xr.testing.assert_identical(read_campaign(tmp_path / "blocks.nc"), read_campaign(tmp_path / "whole.nc"))
 
@@ -334,7 +336,7 @@ def test_runs_of_different_lengths_are_taken_out_unchanged(tmp_path, monkeypatch
     tree = cyclic.tree()
     if kept != "in memory":
         write_campaign(cyclic.runs().items(), tmp_path / "c.nc")
-        monkeypatch.setattr(records, "_LEFT_IN_FILE", 0 if kept == "left in its file" else 2**30)
+        monkeypatch.setattr(files, "_LEFT_IN_FILE", 0 if kept == "left in its file" else 2**30)
         tree = read_campaign(tmp_path / "c.nc")
         assert tree["loops"].variables["work"]._in_memory == (kept == "from its file")
     lengths = set()

@@ -7,8 +7,9 @@ import pytest
 import small_campaign as small
 import xarray as xr
 
-from icha.datasets.files import write_dataset, write_surface
+from icha.datasets.files import write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, RUN_NAMES, SURFACE, SURFACE_NAMES, UnknownFile, flaws, kind_of
+from icha.datasets.surface_file import write_surface
 from icha.datasets.variables import run as of_run
 from icha.datasets.variables import surface as of_surface
 

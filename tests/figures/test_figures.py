@@ -14,8 +14,10 @@ from matplotlib.colors import to_hex, to_rgb
 
 import icha
 from icha.analysis.model_error import jaccard
-from icha.datasets.campaign import RunLabels, campaign_tree, find_snapshot
-from icha.datasets.files import read_dataset, write_surface
+from icha.datasets.campaign import campaign_tree, find_snapshot
+from icha.datasets.files import read_dataset
+from icha.datasets.labels import RunLabels
+from icha.datasets.surface_file import write_surface
 from icha.figures import (
     fig1_jkr,
     fig2_area_and_gap,

@@ -9,7 +9,8 @@ import xarray as xr
 from matplotlib.colors import to_hex
 
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.files import read_dataset, write_surface
+from icha.datasets.files import read_dataset
+from icha.datasets.surface_file import write_surface
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.fig15_loss import PARTS, linear_fit, shares
 from icha.figures.hysteresis import averages

@@ -14,8 +14,9 @@ from icha.analysis.checks import Check, check_campaign
 from icha.analysis.common_loads import at_round_pressures, compare_campaign, compare_runs, interpolated
 from icha.analysis.model_error import model_error
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.files import read_campaign, read_dataset, write_dataset, write_surface
+from icha.datasets.files import read_campaign, read_dataset, write_dataset
 from icha.datasets.labels import RunLabels
+from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr
 from icha.figures.select import path_steps
 from icha.figures.style import save

@@ -13,7 +13,7 @@ import small_campaign as small
 from icha.analysis.checks import check_campaign
 from icha.analysis.common_loads import compare_campaign
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.files import write_surface
+from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr, fig2_area_and_gap
 from icha.figures.style import save
 from icha.report.report import Benchmark, ReportFigure, read_surface_statistics, write_report, write_times_page

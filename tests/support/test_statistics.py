@@ -7,8 +7,8 @@ import xarray as xr
 from scipy.stats import t, ttest_1samp
 
 from icha.analysis.common_loads import compare_runs, mean_curve, mean_way
-from icha.datasets.campaign import LABELS, campaign_tree, reduced_gap
-from icha.datasets.labels import RunLabels
+from icha.datasets.campaign import campaign_tree, reduced_gap
+from icha.datasets.labels import LABELS, RunLabels
 from icha.support.statistics import ensemble
 
 

@@ -10,7 +10,8 @@ import pytest
 from scans import NM, SIZE, UM, centred, preparation, scan, write_xyz
 
 from icha.configuration.measured_surfaces import MeasuredSurface
-from icha.datasets.files import read_dataset, read_surface, write_surface
+from icha.datasets.files import read_dataset
+from icha.datasets.surface_file import read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography, topography_facts
 from icha.surfaces.spectrum import SelfAffineSpectrum

@@ -8,7 +8,8 @@ from scipy.optimize import brentq
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.stickiness import stickiness
-from icha.datasets.files import read_dataset, read_spectral_moments, write_surface
+from icha.datasets.files import read_dataset
+from icha.datasets.surface_file import read_spectral_moments, write_surface
 from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, spectral_moments
 
 MATERIAL = Material(25e6, 0.05, 2.071e-9)

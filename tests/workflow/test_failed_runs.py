@@ -6,8 +6,10 @@ import pytest
 import small_campaign as small
 
 from icha.analysis.checks import check_campaign, read_checks
-from icha.datasets.campaign import RunLabels, campaign_tree, select_run
-from icha.datasets.files import read_campaign, read_run, write_dataset, write_surface
+from icha.datasets.campaign import campaign_tree, select_run
+from icha.datasets.files import read_campaign, read_run, write_dataset
+from icha.datasets.labels import RunLabels
+from icha.datasets.surface_file import write_surface
 from icha.figures.fig2_area_and_gap import figure
 from icha.figures.select import NothingToDraw
 

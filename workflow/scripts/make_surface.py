@@ -2,7 +2,7 @@
 
 from job import attributes, guarded
 
-from icha.datasets.files import write_surface
+from icha.datasets.surface_file import write_surface
 from icha.surfaces.measured.height_map import read_height_map
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum

@@ -3,7 +3,8 @@
 from job import attributes, guarded
 
 from icha.asperity.material import Material
-from icha.datasets.files import read_surface, write_dataset
+from icha.datasets.files import write_dataset
+from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
 from icha.simulation import ConvergenceError, simulate
 

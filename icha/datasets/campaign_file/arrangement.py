@@ -1,0 +1,146 @@
+"""Arrangement of the runs of a study in its group: axes, sizes, the runs in the order of the axes, their status."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from icha.datasets.campaign_file.spool import Entry, Members, plain
+from icha.datasets.files import read_run
+from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED, VARIES_WITH
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement:
+    """The runs of a study along its axes.
+
+    name : of the study. axes : values of every label. model : a run that shows what variables there are. widths : of
+    texts, in bytes. sizes : of the dimensions that runs have in common. snapshots : position of every kind and target.
+    entries : the runs there are, in the order of the axes; positions (n, 4) : of these; failures : why each of these is
+    incomplete, an empty text if it is not. status, step_count : along `LABELS`.
+    """
+
+    name: str
+    axes: dict[str, list]
+    model: xr.Dataset
+    widths: dict[str, int]
+    sizes: dict[str, int]
+    snapshots: dict[tuple[bytes, float], int]
+    entries: list[Entry]
+    positions: np.ndarray
+    failures: list[str]
+    status: np.ndarray
+    step_count: np.ndarray
+
+    def sizes_of(self, dim: str) -> np.ndarray:
+        """Size of a dimension of every run."""
+        return _sizes(self.entries, dim)
+
+    def dims_of(self, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The labels that a variable of the runs varies with, and its own dimensions; no labels of what is ragged."""
+        own = self.model[name].dims
+        if name in self.sizes or set(RAGGED) & set(own):
+            return (), own
+        return VARIES_WITH.get(name, LABELS), own
+
+    def lacks(self, name: str) -> bool:
+        """Whether a variable of the runs has no value somewhere."""
+        along, own = self.dims_of(name)
+        having = np.array([name in entry.names for entry in self.entries])
+        there = np.zeros([len(self.axes[label]) for label in along], bool)
+        there[tuple(self.positions[having][:, LABELS.index(label)] for label in along)] = True
+        if along != LABELS:
+            return not there.all()
+        return not there.all() or any((self.sizes_of(dim)[having] != self.sizes[dim]).any() for dim in own)
+
+
+def arranged(studies: dict[str, Members], design: Iterable[RunLabels | tuple] | None) -> list[Arrangement]:
+    """Arrange the runs of every study, in the order of the design.
+
+    Raises
+    ------
+    ValueError
+        Naming the run: if it is not in the design, or does not fit its study's other runs; if a study has no run.
+    """
+    asked = {name: list(members.entries) for name, members in studies.items()}
+    if design is not None:
+        asked = {}
+        for labels in dict.fromkeys(map(plain, design)):
+            asked.setdefault(labels.study, []).append(labels)
+    known = {labels for of_study in asked.values() for labels in of_study}
+    if odd := [labels for members in studies.values() for labels in members.entries if labels not in known]:
+        raise ValueError(f"{odd[0]}: this run is not in the design")
+    for name in asked:
+        if name not in studies:
+            raise ValueError(f"study {name}: there is no run of it")
+    return [_arranged_study(name, studies[name], labels) for name, labels in asked.items()]
+
+
+def _arranged_study(name, members, design):
+    axes = {label: list(dict.fromkeys(getattr(labels, label) for labels in design)) for label in LABELS}
+    axes |= {label: sorted(axes[label]) for label in ("seed", "rms_slope")}
+    at = [{value: k for k, value in enumerate(axes[label])} for label in LABELS]
+    position = {labels: tuple(k[value] for k, value in zip(at, labels[1:], strict=True)) for labels in design}
+    model = members.model if isinstance(members.model, xr.Dataset) else read_run(members.model)
+    # In the order of the design, whatever that in which they came.
+    entries = [members.entries[labels] for labels in position if labels in members.entries]
+    snapshots = _snapshots(entries)
+    sizes = {dim: size for dim, size in model.sizes.items() if dim not in RAGGED}
+    if "snapshot" in sizes:
+        sizes["snapshot"] = len(snapshots)
+    if "step" in sizes:
+        sizes["step"] = int(_sizes(entries, "step").max())
+    _check(entries, model, sizes)
+
+    entries = sorted(entries, key=lambda entry: position[entry.labels])
+    positions = np.array([position[entry.labels] for entry in entries])
+    failures = [_why_incomplete(entry, len(snapshots)) for entry in entries]
+    shape = tuple(len(axes[label]) for label in LABELS)
+    status = np.full(shape, NOT_IN_DESIGN, np.int8)
+    status[tuple(np.transpose(list(position.values())))] = MISSING
+    status[tuple(positions.T)] = [INCOMPLETE if failure else COMPLETE for failure in failures]
+    step_count = np.zeros(shape, np.int32)
+    step_count[tuple(positions.T)] = _sizes(entries, "step")
+    return Arrangement(
+        name, axes, model, members.widths, sizes, snapshots, entries, positions, failures, status, step_count
+    )
+
+
+def _sizes(entries, dim):
+    return np.array([entry.size(dim) for entry in entries])
+
+
+def _snapshots(entries):
+    """Position of every snapshot of the study, by kind and target.
+
+    Where a run meets its stops in another order than the others (a load and an area, say), so it does its snapshots.
+    """
+    longest = max(entries, key=lambda entry: (not entry.failure, entry.size("step")))
+    known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))
+    return {each: k for k, each in enumerate(known)}
+
+
+def _check(entries, model, sizes):
+    """Refuse runs with other variables, or others along dimensions that all have in common."""
+    names = frozenset(model.variables)
+    may_lack = frozenset(name for name in names if not set(RAGGED) & set(model[name].dims))
+    for entry in entries:
+        odd = entry.names ^ names
+        if odd - (may_lack if entry.failure else frozenset()):
+            known = ", ".join(sorted(odd))
+            raise ValueError(f"{entry.labels}: variables differ from those of the study's other runs: {known}")
+        for dim, size in sizes.items():
+            if dim not in ("step", "snapshot") and entry.size(dim) != size:
+                raise ValueError(f"{entry.labels}: {entry.size(dim)} along {dim}, {size} of the study's other runs")
+
+
+def _why_incomplete(entry, snapshots):
+    """Why a run does not hold all that the study has; an empty text if it does."""
+    if entry.failure or len(entry.snapshots) == snapshots:
+        return entry.failure
+    return f"{len(entry.snapshots)} of {snapshots} snapshots"

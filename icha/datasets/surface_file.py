@@ -1,0 +1,114 @@
+"""The file of a surface: its heights, statistics and power spectrum, and where it comes from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from icha.datasets.attributes import INPUT, discovery
+from icha.datasets.build import build, of
+from icha.datasets.files import read_dataset, readable, write_dataset
+from icha.datasets.variables.surface import SURFACE
+from icha.datasets.variables.terms import ROUGHNESS
+from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, ring_edges, spectral_moments
+from icha.surfaces.surface import PERIODIC, Surface
+
+
+def write_surface(
+    path: str | os.PathLike,
+    surface: Surface,
+    *,
+    name: str,
+    seed: int,
+    spectrum=None,
+    measured=None,
+    attrs: Mapping[str, str] = {},
+) -> None:
+    """Write a topography, its statistics and power spectrum, and where it comes from.
+
+    Parameters
+    ----------
+    path : the file.
+    surface : the topography; the campaigns keep it at rms slope 1.
+    name, seed : what the campaign calls it.
+    spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` that it realises, if any.
+    measured : the `icha.surfaces.measured.topography.PreparedTopography` whose heights, scaled, it has, if any.
+    attrs : further global attributes.
+    """
+    n = surface.grid
+    nodes = np.arange(n) * surface.spacing
+    moments = spectral_moments(surface)
+    wave_number, power = radial_power_spectrum(surface)
+    edges = ring_edges(surface)
+    values = {
+        "x": nodes,
+        "y": nodes,
+        "psd_wavevector": wave_number,
+        "height": surface.heights,
+        "seed": seed,
+        **of(surface, "period", "grid", *ROUGHNESS),
+        "spectral_moment_0": moments.m0,
+        "spectral_moment_2": moments.m2,
+        "spectral_moment_4": moments.m4,
+        "nayak_parameter": moments.nayak_parameter,
+        "psd_wavevector_bounds": np.column_stack([edges[:-1], edges[1:]]),
+        "power_spectrum": power,
+    }
+    if spectrum is not None:
+        values |= of(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
+    if measured is not None:
+        values["measured_rms_slope"] = measured.rms_slope
+    kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
+    if measured is not None:
+        kind = "Measured topography"
+        origin = {
+            "source_file": measured.source_file,
+            "source_sha256": measured.source_sha256,
+            "preparation": measured.description,
+        }
+    attributes = discovery(
+        f"Topography {name}, seed {seed}",
+        f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
+        INPUT,
+        keywords=["topography"],
+    )
+    origin |= {"surface": name, "boundary": surface.boundary}
+    write_dataset(build(SURFACE, values, attributes | origin | dict(attrs)), path)
+
+
+def read_surface(path: str | os.PathLike) -> Surface:
+    """Read the topography of a surface file.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, lacks heights or period, or its heights are not finite, not square or flat.
+    """
+    dataset = read_dataset(path)
+    for name in ("height", "period"):
+        if name not in dataset:
+            raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
+    try:
+        heights = dataset["height"].transpose("y", "x").values
+        return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
+    """Read the spectral moments of a surface file, without its heights.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or does not hold them.
+    """
+    names = [f"spectral_moment_{order}" for order in (0, 2, 4)]
+
+    with readable(path), xr.open_dataset(path, engine="netcdf4") as dataset:
+        if missing := [name for name in names if name not in dataset]:
+            raise ValueError(f"{path}: not a surface file, it has no variable {missing[0]!r}")
+        return SpectralMoments(*(float(dataset[name]) for name in names))
