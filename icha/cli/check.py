@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, WRONG, counted
+from icha.cli.project import FAILED, WRONG
+from icha.support.in_words import counted
 
 
 def check(

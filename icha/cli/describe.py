@@ -10,8 +10,9 @@ from typing import Annotated
 import typer
 
 from icha.cli.options import Config, Cores, Folder
-from icha.cli.project import configuration_path, counted, find_project, read_configuration, shown
+from icha.cli.project import configuration_path, find_project, read_configuration, shown
 from icha.support import in_words
+from icha.support.in_words import counted
 
 
 def describe(

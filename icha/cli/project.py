@@ -108,8 +108,3 @@ def shown(path: Path) -> Path:
     """The path as people like to read it: relative to the working directory where it lies in it."""
     path = Path(path)
     return path.relative_to(Path.cwd()) if path.is_absolute() and path.is_relative_to(Path.cwd()) else path
-
-
-def counted(number: int, thing: str) -> str:
-    """`1 run`, `3 runs`."""
-    return f"{number} {thing}{'' if number == 1 else 's'}"

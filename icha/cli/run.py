@@ -17,7 +17,8 @@ from typing import Annotated
 import typer
 
 from icha.cli.options import Cores, Folder
-from icha.cli.project import DEFAULT, FAILED, Mistake, configuration_path, counted, project, read_configuration, shown
+from icha.cli.project import DEFAULT, FAILED, Mistake, configuration_path, project, read_configuration, shown
+from icha.support.in_words import counted
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, Mistake, counted
+from icha.cli.project import FAILED, Mistake
 from icha.support import in_words
 
 
@@ -26,7 +26,7 @@ def verify(
     for problem in problems:
         typer.echo(problem)
     if problems:
-        typer.secho(f"{deposit}: not whole: {counted(len(problems), 'problem')}", err=True, fg="red")
+        typer.secho(f"{deposit}: not whole: {in_words.counted(len(problems), 'problem')}", err=True, fg="red")
         raise typer.Exit(FAILED)
     sizes = contents(deposit)
-    typer.echo(f"{deposit}: whole: {counted(len(sizes), 'file')}, {in_words.size(sum(sizes.values()))}")
+    typer.echo(f"{deposit}: whole: {in_words.counted(len(sizes), 'file')}, {in_words.size(sum(sizes.values()))}")

@@ -1,4 +1,4 @@
-"""What a published dataset says of its makers, in the file itself."""
+"""Global attributes by which a published dataset names its makers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a deposit is cited: the same publication for people (CITATION.cff), for Zenodo and for DataCite."""
+"""The citation of a deposit, the same for people (CITATION.cff), for Zenodo and for DataCite."""
 
 from __future__ import annotations
 
@@ -201,25 +201,23 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
                 )
                 for related in publication.related_identifiers
             ],
-            "relatedItems": [
-                {
-                    "relatedItemType": "JournalArticle",
-                    "relationType": "Cites",
-                    "titles": [{"title": MODEL_PAPER.title}],
-                    "creators": [
-                        {
-                            "name": f"{family}, {given}",
-                            "nameType": "Personal",
-                            "givenName": given,
-                            "familyName": family,
-                        }
-                        for given, family in MODEL_PAPER.authors
-                    ],
-                }
-            ],
+            "relatedItems": [_datacite_paper()],
             "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
         }
     )
+
+
+def _datacite_paper() -> dict[str, Any]:
+    """The paper of the model."""
+    return {
+        "relatedItemType": "JournalArticle",
+        "relationType": "Cites",
+        "titles": [{"title": MODEL_PAPER.title}],
+        "creators": [
+            {"name": f"{family}, {given}", "nameType": "Personal", "givenName": given, "familyName": family}
+            for given, family in MODEL_PAPER.authors
+        ],
+    }
 
 
 def _datacite_creator(author: Author) -> dict[str, Any]:

@@ -154,15 +154,7 @@ def crate_metadata(
     shown = {path for path in checksums if not path.startswith(SOURCE)}
     shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in steps)} & set(checksums)
     files = {path: _add_file(crate, path, sizes[path], checksums[path]) for path in sorted(shown)}
-    source = crate.add(Dataset(crate, dest_path=SOURCE))
-    _set(
-        source,
-        name="Source of the workflow and of its program",
-        version=commit,
-        identifier=commit,
-        hasPart=[file for path, file in files.items() if path.startswith(SOURCE)],
-    )
-
+    _add_source(crate, files, commit)
     engine = _engine(crate)
     workflow = _describe_workflow(crate, files, engine, commit, steps)
     made = {path for job in jobs for path in job.outputs}
@@ -316,6 +308,17 @@ def _add_file(crate: ROCrate, path: str, size: int, sha256: str) -> File:
     known = _FORMATS.get(PurePosixPath(path).suffix, "application/octet-stream")
     properties = {"name": path, "contentSize": str(size), "sha256": sha256, "encodingFormat": known}
     return crate.add(File(crate, dest_path=path, properties=properties))
+
+
+def _add_source(crate: ROCrate, files: Mapping[str, File], commit: str) -> None:
+    """The folder with the source, of which only some files are shown."""
+    _set(
+        crate.add(Dataset(crate, dest_path=SOURCE)),
+        name="Source of the workflow and of its program",
+        version=commit,
+        identifier=commit,
+        hasPart=[file for path, file in files.items() if path.startswith(SOURCE)],
+    )
 
 
 def _engine(crate: ROCrate) -> Entity:

@@ -1,4 +1,4 @@
-"""Whether the packages that are installed are those of the lock."""
+"""The environment that a deposit promises: the packages of the lock, and no other versions."""
 
 from __future__ import annotations
 

@@ -130,6 +130,24 @@ def readme(
     sizes : bytes of every file, by its path in the deposit.
     cost : what computing the whole campaign is expected to take.
     """
+    text = _template().render(
+        publication=publication,
+        citation=citation(publication),
+        paper=MODEL_PAPER,
+        summary=paragraphs(publication.summary),
+        licence=licence,
+        commit=commit,
+        variables=_short_dictionary(dictionary, campaign.name),
+        cost=cost,
+        addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
+        **_asked(campaign),
+        **_outcome(publication, dataset, checks, model_error),
+        **_content(sizes),
+    )
+    return text.rstrip() + "\n"
+
+
+def _template() -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         trim_blocks=True,
@@ -149,46 +167,54 @@ def readme(
         "seeds": _seeds,
         "few": _few,
     }
-    designs, surfaces = study_designs(dataset), _written(campaign, "surfaces")
+    return environment.get_template(_TEMPLATE)
+
+
+def _asked(campaign: Campaign) -> dict:
+    """The campaign as its author wrote it."""
+    surfaces = _written(campaign, "surfaces")
+    return {
+        "campaign": campaign,
+        "surfaces": surfaces,
+        "materials": _written(campaign, "materials"),
+        "self_affine": any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
+        "sides": _known_of(surfaces, campaign.period, "{:.4g}".format),
+        "grids": _known_of(surfaces, campaign.grid, str),
+        "adhesive": any(material.surface_energy > 0 for material in campaign.materials.values()),
+        "both_ways": any(study.unload or study.turning_points for study in campaign.studies.values()),
+        "free": any(campaign.boundary(name) == "free" for name in campaign.surfaces),
+    }
+
+
+def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check], model_error) -> dict:
+    """Runs that are complete and that are not, and how far both can be trusted."""
+    designs = study_designs(dataset)
     complete, incomplete = (_runs_of_status(dataset, status) for status in (COMPLETE, INCOMPLETE))
     known = {failure.run: failure.reason for failure in publication.known_failures}
     incomplete = [IncompleteRun(*run, known.get(str(run[0]), "")) for run in incomplete]
-    text = environment.get_template(_TEMPLATE).render(
-        publication=publication,
-        citation=citation(publication),
-        paper=MODEL_PAPER,
-        summary=paragraphs(publication.summary),
-        campaign=campaign,
-        surfaces=surfaces,
-        materials=_written(campaign, "materials"),
-        licence=licence,
-        commit=commit,
-        designs=designs,
-        incomplete=incomplete,
-        checks=[_meant(check) for check in worst(checks)],
-        failed=[check for check in checks if not check.passed and check.name != COMPLETED],
-        known=known,
-        count=_count_by_name(checks),
-        passed=sum(check.passed for check in checks),
-        total=len(checks),
-        errors=model_errors(model_error) if model_error is not None else [],
-        variables=_short_dictionary(dictionary, campaign.name),
-        parts=_parts(sizes),
-        files=len(sizes),
-        size=sum(sizes.values()),
-        computed=sum(size for path, size in sizes.items() if path.split("/")[0] in _COMPUTED),
-        cost=cost,
-        addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
-        example=(complete or incomplete)[0][0],
-        partial=[study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
-        self_affine=any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
-        sides=_known_of(surfaces, campaign.period, "{:.4g}".format),
-        grids=_known_of(surfaces, campaign.grid, str),
-        adhesive=any(material.surface_energy > 0 for material in campaign.materials.values()),
-        both_ways=any(study.unload or study.turning_points for study in campaign.studies.values()),
-        free=any(campaign.boundary(name) == "free" for name in campaign.surfaces),
-    )
-    return text.rstrip() + "\n"
+    return {
+        "designs": designs,
+        "partial": [study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
+        "incomplete": incomplete,
+        "example": (complete or incomplete)[0][0],
+        "checks": [_meant(check) for check in worst(checks)],
+        "failed": [check for check in checks if not check.passed and check.name != COMPLETED],
+        "known": known,
+        "count": _count_by_name(checks),
+        "passed": sum(check.passed for check in checks),
+        "total": len(checks),
+        "errors": model_errors(model_error) if model_error is not None else [],
+    }
+
+
+def _content(sizes: Mapping[str, int]) -> dict:
+    """The files and their bytes."""
+    return {
+        "parts": _parts(sizes),
+        "files": len(sizes),
+        "size": sum(sizes.values()),
+        "computed": sum(size for path, size in sizes.items() if path.split("/")[0] in _COMPUTED),
+    }
 
 
 def citation(publication: Publication) -> str:

@@ -1,10 +1,15 @@
-"""Bytes, times and lengths as people say them."""
+"""Numbers, bytes, times and lengths as people say them."""
 
 from __future__ import annotations
 
 import math
 
 _PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: ""}
+
+
+def counted(number: int, thing: str) -> str:
+    """`1 run`, `3 runs`."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 def size(count: float) -> str:

@@ -1,4 +1,4 @@
-"""What a reader finds in a file, and what readers of several formats need."""
+"""Heights as a reader finds them in a file, and what readers of several formats need."""
 
 from __future__ import annotations
 

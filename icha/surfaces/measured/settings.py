@@ -1,4 +1,4 @@
-"""What the numbers of a file mean and how they become a surface, as whoever measured it says."""
+"""Settings of a measured topography: what the numbers of its file mean, and how they become a surface."""
 
 from __future__ import annotations
 
