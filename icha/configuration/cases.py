@@ -47,20 +47,3 @@ def asperity_cases(campaign: Campaign) -> dict[str, float | None]:
     if campaign.one_asperity is None:
         return {}
     return {"hertz": None} | {f"mu{number_label(mu)}": mu for mu in campaign.one_asperity.tabor_parameters}
-
-
-def map_solution(campaign: Campaign) -> SolutionLabels | None:
-    """The finest boundary-element solution of the state that the contact map (figure 4) shows, if there is any."""
-    figure = campaign.figures.fig4_contact_map
-    snapshots = campaign.snapshots_of(figure.study) or [campaign.studies[figure.study].targets.last]
-    if figure.snapshot is not None:
-        kind, value = figure.snapshot.target
-    elif {kind for kind, _ in snapshots} == {"reduced_pressure"}:
-        kind, value = min(snapshots)  # the first one that is met
-    else:
-        return None
-    if kind != "reduced_pressure":
-        return None
-    run = figure.run(campaign)
-    found = [case for case in solution_cases(campaign) if case.run == run and case.reduced_pressure == value]
-    return max(found, key=lambda case: campaign.boundary_elements[case.entry].refinement, default=None)

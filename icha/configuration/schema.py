@@ -10,6 +10,7 @@ from pathlib import Path
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SURFACE_KINDS
+from icha.figures.registry import DECLARATIONS
 
 SCHEMA = Path("workflow/schemas/config.schema.json")
 README = Path("config/README.md")
@@ -39,6 +40,16 @@ def key_tables() -> str:
 
 
 _WITH_DEFAULTS = (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material", "Study")
+
+
+def _figure_headings() -> dict[str, str]:
+    """The options of figures, which several may share."""
+    sharing: dict[str, list[str]] = {}
+    for name, declaration in DECLARATIONS.items():
+        sharing.setdefault(declaration.options.__name__, []).append(f"`figures.{name}`")
+    return {options: ", ".join(names) for options, names in sharing.items()}
+
+
 _HEADINGS = {
     "Campaign": "Top level",
     "Defaults": "`defaults`",
@@ -60,18 +71,7 @@ _HEADINGS = {
     "Measurement": "`measurements.<name>`",
     "Column": "`measurements.<name>.load` and `.area`",
     "Figures": "`figures`",
-    "JKRFigure": "`figures.fig1_jkr`",
-    "StudyFigure": "`figures.fig2_area_and_gap`, `figures.fig5_multi_slope`, `figures.fig7_stiffness`",
-    "SnapshotFigure": "`figures.fig3_distributions`, `figures.fig8_patch_sizes`",
-    "MapFigure": "`figures.fig4_contact_map`",
-    "SlopesFigure": "`figures.fig6_spots_by_slope`",
-    "TaborFigure": "`figures.fig9_tabor`",
-    "ComparedFigure": "`figures.fig10_model_error`, `figures.fig11_distribution_error`",
-    "SourcesFigure": "`figures.fig12_error_sources`",
-    "LoopsFigure": "`figures.fig13_loops`",
-    "PullOffFigure": "`figures.fig14_pull_off`",
-    "LossFigure": "`figures.fig15_loss`",
-    "SnapMapFigure": "`figures.fig16_snap_map`",
+    **_figure_headings(),
     "Publication": "`publication`",
     "Author": "`publication.authors`, each",
     "Funding": "`publication.funding`, each",

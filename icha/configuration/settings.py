@@ -62,29 +62,6 @@ def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabel
     }
 
 
-def measurement_settings(campaign: Campaign, study: str) -> list[dict]:
-    """The measurements that belong to a study, as a figure needs them, but for their files."""
-    return [
-        {
-            "label": measurement.label,
-            "citation": measurement.citation,
-            "columns": measurement.columns,
-            "load_unit": _load_unit(campaign, measurement),
-            "material": measurement.material,
-            "rms_slope": measurement.rms_slope,
-        }
-        for measurement in campaign.measurements.values()
-        if measurement.study == study
-    ]
-
-
-def _load_unit(campaign, measurement) -> float:
-    """What a measured load is divided by to become p/(E* h'rms)."""
-    if not measurement.load_is_pressure:
-        return 1.0
-    return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
-
-
 def run_sha256(campaign: Campaign, case: RunLabels) -> str:
     """Checksum of everything that determines a run."""
     topography = campaign.topography(case.surface)

@@ -1,4 +1,4 @@
-"""Tables of measurements."""
+"""Tables of measurements: columns of CSV files."""
 
 from __future__ import annotations
 

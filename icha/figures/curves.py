@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from icha.analysis.common_loads import mean_curve, mean_way
 from icha.datasets.labels import RunLabels
 from icha.figures.scale import MOST_COLOURS, Scale, materials_scale, places_scale
 from icha.figures.select import path_steps, study_runs, ways_back
-from icha.figures.style import BLACK, COLOURS, GREY, MARKERS, line_look, material_label, slope_label
+from icha.figures.style import (
+    BLACK,
+    COLOURS,
+    GREY,
+    MARKERS,
+    legend_handle,
+    line_artist,
+    line_look,
+    material_label,
+    slope_label,
+)
 from icha.support.statistics import Ensemble
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"
 AREA_LABEL = r"contact area  $A/A_0$"
@@ -154,6 +165,8 @@ def draw_line(
     -------
     What was drawn: loads and values.
     """
+    from icha.analysis.common_loads import mean_curve
+
     members = [points(run) for run in line.runs]
     if len(members) > 1:
         load, over = mean_curve(members, logarithmic=logarithmic)
@@ -191,7 +204,7 @@ def band_handle(counts: Iterable[int]) -> Line2D:
     counts = sorted({count for count in counts if count > 1})
     words = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
     look = {"color": GREY, "alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
-    return Line2D([], [], label=f"mean and 95 % band, n = {words} seeds", **look)
+    return legend_handle(label=f"mean and 95 % band, n = {words} seeds", **look)
 
 
 def bars_handle(counts: Iterable[int]) -> dict[str, Line2D]:
@@ -200,7 +213,7 @@ def bars_handle(counts: Iterable[int]) -> dict[str, Line2D]:
     if not counts:
         return {}
     words = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
-    return {f"means of n = {words} seeds, bars 95 %": Line2D([], [], color=GREY, marker="|", ls="none", ms=8)}
+    return {f"means of n = {words} seeds, bars 95 %": legend_handle(color=GREY, marker="|", ls="none", ms=8)}
 
 
 def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
@@ -209,6 +222,8 @@ def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
     `panels` are axes, and load and value of a way as functions of its reduced pressure, contact area and reduced
     separation.
     """
+    from icha.analysis.common_loads import mean_way
+
     ways = [
         (leg["reduced_pressure"].values, leg["contact_area_fraction"].values, leg["reduced_separation"].values)
         for leg in line.back[0]
@@ -226,7 +241,7 @@ def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
 def draw_unloading(axes: Axes, load: np.ndarray, values: np.ndarray, colour: str) -> None:
     """Draw one way back of a run on logarithmic axes of load, where it is compressive; the axes keep their range."""
     # Just before separation loads are as small as can be.
-    axes.add_artist(Line2D(np.where(load > 0, load, np.nan), values, color=colour, **UNLOADING))
+    axes.add_artist(line_artist(np.where(load > 0, load, np.nan), values, color=colour, **UNLOADING))
 
 
 # More runs than this are named below the panels, and all lines if a panel had more names than this.

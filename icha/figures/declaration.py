@@ -1,7 +1,7 @@
 """The declaration of a figure: what a campaign may ask of it, and what it is drawn from.
 
-A module `fig<number>_<words>` of this folder is a figure. Its `FIGURE` is a `Figure`, its function `figure` draws it,
-and nothing else knows its name: `icha.figures.registry` finds it. Reading a configuration imports all of them, so that
+A module `fig<number>_<words>` of this folder is a figure: it has a `DECLARATION` and a function `figure` that draws it.
+Nothing else knows its name, for `icha.figures.registry` finds it. Reading a configuration imports all of them, so that
 they import libraries for drawing, and modules that need xarray, only where they draw.
 """
 
@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
+from icha.datasets import results
+from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, parts
 from icha.support.values import Problem, Section
 
 
@@ -37,31 +38,43 @@ class Campaign(Protocol):
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """The files of a campaign's results from which figures are drawn, below the folder of the results."""
+    """Paths of the results of a campaign from which figures are drawn: its folder of results, and its name."""
 
-    results: str
-    dataset: str
-    model_error: str
+    folder: str
+    campaign: str
+
+    def _path(self, pattern, **names) -> str:
+        return f"{self.folder}/{pattern.format(campaign=self.campaign, **names)}"
+
+    @property
+    def dataset(self) -> str:
+        """The campaign dataset."""
+        return self._path(results.DATASET)
+
+    @property
+    def model_error(self) -> str:
+        """The differences between the model and boundary elements."""
+        return self._path(results.MODEL_ERROR)
 
     def surface(self, run: RunLabels) -> str:
         """Topography of a run."""
-        return f"{self.results}/surfaces/{run.surface}/seed{run.seed}.nc"
+        return self._path(results.SURFACE, surface=run.surface, seed=run.seed)
 
     def theories(self, surface: str) -> str:
         """Theories for a surface."""
-        return f"{self.results}/references/{surface}.nc"
+        return self._path(results.THEORIES, surface=surface)
 
     def solution(self, labels: SolutionLabels) -> str:
         """A boundary-element solution."""
-        return f"{self.results}/references/boundary_elements/{labels.path}.nc"
+        return self._path(results.SOLUTION, **parts(labels))
 
     def loop(self, labels: ContactLabels) -> str:
         """Boundary elements both ways."""
-        return f"{self.results}/references/loops/{labels.path}.nc"
+        return self._path(results.LOOP, **parts(labels))
 
     def error_sources(self, labels: ContactLabels) -> str:
         """A study of the sources of the model's error."""
-        return f"{self.results}/references/error_sources/{labels.path}.nc"
+        return self._path(results.ERROR_SOURCES, **parts(labels))
 
 
 # Files by the names of the arguments that are read from them: one, or a list of them.
@@ -90,15 +103,15 @@ def dataset_only(campaign: Campaign, options: FigureOptions, files: ResultFiles)
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A figure that a campaign may ask for.
+class Declaration:
+    """What a figure is, but for its drawing.
 
     Parameters
     ----------
     description : what it shows, in a line, for those who write configurations.
     caption : what it shows, for those who look at it; printed in the report.
     options : the model of its section; its first line of documentation is part of the schema.
-    inputs : the files of its arguments. Datasets are read, of other files the paths are handed over.
+    inputs : the files of its arguments. Results are read; of other files the paths are handed over.
     arguments : arguments that the rest of the configuration gives, beside those of the options.
     holds_topography : whether it takes memory for arrays of the surface's size.
     """

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from icha.figures.curves import PRESSURE_LABEL, bars_handle
 from icha.figures.scale import MOST_COLOURS, places_scale
@@ -19,6 +16,7 @@ from icha.figures.style import (
     GREY,
     MARKERS,
     TWO_COLUMNS,
+    legend_handle,
     logarithmic_axes,
     material_label,
     new_figure,
@@ -26,6 +24,10 @@ from icha.figures.style import (
     slope_label,
 )
 from icha.support.statistics import ensemble
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
 
 # More surfaces than this, and every material has panels of its own.
 _MOST_LINES = 2
@@ -131,7 +133,7 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylim(*quantity.limits)
     if against_other:
-        named["against the energetic area"] = Line2D([], [], color=GREY, **_OTHER)
+        named["against the energetic area"] = legend_handle(color=GREY, **_OTHER)
     named |= bars_handle(counts)
     if scale:
         scale.draw(fig, panels.ravel().tolist())
@@ -153,6 +155,8 @@ def _count(lines, materials, places, own_rows):
 
 def interfaces_of(entries, materials):
     """Modulus, energy and range of the materials of all entries."""
+    import xarray as xr
+
     names = ("contact_modulus", "surface_energy", "interaction_range")
     found = {}
     for errors in entries.values():

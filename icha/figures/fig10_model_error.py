@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
-import xarray as xr
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
+from icha.figures.declaration import Declaration
 from icha.figures.errors import Quantity, draw_errors
+from icha.figures.options import ComparedFigure, model_error_only
 from icha.figures.style import styled
 
-CAPTION = (
-    "Error of the model: contact area and mean separation of ICHA over those of boundary elements, less one, in per "
-    "cent, against the reduced pressure F/(E* h'rms A0). Both press the same topographies with the same interaction "
-    "range; the boundary elements are an independent code, and their contact area is corrected by the perimeter of "
-    "the contact (Yastrebov et al., 2017). Points: mean over the seeds; bars: the 95 % confidence of that mean "
-    "(Student's t); open markers are without adhesion. With adhesion the contact is where the gap is zero, and a zone "
-    "around it attracts as well: dotted lines are errors against the energetic area, energy of adhesion over that of "
-    "full contact, which tends to the area of JKR sooner as the range vanishes. At the ranges of attraction that a "
-    "grid resolves boundary elements show practically no hysteresis between loading and unloading: with adhesion they "
-    "bound the error in the limit of short ranges (JKR), they do not prove it."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+DECLARATION = Declaration(
+    description=(
+        "Relative error of contact area and mean separation against boundary elements. The study needs "
+        "`boundary_elements`."
+    ),
+    caption=(
+        "Error of the model: contact area and mean separation of ICHA over those of boundary elements, less one, in "
+        "per cent, against the reduced pressure F/(E* h'rms A0). Both press the same topographies with the same "
+        "interaction range; the boundary elements are an independent code, and their contact area is corrected by the "
+        "perimeter of the contact (Yastrebov et al., 2017). Points: mean over the seeds; bars: the 95 % confidence of "
+        "that mean (Student's t); open markers are without adhesion. With adhesion the contact is where the gap is "
+        "zero, and a zone around it attracts as well: dotted lines are errors against the energetic area, energy of "
+        "adhesion over that of full contact, which tends to the area of JKR sooner as the range vanishes. At the "
+        "ranges of attraction that a grid resolves boundary elements show practically no hysteresis between loading "
+        "and unloading: with adhesion they bound the error in the limit of short ranges (JKR), they do not prove it."
+    ),
+    options=ComparedFigure,
+    inputs=model_error_only,
 )
 
 QUANTITIES = (

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
+from pydantic import Field
 
+from icha.datasets.labels import ContactLabels
 from icha.figures.curves import PRESSURE_LABEL
+from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs, ResultFiles
 from icha.figures.style import (
     BLACK,
     BLUE,
@@ -24,18 +26,68 @@ from icha.figures.style import (
     panel_label,
     styled,
 )
-from icha.references.error_sources import effects, relative_radius, shape_ratio, shape_ratio_of_fourth_order
+from icha.support.values import Name, Problem, unknown
 
-CAPTION = (
-    "Where the model's error comes from: between ICHA and boundary elements (BEM) one thing is switched at a time, on "
-    "the same topographies, without adhesion. (a) Contact area and (b) mean separation over those of boundary elements "
-    "on the true topography, against the reduced pressure F/(E* h'rms A0); paraboloids: boundary elements on the upper "
-    "envelope of the summits' paraboloids instead of the topography. (c) What every step from boundary elements to the "
-    "model adds to the logarithm of the area; the steps add up to the black line. (d) Spots of one summit: area of the "
-    "patch over Hertz's area at the patch's own force, against the patch's radius a times the wave number q = (mean "
-    "q^4 / mean q^2)^(1/2) of the surface; line: medians; dashed: medians of what the summits' fourth-order terms "
-    "alone give; a few points lie above the frame. In (a) and (b) mean and standard deviation over the seeds; in (c) "
-    "means."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class SourcesFigure(FigureOptions):
+    """A figure of where the model's error comes from."""
+
+    entry: Name = Field(description="Name of the entry of `error_sources` that is drawn: its runs without adhesion.")
+
+    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
+        """The one beside which the entry stands."""
+        return (campaign.error_sources[self.entry].study,)
+
+    def arguments(self) -> dict[str, Any]:
+        """Files only."""
+        return {}
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """What keeps the runs without adhesion of the entry from differing in their seeds only."""
+        yield from unknown(("entry",), self.entry, campaign.error_sources)
+        entry = campaign.error_sources.get(self.entry)
+        if entry is None or entry.study not in campaign.studies:
+            return
+        contacts = campaign.solved(entry)
+        bare = [each for each in contacts if campaign.materials[each.material].surface_energy == 0]
+        for what, asked in (
+            ("surface", [each.surface for each in contacts]),
+            ("rms slope", [each.rms_slope for each in contacts]),
+            ("material without adhesion", [each.material for each in bare]),
+        ):
+            there = list(dict.fromkeys(asked))
+            if len(there) != 1:
+                listed = f" ({', '.join(map(str, there))})" if there else ""
+                reason = f"has not one {what} but {len(there)}{listed}; allowed: an entry with one, and any seeds"
+                yield ("entry",), self.entry, reason
+
+
+def inputs(campaign: Campaign, options: SourcesFigure, files: ResultFiles) -> Inputs:
+    """The entry's runs without adhesion."""
+    labels = [ContactLabels(options.entry, *each) for each in campaign.solved(campaign.error_sources[options.entry])]
+    bare = [each for each in labels if campaign.materials[each.material].surface_energy == 0]
+    return {"error_sources": [files.error_sources(each) for each in bare]}
+
+
+DECLARATION = Declaration(
+    description="From the model to boundary elements, one thing at a time.",
+    caption=(
+        "Where the model's error comes from: between ICHA and boundary elements (BEM) one thing is switched at a time, "
+        "on the same topographies, without adhesion. (a) Contact area and (b) mean separation over those of boundary "
+        "elements on the true topography, against the reduced pressure F/(E* h'rms A0); paraboloids: boundary elements "
+        "on the upper envelope of the summits' paraboloids instead of the topography. (c) What every step from "
+        "boundary elements to the model adds to the logarithm of the area; the steps add up to the black line. (d) "
+        "Spots of one summit: area of the patch over Hertz's area at the patch's own force, against the patch's radius "
+        "a times the wave number q = (mean q^4 / mean q^2)^(1/2) of the surface; line: medians; dashed: medians of "
+        "what the summits' fourth-order terms alone give; a few points lie above the frame. In (a) and (b) mean and "
+        "standard deviation over the seeds; in (c) means."
+    ),
+    options=SourcesFigure,
+    inputs=inputs,
 )
 
 LOOKS = {
@@ -120,6 +172,8 @@ def _draw_ratios(ax, error_sources, name):
 
 
 def _draw_effects(ax, error_sources):
+    from icha.references.error_sources import effects
+
     mean = sum(effects(one) for one in error_sources) / len(error_sources)
     p = mean["reduced_pressure"].values
     place = np.arange(len(p))
@@ -140,6 +194,8 @@ def _draw_effects(ax, error_sources):
 
 
 def _draw_single_spots(ax, error_sources):
+    from icha.references.error_sources import relative_radius, shape_ratio, shape_ratio_of_fourth_order
+
     x, ratio, expected = (
         np.concatenate([quantity(one)[one["pair_patch_nodes"].values >= _LEAST_NODES] for one in error_sources])
         for quantity in (relative_radius, shape_ratio, shape_ratio_of_fourth_order)

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from pydantic import Field
 
-from icha.analysis.common_loads import mean_way
-from icha.analysis.model_error import run_of_same_contact
-from icha.datasets.labels import RunLabels
+from icha.datasets.labels import ContactLabels, RunLabels
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, band_handle, draw_band
+from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
 from icha.figures.hysteresis import (
     BRANCH_DASHES,
     Lines,
@@ -22,22 +18,57 @@ from icha.figures.hysteresis import (
     pull_off_step,
     unloaded_runs,
 )
+from icha.figures.options import StudyFigure, not_unloaded
 from icha.figures.select import branches, pick
-from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, slope_label, styled
+from icha.figures.style import GREY, TWO_COLUMNS, legend_handle, new_figure, panel_label, slope_label, styled
 from icha.support.statistics import Ensemble
+from icha.support.values import Label, Problem, Seed
 
-CAPTION = (
-    "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over nominal "
-    "area against the reduced pressure, on the way in (solid) and on the way back (dashed); tension is negative. "
-    "Symbols with a black edge: pull-off, the largest tension on the last way back, where there is any; where slopes "
-    "share a panel, symbols without it mark where the first way in ends. Insets enlarge the surroundings of zero load "
-    "where the tension is small beside the largest load. The energy lost per nominal area is the area between the "
-    "ways, of the pressure against the mean separation. Where several seeds are drawn the lines are means at common "
-    "displacements from the turning point, with the 95 % band of confidence of the mean (Student's t), and the marks "
-    "means over the seeds. Steps are jumps of single spots or of several. Dots and rings, where given: boundary "
-    "elements, an independent code, at some of their states, of the same topography, half-space and range of "
-    "attraction, dots on the way in and rings on the way back, with the area corrected by the perimeter of the "
-    "contact."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class LoopsFigure(StudyFigure):
+    """A figure of the runs of a study both ways, for one topography."""
+
+    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
+    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """A study that does not come back is one more."""
+        yield from super().problems(campaign)
+        yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
+
+
+def inputs(campaign: Campaign, options: LoopsFigure, files: ResultFiles) -> Inputs:
+    """The runs, and boundary elements both ways beside them, if there are any."""
+    loops = [
+        files.loop(ContactLabels(label, *contact))
+        for label, entry in campaign.boundary_element_loops.items()
+        if entry.study == options.study
+        for contact in campaign.solved(entry)
+    ]
+    return {"campaign": files.dataset} | ({"loops": loops} if loops else {})
+
+
+DECLARATION = Declaration(
+    description="Pressure and contact area against mean separation, both ways.",
+    caption=(
+        "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over "
+        "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed); tension is "
+        "negative. Symbols with a black edge: pull-off, the largest tension on the last way back, where there is any; "
+        "where slopes share a panel, symbols without it mark where the first way in ends. Insets enlarge the "
+        "surroundings of zero load where the tension is small beside the largest load. The energy lost per nominal "
+        "area is the area between the ways, of the pressure against the mean separation. Where several seeds are drawn "
+        "the lines are means at common displacements from the turning point, with the 95 % band of confidence of the "
+        "mean (Student's t), and the marks means over the seeds. Steps are jumps of single spots or of several. Dots "
+        "and rings, where given: boundary elements, an independent code, at some of their states, of the same "
+        "topography, half-space and range of attraction, dots on the way in and rings on the way back, with the area "
+        "corrected by the perimeter of the contact."
+    ),
+    options=LoopsFigure,
+    inputs=inputs,
 )
 
 # More loops than this in one panel, and every slope has panels of its own.
@@ -79,6 +110,8 @@ class _Way(NamedTuple):
 
 def _ways(runs):
     """The legs of a run; of several seeds their means at common separations."""
+    from icha.analysis.common_loads import mean_way
+
     legs = [list(branches(run)) for run in runs]
     if len(runs) == 1 or len({len(own) for own in legs}) > 1:
         return [_Way(name, *(leg[axis].values for axis in _COLUMNS), {}) for own in legs for name, leg in own]
@@ -118,6 +151,8 @@ def figure(
         If there is no such study, surface or seed, no run was unloaded, or boundary elements belong to no run of the
         study.
     """
+    from matplotlib.ticker import MaxNLocator
+
     runs = unloaded_runs(campaign, study)
     surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
     truths = _truths(study, runs, loops or ())
@@ -201,6 +236,8 @@ def _mean_point(states, axis):
 
 def _enlarge(left, right, loops):
     """Insets around zero load, if the tension is there but small."""
+    from matplotlib.ticker import MaxNLocator
+
     ways = [way for loop in loops for way in loop.ways]
     pressures = np.concatenate([way.reduced_pressure for way in ways])
     tension = -pressures.min()
@@ -235,23 +272,25 @@ def _handles(lines, rows, runs, truths):
     """What the legend shows, by name."""
     handles = lines.handles(**_LOOP)
     if len(rows[0]) == 1:
-        handles = {name: Line2D([], [], color=handle.get_color(), **_LOOP) for name, handle in handles.items()}
+        handles = {name: legend_handle(color=handle.get_color(), **_LOOP) for name, handle in handles.items()}
     for branch, dashes in BRANCH_DASHES.items():
-        handles[branch] = Line2D([], [], color=GREY, ls=dashes, **_LOOP)
+        handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
     counts = [len(members) for members in runs.values()]
     if max(counts) > 1:
         band = band_handle(counts)
         handles[band.get_label()] = band
     if any(pull_off_step(run) is not None for members in runs.values() for run in members):
-        handles["pull-off"] = Line2D([], [], marker="o", mfc=GREY, **_PULL_OFF)
+        handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
     if any(labels in truths for labels in runs):
         for branch, face, size in (("loading", GREY, _DOT), ("unloading", "none", _RING)):
-            handles[f"boundary elements, {branch}"] = Line2D([], [], mec=GREY, mfc=face, ms=size, **_TRUTH)
+            handles[f"boundary elements, {branch}"] = legend_handle(mec=GREY, mfc=face, ms=size, **_TRUTH)
     return handles
 
 
 def _truths(study, runs, loops):
     """The boundary elements of every run of a study that has some, by its labels."""
+    from icha.analysis.model_error import run_of_same_contact
+
     found = {}
     for loop in loops:
         try:

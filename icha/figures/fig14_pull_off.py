@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
+from pydantic import Field
 
 from icha.figures.curves import bars_handle
+from icha.figures.declaration import Campaign, Declaration
 from icha.figures.hysteresis import (
     Lines,
     averages,
@@ -18,6 +18,7 @@ from icha.figures.hysteresis import (
     legend_below,
     several,
 )
+from icha.figures.options import StudyFigure, not_unloaded, studies_problems
 from icha.figures.select import pick
 from icha.figures.style import (
     GREY,
@@ -30,16 +31,49 @@ from icha.figures.style import (
     styled,
     unit_for,
 )
+from icha.support.values import Problem, list_of_names
 
-CAPTION = (
-    "Pull-off, the largest tension on the way back to complete separation, against the rms slope (a) and, where "
-    "studies of several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached before "
-    "(b). It is drawn as nominal pressure, or over the strength of the interface (the largest attraction of the "
-    "Lennard-Jones traction), or over all summits pulling their most, 3/2 pi dgamma R, at once; the axis says which. "
-    "Points are means over the seeds, bars the 95 % confidence of that mean (Student's t) where there are several "
-    "seeds. Without adhesion (open markers) there is no pull-off. Where the values span decades the axis is "
-    "logarithmic down to the decade of the smallest, and linear from there to zero. Runs that were not separated "
-    "completely are left out."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class PullOffFigure(StudyFigure):
+    """A figure of the pull-off of all runs of some studies."""
+
+    load_studies: list_of_names("Studies that differ in their largest load.") | None = Field(
+        default=None, description="Names of studies that differ in their largest load, for a second panel."
+    )
+    quantity: Literal["pull_off_pressure", "pull_off_over_strength", "pull_off_over_summits"] = Field(
+        default="pull_off_pressure",
+        description="What is drawn: the largest tension, or its part of the interface's strength or of what all "
+        "asperities could pull at once.",
+    )
+
+    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
+        """Those of both panels."""
+        return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """Studies of the second panel that are not there, and studies that do not come back, are more."""
+        yield from studies_problems(campaign, "load_studies", self.load_studies or ())
+        yield from super().problems(campaign)
+        yield from not_unloaded(campaign, ("study",), self.study, in_part=False)
+
+
+DECLARATION = Declaration(
+    description="Pull-off against rms slope, and against the largest load.",
+    caption=(
+        "Pull-off, the largest tension on the way back to complete separation, against the rms slope (a) and, where "
+        "studies of several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached "
+        "before (b). It is drawn as nominal pressure, or over the strength of the interface (the largest attraction of "
+        "the Lennard-Jones traction), or over all summits pulling their most, 3/2 pi dgamma R, at once; the axis says "
+        "which. Points are means over the seeds, bars the 95 % confidence of that mean (Student's t) where there are "
+        "several seeds. Without adhesion (open markers) there is no pull-off. Where the values span decades the axis "
+        "is logarithmic down to the decade of the smallest, and linear from there to zero. Runs that were not "
+        "separated completely are left out."
+    ),
+    options=PullOffFigure,
 )
 
 _QUANTITIES = {
@@ -74,6 +108,8 @@ def figure(
     ValueError
         If there is no such study or quantity, or no run of a study was unloaded to complete separation.
     """
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     pick("quantity", quantity, list(_QUANTITIES))
     by_slope, by_load = {}, {}
     for labels, run in detached_runs_of(campaign, [study]):

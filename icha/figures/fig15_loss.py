@@ -2,33 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
-from scipy.stats import linregress
+from pydantic import Field
 
 from icha.figures.curves import bars_handle
+from icha.figures.declaration import Campaign, Declaration, FigureOptions
 from icha.figures.hysteresis import Lines, averages, detached_runs_of, draw_averages, legend_below, several
+from icha.figures.options import studies_problems
 from icha.figures.select import NothingToDraw
 from icha.figures.style import GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
+from icha.support.values import Flag, Problem, list_of_names
 
-CAPTION = (
-    "(a) Hysteresis loss, the energy per nominal area that a path from first contact to the largest load and back to "
-    "separation dissipates, against the contact area over the nominal area, the largest on the path. Points: means "
-    "over the seeds, bars the 95 % confidence of that mean (Student's t) where there are several seeds. Lines: least "
-    "squares of a straight line through the points that differ in their largest load only, three at least; the legend "
-    "gives its coefficient of determination r² and the exponent of a power law through the same points, 1 where the "
-    "loss is proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found it to grow linearly). The "
-    "axes are logarithmic where both quantities span decades. Runs without adhesion have no value where the loss is "
-    "drawn over the surface energy, and are left out there. (b) What the loss consists of at the largest load of "
-    "every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and their undoing (a property "
-    "of the model, of either sign), jumps at controlled load, and what none of them explains; parts are over the sum "
-    "of their magnitudes, and those below zero are gains. Bars carry the markers of (a). Runs that were not separated "
-    "completely are left out."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class LossFigure(FigureOptions):
+    """A figure of the energy lost in the runs of some studies."""
+
+    studies: list_of_names("Studies that are drawn; those that differ in their largest load only make up the lines.")
+    over_surface_energy: Flag = Field(
+        default=True, description="Whether the loss is drawn over the surface energy, or in J/m²."
+    )
+
+    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
+        """All of them."""
+        return tuple(dict.fromkeys(self.studies))
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """Studies that are not there, or do not come back."""
+        yield from studies_problems(campaign, "studies", self.studies)
+
+
+DECLARATION = Declaration(
+    description="Energy lost in a loop against contact area, and what it was lost in.",
+    caption=(
+        "(a) Hysteresis loss, the energy per nominal area that a path from first contact to the largest load and back "
+        "to separation dissipates, against the contact area over the nominal area, the largest on the path. Points: "
+        "means over the seeds, bars the 95 % confidence of that mean (Student's t) where there are several seeds. "
+        "Lines: least squares of a straight line through the points that differ in their largest load only, three at "
+        "least; the legend gives its coefficient of determination r² and the exponent of a power law through the same "
+        "points, 1 where the loss is proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found it "
+        "to grow linearly). The axes are logarithmic where both quantities span decades. Runs without adhesion have no "
+        "value where the loss is drawn over the surface energy, and are left out there. (b) What the loss consists of "
+        "at the largest load of every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and "
+        "their undoing (a property of the model, of either sign), jumps at controlled load, and what none of them "
+        "explains; parts are over the sum of their magnitudes, and those below zero are gains. Bars carry the markers "
+        "of (a). Runs that were not separated completely are left out."
+    ),
+    options=LossFigure,
 )
 
 # Parts of the loss, with the look of their bars: none has the colour of a material.
@@ -76,6 +102,8 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
         If there is no such study, no run of a study was unloaded to complete separation, or none has adhesion where
         the loss is over the surface energy.
     """
+    from matplotlib.patches import Patch
+
     studies = several("studies", studies)
     # Of every line the runs of every study, by seed.
     runs: dict[tuple, dict[str, dict[int, xr.Dataset]]] = {}
@@ -132,6 +160,8 @@ def _point(run, quantity):
 
 def linear_fit(x: np.ndarray, y: np.ndarray) -> LinearFit | None:
     """Least squares through points; None of fewer than three different x."""
+    from scipy.stats import linregress
+
     if len(np.unique(x)) < _LEAST_POINTS:
         return None
     line = linregress(x, y)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
 from icha.figures.curves import SEPARATION_LABEL
-from icha.figures.fig4_contact_map import _means, _show_whole
+from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
 from icha.figures.hysteresis import BRANCH_DASHES, legend_below
-from icha.figures.select import NothingToDraw, check_topography, pick_run, ways_back
+from icha.figures.maps import block_means, draw_whole
+from icha.figures.options import RunFigure, not_unloaded
+from icha.figures.select import NothingToDraw, run_on_topography, ways_back
 from icha.figures.style import (
     BLACK,
     BLUE,
@@ -21,6 +20,7 @@ from icha.figures.style import (
     GREY,
     TWO_COLUMNS,
     VERMILLION,
+    legend_handle,
     logarithmic_axes,
     material_label,
     new_figure,
@@ -29,14 +29,41 @@ from icha.figures.style import (
     styled,
     unit_for,
 )
+from icha.support.values import Problem
 
-CAPTION = (
-    "(a) Where spots formed on the first way in and where they broke on the last way back, over the topography of one "
-    "period (the highest parts are white). With adhesion a spot forms by a jump into contact and breaks by a jump "
-    "off; without adhesion it forms and breaks where the surfaces touch, without a jump. Unions of two spots, and "
-    "united spots that fell back into their asperities, are marked at the centre of the united spot. The numbers in "
-    "the legend count the marks. (b) How many such events there have been on the way in (solid, from the right) and "
-    "on the way back (dashed, from the left), against the mean separation, of every kind that occurred there."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class SnapMapFigure(RunFigure):
+    """A figure of the events of one run; what is left out is the study's first."""
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """A study that does not come back is one more."""
+        yield from super().problems(campaign)
+        yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
+
+
+def inputs(campaign: Campaign, options: SnapMapFigure, files: ResultFiles) -> Inputs:
+    """The runs, and the topography of the one that is drawn."""
+    return {"campaign": files.dataset, "surface": files.surface(options.run(campaign))}
+
+
+DECLARATION = Declaration(
+    description="Where and when spots of one run snap into and out of contact.",
+    caption=(
+        "(a) Where spots formed on the first way in and where they broke on the last way back, over the topography of "
+        "one period (the highest parts are white). With adhesion a spot forms by a jump into contact and breaks by a "
+        "jump off; without adhesion it forms and breaks where the surfaces touch, without a jump. Unions of two spots, "
+        "and united spots that fell back into their asperities, are marked at the centre of the united spot. The "
+        "numbers in the legend count the marks. (b) How many such events there have been on the way in (solid, from "
+        "the right) and on the way back (dashed, from the left), against the mean separation, of every kind that "
+        "occurred there."
+    ),
+    options=SnapMapFigure,
+    inputs=inputs,
+    holds_topography=True,
 )
 
 
@@ -87,24 +114,35 @@ def figure(
         If there is no such run, it was not unloaded, or the surface is another one's.
     """
     asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
-    labels, run = pick_run(campaign, study, **asked)
+    labels, run = run_on_topography(campaign, study, surface, **asked)
     if not ways_back(run):
         raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
-    period = float(run["period"])
-    check_topography(labels, run, surface)
-    adhesive = float(run["surface_energy"]) > 0
     events = _events(run)
-
     fig = new_figure(TWO_COLUMNS, 3.1)
     where, when = fig.subplots(1, 2, width_ratios=(1.3, 1))
+    handles = _draw_places(where, run, surface, events)
+    _draw_counts(when, events)
+    title = f"{material_label(campaign[study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
+    when.set_title(title, loc="right", fontsize="small")
+    for ax, letter in ((where, "a"), (when, "b")):
+        panel_label(ax, letter)
+    handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
+    legend_below(fig, handles, columns=3)
+    return fig
+
+
+def _draw_places(ax, run, surface, events):
+    """Draw events over the topography; returns what the legend shows, by name."""
+    adhesive = float(run["surface_energy"]) > 0
     heights = surface["height"].transpose("y", "x").values * float(run["rms_height"]) / float(surface["rms_height"])
+    period = float(run["period"])
     length, length_unit = unit_for(period, "m")
     height, height_unit = unit_for(float(np.abs(heights).max()), "m")
     highest = float(np.abs(heights).max()) * height
     side = period * length
     # Light, so that the marks show.
     look = {"origin": "lower", "cmap": "gray", "vmin": -2.2 * highest, "vmax": highest}
-    image = _show_whole(where, _means(heights) * height, len(heights), side, **look)
+    image = draw_whole(ax, block_means(heights) * height, len(heights), side, **look)
     marks = {
         name: np.flatnonzero((events["kind"] == name) & (events["branch"] == kind.branch))
         for name, kind in _KINDS.items()
@@ -116,39 +154,38 @@ def figure(
         # A ring around a dot: a spot that formed and broke at the same place.
         ring = 1.6 if name == "jump_off" else 1.0
         look = {"ls": "none", "ms": ring * size, "mew": 0.9} | kind.look
-        (points,) = where.plot(events["x"][own] * length, events["y"][own] * length, **look)
+        (points,) = ax.plot(events["x"][own] * length, events["y"][own] * length, **look)
         if len(own):
             handles[f"{kind.names[0 if adhesive else 1]} ({len(own)})"] = points
-    where.set_xlim(0, side)
-    where.set_ylim(0, side)
-    where.set_xlabel(f"x ({length_unit})")
-    where.set_ylabel(f"y ({length_unit})")
-    where.tick_params(direction="out", top=False, right=False)
-    bar = fig.colorbar(image, ax=where, shrink=0.9, pad=0.02, aspect=28)
+    ax.set_xlim(0, side)
+    ax.set_ylim(0, side)
+    ax.set_xlabel(f"x ({length_unit})")
+    ax.set_ylabel(f"y ({length_unit})")
+    ax.tick_params(direction="out", top=False, right=False)
+    bar = ax.figure.colorbar(image, ax=ax, shrink=0.9, pad=0.02, aspect=28)
     bar.set_label(f"height ({height_unit})")
     bar.ax.set_ylim(-highest, highest)
+    return handles
+
+
+def _draw_counts(ax, events):
+    """Draw how many events of every kind there have been on every branch."""
+    from matplotlib.ticker import MaxNLocator
 
     for name, kind in _KINDS.items():
         for branch, dashes in BRANCH_DASHES.items():
             own = (events["kind"] == name) & (events["branch"] == branch)
             if own.any():
-                _draw_count(when, events["separation"][own], color=kind.look["mec"], ls=dashes, lw=1.1)
-    most = max((line.get_ydata()[-1] for line in when.get_lines()), default=1)
+                _draw_count(ax, events["separation"][own], color=kind.look["mec"], ls=dashes, lw=1.1)
+    most = max((line.get_ydata()[-1] for line in ax.get_lines()), default=1)
     if most > _FEW:
-        logarithmic_axes(when, "y")
-        when.set_ylim(bottom=0.8)
+        logarithmic_axes(ax, "y")
+        ax.set_ylim(bottom=0.8)
     else:
-        when.set_ylim(0, 1.06 * most)
-        when.yaxis.set_major_locator(MaxNLocator(integer=True))
-    when.set_xlabel(SEPARATION_LABEL)
-    when.set_ylabel("events so far")
-    title = f"{material_label(campaign[study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
-    when.set_title(title, loc="right", fontsize="small")
-    for ax, letter in ((where, "a"), (when, "b")):
-        panel_label(ax, letter)
-    handles |= {name: Line2D([], [], color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
-    legend_below(fig, handles, columns=3)
-    return fig
+        ax.set_ylim(0, 1.06 * most)
+        ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_xlabel(SEPARATION_LABEL)
+    ax.set_ylabel("events so far")
 
 
 def _events(run):

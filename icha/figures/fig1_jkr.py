@@ -2,24 +2,50 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.figure import Figure
+from pydantic import Field
 
-from icha.asperity.jkr import JKR
-from icha.asperity.material import Material
+from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs, ResultFiles
 from icha.figures.style import BLUE, GREY, TWO_COLUMNS, VERMILLION, new_figure, panel_label, styled
+from icha.support.values import Positive
 
-CAPTION = (
-    "Force F (a) and contact radius a (b) of one asperity against its approach δ by the theory of Johnson, Kendall and "
-    "Roberts, for a Tabor parameter of 3. On loading (solid) the asperity snaps into contact at A, where the gap falls "
-    "to Wu's jump-in distance; on unloading (dashed) it follows the stable branch to C, the jump-off point, and "
-    "detaches. B is the pull-off point under load control. Dotted: unstable branch. Negative forces are tensile."
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class JKRFigure(FigureOptions):
+    """The force-approach curve of one asperity."""
+
+    tabor_parameter: Positive = Field(default=3.0, description="Tabor parameter, which sets the jump-in distance.")
+
+
+def no_inputs(campaign: Campaign, options: JKRFigure, files: ResultFiles) -> Inputs:
+    """Nothing: the law is drawn for one asperity."""
+    return {}
+
+
+DECLARATION = Declaration(
+    description="Force and radius of one asperity against approach.",
+    caption=(
+        "Force F (a) and contact radius a (b) of one asperity against its approach δ by the theory of Johnson, Kendall "
+        "and Roberts, for a Tabor parameter of 3. On loading (solid) the asperity snaps into contact at A, where the "
+        "gap falls to Wu's jump-in distance; on unloading (dashed) it follows the stable branch to C, the jump-off "
+        "point, and detaches. B is the pull-off point under load control. Dotted: unstable branch. Negative forces are "
+        "tensile."
+    ),
+    options=JKRFigure,
+    inputs=no_inputs,
 )
 
 
 @styled
 def figure(*, tabor_parameter: float = 3.0) -> Figure:
     """Draw the law in its own units, a in (Δγ R²/E*)^(1/3), δ in (Δγ² R/E*²)^(1/3) and F in Δγ R."""
+    from icha.asperity.jkr import JKR
+    from icha.asperity.material import Material
+
     law = JKR(Material(contact_modulus=1.0, surface_energy=1.0, interaction_range=1 / tabor_parameter))
     R = 1.0
     jump_in, jump_off = float(law.jump_in_approach(R)), float(law.jump_off_approach(R))

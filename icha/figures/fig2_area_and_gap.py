@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from icha.figures.curves import (
     AREA_LABEL,
@@ -18,25 +17,43 @@ from icha.figures.curves import (
     say_whose_theories,
     study_curves,
 )
+from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.options import StudyFigure, is_compared
 from icha.figures.select import study_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
 
-CAPTION = (
-    "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
-    "F/(E* h'rms A0), on double logarithmic axes. Markers: ICHA, one for each stop of the loading path; open markers "
-    "are without adhesion. Where there are several seeds the lines are means over them at common loads, with the 95 % "
-    "band of confidence of the mean (Student's t). Thin dashed lines, where there are any: the way back, unloading, "
-    "while the load is compressive. Upright crosses, where there are any: boundary elements, an independent code, on "
-    "the same topographies (means over their seeds) and with the same interaction range, in the colour of the "
-    "material; their area is corrected by the perimeter of the contact. At the ranges that a grid resolves they show "
-    "practically no hysteresis, so that with adhesion they bound the limit of short ranges (JKR), and do not prove "
-    "it. Lines: adhesionless theories of Persson (area) and of Yang and Persson (separation), the linear law of Bush, "
-    "Gibson and Thomas where few summits touch, and the theories of separate summits of Greenwood and Williamson (no "
-    "adhesion) and of Fuller and Tabor (with adhesion, in the colour of the material), with the spectral moments of "
-    "the surface, of several the first one. "
-    "Oblique crosses: adhesionless Green's function molecular dynamics (GFMD) of other surfaces (H = "
-    "0.8, q1/q0 = 100, no roll-off), reduced from published data."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+def inputs(campaign: Campaign, options: StudyFigure, files: ResultFiles) -> Inputs:
+    """The runs, theories for their first surface, and boundary elements beside them, if there are any."""
+    found = {"campaign": files.dataset, "references": files.theories(campaign.studies[options.study].surfaces[0])}
+    return found | ({"model_error": files.model_error} if is_compared(campaign, options.study) else {})
+
+
+DECLARATION = Declaration(
+    description="Contact area and mean separation against load, with theories.",
+    caption=(
+        "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
+        "F/(E* h'rms A0), on double logarithmic axes. Markers: ICHA, one for each stop of the loading path; open "
+        "markers are without adhesion. Where there are several seeds the lines are means over them at common loads, "
+        "with the 95 % band of confidence of the mean (Student's t). Thin dashed lines, where there are any: the way "
+        "back, unloading, while the load is compressive. Upright crosses, where there are any: boundary elements, an "
+        "independent code, on the same topographies (means over their seeds) and with the same interaction range, in "
+        "the colour of the material; their area is corrected by the perimeter of the contact. At the ranges that a "
+        "grid resolves they show practically no hysteresis, so that with adhesion they bound the limit of short ranges "
+        "(JKR), and do not prove it. Lines: adhesionless theories of Persson (area) and of Yang and Persson "
+        "(separation), the linear law of Bush, Gibson and Thomas where few summits touch, and the theories of separate "
+        "summits of Greenwood and Williamson (no adhesion) and of Fuller and Tabor (with adhesion, in the colour of "
+        "the material), with the spectral moments of the surface, of several the first one. Oblique crosses: "
+        "adhesionless Green's function molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no "
+        "roll-off), reduced from published data."
+    ),
+    options=StudyFigure,
+    inputs=inputs,
 )
 
 
@@ -66,6 +83,8 @@ def figure(
     ValueError
         If there is no such study or no run in it.
     """
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
     curves = study_curves(campaign, study)
     fig = new_figure(TWO_COLUMNS, 3.3)
     left, right = fig.subplots(1, 2)

@@ -3,29 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
 
-from icha.analysis.model_error import state_of
 from icha.figures.curves import band_handle, draw_mean, material_looks
+from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.options import SnapshotFigure, is_compared
 from icha.figures.select import first_line, name_of_place, snapshot_label, study_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
-from icha.references.persson import persson_pressure_density
 from icha.support.statistics import ensemble
 
-CAPTION = (
-    "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure p "
-    "(b), at the load given in the figure; open markers are without adhesion. Where there are several seeds the lines "
-    "are means over them, with the 95 % band of confidence of the mean (Student's t). Gaps are in units of the rms "
-    "height, pressures of E* h'rms. Only contact carries pressure in this model, so the integral of (b) is A/A0 and "
-    "that of (a) is 1 - A/A0 less the overlap fraction; adhesion gives the tensile tail at negative pressures. Broad "
-    "pale lines, where there are any: boundary elements, an independent code, on the same topographies (means over "
-    "those seeds that have them) and with the same interaction range, in the colour of the material; gaps out of "
-    "contact and pressures in contact. At the ranges that a grid resolves they show practically no hysteresis, so "
-    "that with adhesion they bound the limit of short ranges (JKR), and do not prove it. Line: Persson's theory of "
-    "adhesionless contact."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+def inputs(campaign: Campaign, options: SnapshotFigure, files: ResultFiles) -> Inputs:
+    """The runs, and boundary elements beside them, if there are any."""
+    compared = {"model_error": files.model_error} if is_compared(campaign, options.study) else {}
+    return {"campaign": files.dataset} | compared
+
+
+DECLARATION = Declaration(
+    description="Distributions of gap and pressure of every material, on the study's first surface.",
+    caption=(
+        "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure "
+        "p (b), at the load given in the figure; open markers are without adhesion. Where there are several seeds the "
+        "lines are means over them, with the 95 % band of confidence of the mean (Student's t). Gaps are in units of "
+        "the rms height, pressures of E* h'rms. Only contact carries pressure in this model, so the integral of (b) is "
+        "A/A0 and that of (a) is 1 - A/A0 less the overlap fraction; adhesion gives the tensile tail at negative "
+        "pressures. Broad pale lines, where there are any: boundary elements, an independent code, on the same "
+        "topographies (means over those seeds that have them) and with the same interaction range, in the colour of "
+        "the material; gaps out of contact and pressures in contact. At the ranges that a grid resolves they show "
+        "practically no hysteresis, so that with adhesion they bound the limit of short ranges (JKR), and do not prove "
+        "it. Line: Persson's theory of adhesionless contact."
+    ),
+    options=SnapshotFigure,
+    inputs=inputs,
 )
 
 # Sampled gaps per plotted point: bins with less are joined with their neighbours.
@@ -59,6 +74,9 @@ def figure(
     ValueError
         If there is no such study or snapshot.
     """
+    from icha.analysis.model_error import state_of
+    from icha.references.persson import persson_pressure_density
+
     lines = first_line(campaign, study, kind, target)
     looks, scale = material_looks(campaign[study].to_dataset(), [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)

@@ -2,28 +2,72 @@
 
 from __future__ import annotations
 
-import numpy as np
-import xarray as xr
-from matplotlib.colors import LinearSegmentedColormap, to_rgb
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from typing import TYPE_CHECKING, NamedTuple
 
-from icha.analysis.model_error import check_same_contact, contact_of_spots, jaccard, state_of
-from icha.datasets.campaign import find_snapshot, spots_of
-from icha.figures.select import check_topography, pick_run
+import numpy as np
+
+from icha.datasets.labels import SolutionLabels
+from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.maps import block_means, draw_whole
+from icha.figures.options import RunFigure, SnapshotFigure
+from icha.figures.select import run_on_topography
 from icha.figures.spots import circles_in_cell, draw_spots
 from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, new_figure, number, panel_label, styled, unit_for
 
-CAPTION = (
-    "Contact spots (red circles, true size and position) over the topography, of which the highest parts are "
-    "yellow: one period of a periodic surface, where circles that cross a border continue at the opposite one, or the "
-    "whole of a free square, where they end beyond its edges. The load is given above the map. The framed part around "
-    "the largest spot is enlarged. Where there is a boundary-element solution of the same topography, load "
-    "and interaction range, by an independent code, its contact stands beside that of ICHA (b), its edge (black) "
-    "beside the enlarged circles (c), and the map (d) shows where both are in contact and where only one of them is; "
-    "the overlap is the area in contact in both over that in either. The areas given are corrected by the perimeter of "
-    "the contact for boundary elements. At the ranges that a grid resolves these show practically no hysteresis, so "
-    "that with adhesion they bound the limit of short ranges (JKR), and do not prove it."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class MapFigure(SnapshotFigure, RunFigure):
+    """A figure of one snapshot of one run; what is left out is the study's first."""
+
+
+def inputs(campaign: Campaign, options: MapFigure, files: ResultFiles) -> Inputs:
+    """The runs, the topography of the one that is drawn, and boundary elements of its state, if there are any."""
+    found = {"campaign": files.dataset, "surface": files.surface(options.run(campaign))}
+    solution = finest_solution(campaign, options)
+    return found | ({"solution": files.solution(solution)} if solution else {})
+
+
+def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | None:
+    """The finest boundary-element solution of the state that is drawn, if there is any."""
+    snapshots = campaign.snapshots_of(options.study) or [campaign.studies[options.study].targets.last]
+    if options.snapshot is not None:
+        kind, value = options.snapshot.target
+    elif {kind for kind, _ in snapshots} == {"reduced_pressure"}:
+        kind, value = min(snapshots)  # the first one that is met
+    else:
+        return None
+    _, *contact = options.run(campaign)
+    finest_first = sorted(campaign.boundary_elements.items(), key=lambda each: -each[1].refinement)
+    return next(
+        (
+            SolutionLabels(label, options.study, *contact, value)
+            for label, entry in finest_first
+            if kind == "reduced_pressure" and entry.study == options.study
+            if value in entry.reduced_pressures and tuple(contact) in campaign.solved(entry)
+        ),
+        None,
+    )
+
+
+DECLARATION = Declaration(
+    description="Contact spots over the topography.",
+    caption=(
+        "Contact spots (red circles, true size and position) over the topography, of which the highest parts are "
+        "yellow: one period of a periodic surface, where circles that cross a border continue at the opposite one, or "
+        "the whole of a free square, where they end beyond its edges. The load is given above the map. The framed part "
+        "around the largest spot is enlarged. Where there is a boundary-element solution of the same topography, load "
+        "and interaction range, by an independent code, its contact stands beside that of ICHA (b), its edge (black) "
+        "beside the enlarged circles (c), and the map (d) shows where both are in contact and where only one of them "
+        "is; the overlap is the area in contact in both over that in either. The areas given are corrected by the "
+        "perimeter of the contact for boundary elements. At the ranges that a grid resolves these show practically no "
+        "hysteresis, so that with adhesion they bound the limit of short ranges (JKR), and do not prove it."
+    ),
+    options=MapFigure,
+    inputs=inputs,
+    holds_topography=True,
 )
 
 # The enlarged view shows a quarter of the period, halved as often as it is wider than so many radii of the spots, and
@@ -31,8 +75,6 @@ CAPTION = (
 _ZOOM = 4
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
-# More cells a side than this cannot be told apart in a panel.
-_MOST_CELLS = 1024
 # More spots than this are drawn as an image in PDF files as well.
 _MANY_SPOTS = 2000
 # Outline of a spot in the map, as part of its radius, so that it does not hide small ones, and at most, in points; and
@@ -41,7 +83,6 @@ _OUTLINE = 0.25
 _WIDEST_OUTLINE = 0.35
 _PANEL = 190
 _RED = (0.9, 0.0, 0.05)
-_TRANSPARENT_TO_RED = LinearSegmentedColormap.from_list("contact", [(*_RED, 0.0), (*_RED, 0.9)])
 # What is in contact at a node: nothing, ICHA, boundary elements, both.
 _STATES = (("", "0.94"), ("ICHA only", VERMILLION), ("boundary elements only", BLUE), ("both", "0.35"))
 
@@ -77,28 +118,80 @@ def figure(
     ValueError
         If there is no such run or snapshot, or the surface or the solution is another one's.
     """
+    from icha.datasets.campaign import find_snapshot
+
     asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
-    labels, run = pick_run(campaign, study, **asked)
+    labels, run = run_on_topography(campaign, study, surface, **asked)
     at = find_snapshot(run, kind, target)
-    period = float(run["period"])
-    check_topography(labels, run, surface)
-
     if solution is not None:
-        try:
-            check_same_contact(run, solution)
-        except ValueError as error:
-            raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
-        shown, solved = float(state_of(run, at)["reduced_pressure"]), float(solution["target_reduced_pressure"])
-        if not np.isclose(shown, solved, rtol=1e-6):
-            raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g} for a snapshot at {shown:g}")
+        _check_solution(labels, run, at, solution)
+    view = _view(run, at, surface)
 
+    fig = new_figure(TWO_COLUMNS, 3.35 if solution is None else 6.9)
+    panels = fig.subplots(1 if solution is None else 2, 2, squeeze=False)
+    whole, enlarged = panels[0, 0], panels[0, 1] if solution is None else panels[1, 0]
+    image = _draw_spots_over_topography(whole, enlarged, view)
+    enlarged.set_title(f"enlarged ×{view.zoom}", loc="right")
+    step = int(run["snapshot_step"].values[at])
+    load = number(float(run["reduced_pressure"].values[step]))
+    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
+    area = rf"$A/A_0$ = {float(run['contact_area_fraction'].values[step]):.3f}"
+    if solution is None:
+        whole.set_title(f"{load}, {area}", loc="right")
+    else:
+        _draw_solution(panels, view, run, at, solution)
+        fig.suptitle(load, fontsize="medium")
+        whole.set_title(f"ICHA, {area}", loc="right")
+    _frame(panels, enlarged, view)
+    bar = fig.colorbar(image, ax=panels, shrink=0.92 if solution is None else 0.46, pad=0.015, aspect=28)
+    bar.set_label(f"height ({view.height_unit})")
+    return fig
+
+
+def _check_solution(labels, run, at, solution):
+    """Raise ValueError unless boundary elements are of the state that is drawn."""
+    from icha.analysis.model_error import check_same_contact, state_of
+
+    try:
+        check_same_contact(run, solution)
+    except ValueError as error:
+        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
+    shown, solved = float(state_of(run, at)["reduced_pressure"]), float(solution["target_reduced_pressure"])
+    if not np.isclose(shown, solved, rtol=1e-6):
+        raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g} for a snapshot at {shown:g}")
+
+
+class _View(NamedTuple):
+    """Topography and spots in the units of the axes, and the window that is enlarged.
+
+    `heights` (n, n) are those of the surface's file, `scale` times them those of the run in its unit, of which `look`
+    has the limits; `circles` are rows of x, y and radius; `corner` is the window's lower left one.
+    """
+
+    heights: np.ndarray
+    scale: float
+    height_unit: str
+    look: dict
+    side: float
+    length_unit: str
+    circles: np.ndarray
+    zoom: int
+    corner: np.ndarray
+    window: float
+
+
+def _view(run, at, surface):
+    from icha.datasets.campaign import spots_of
+
+    period = float(run["period"])
     heights = surface["height"].transpose("y", "x").values
     factor = float(run["rms_height"]) / float(surface["rms_height"])
+    highest = max(float(heights.max()), -float(heights.min())) * factor
+    length, length_unit = unit_for(period, "m")
+    height, height_unit = unit_for(highest, "m")
     spots = spots_of(run, at)
     radius = spots["spot_radius"].values
-    length, length_unit = unit_for(period, "m")
-    highest = max(float(heights.max()), -float(heights.min())) * factor
-    height, height_unit = unit_for(highest, "m")
+    x, y = spots["spot_x"].values * length, spots["spot_y"].values * length
     side, n = period * length, len(heights)
     # The mean radius over the area of contact.
     typical = float(np.sum(radius**3) / np.sum(radius**2)) if radius.any() else period
@@ -109,82 +202,78 @@ def figure(
     middle = np.array([side, side]) / 2
     if len(radius):
         largest = int(np.argmax(radius))
-        middle = np.array([spots["spot_x"].values[largest], spots["spot_y"].values[largest]]) * length
-    corner = np.clip(middle - window / 2, 0, side - window)
+        middle = np.array([x[largest], y[largest]])
+    return _View(
+        heights,
+        factor * height,
+        height_unit,
+        {"origin": "lower", "cmap": "cividis", "vmin": -highest * height, "vmax": highest * height},
+        side,
+        length_unit,
+        circles_in_cell(x, y, radius * length, side, str(run["boundary"].values)),
+        zoom,
+        np.clip(middle - window / 2, 0, side - window),
+        window,
+    )
 
-    cell = side / n
-    look = {"origin": "lower", "cmap": "cividis", "vmin": -highest * height, "vmax": highest * height}
-    x, y = spots["spot_x"].values * length, spots["spot_y"].values * length
-    circles = circles_in_cell(x, y, radius * length, side, str(run["boundary"].values))
+
+def _draw_spots_over_topography(whole, enlarged, view):
+    """Draw the whole map and the enlarged part of it; returns the image of the heights."""
+    n, circles, corner, window = len(view.heights), view.circles, view.corner, view.window
     near = circles[np.all(np.abs(circles[:, :2] - (corner + window / 2)) < window / 2 + circles[:, 2:], axis=1)]
-
-    fig = new_figure(TWO_COLUMNS, 3.35 if solution is None else 6.9)
-    panels = fig.subplots(1 if solution is None else 2, 2, squeeze=False)
-    whole, enlarged = panels[0, 0], panels[0, 1] if solution is None else panels[1, 0]
-    topography = _means(heights) * (factor * height)
-    image = _show_whole(whole, topography, n, side, **look)
-    outlines = np.minimum(_OUTLINE * _PANEL / side * circles[:, 2], _WIDEST_OUTLINE)
+    image = draw_whole(whole, block_means(view.heights) * view.scale, n, view.side, **view.look)
+    outlines = np.minimum(_OUTLINE * _PANEL / view.side * circles[:, 2], _WIDEST_OUTLINE)
     many = len(circles) > _MANY_SPOTS
     draw_spots(whole, circles, facecolor=(*_RED, 0.85), edgecolor="black", lw=outlines, rasterized=many)
-    part, borders = _window(heights, cell, corner, window)
-    enlarged.imshow(_means(part) * (factor * height), extent=borders, interpolation="nearest", **look)
+    part, borders = _window(view.heights, view.side / n, corner, window)
+    enlarged.imshow(block_means(part) * view.scale, extent=borders, interpolation="nearest", **view.look)
     draw_spots(enlarged, near, facecolor=(*_RED, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
+    return image
 
-    step = int(run["snapshot_step"].values[at])
-    load = number(float(run["reduced_pressure"].values[step]))
-    area = float(run["contact_area_fraction"].values[step])
-    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
-    area = rf"$A/A_0$ = {area:.3f}"
-    enlarged.set_title(f"enlarged ×{zoom}", loc="right")
-    if solution is None:
-        whole.set_title(f"{load}, {area}", loc="right")
-    else:
-        beside, compared = panels[0, 1], panels[1, 1]
-        contact = solution["contact"].transpose("y", "x").values == 1
-        spots_cover = contact_of_spots(run, at, len(contact))
-        fine = len(contact)
-        _show_whole(beside, topography, n, side, **look)
-        red = {"origin": "lower", "cmap": _TRANSPARENT_TO_RED, "vmin": 0, "vmax": 1}
-        _show_whole(beside, _means(contact.astype(float)), fine, side, **red)
-        own, borders = _window(contact, side / fine, corner, window)
-        enlarged.contour(own, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
-        palette = np.array([to_rgb(colour) for _, colour in _STATES])
-        _show_whole(compared, _means(palette[1 * spots_cover + 2 * contact]), fine, side, origin="lower")
-        keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]
-        compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
-        fig.suptitle(load, fontsize="medium")
-        whole.set_title(f"ICHA, {area}", loc="right")
-        truth = float(solution["contact_area_fraction"])
-        beside.set_title(rf"boundary elements, $A/A_0$ = {truth:.3f}", loc="right")
-        compared.set_title(f"overlap {jaccard(spots_cover, contact):.2f}", loc="right")
+
+def _draw_solution(panels, view, run, at, solution):
+    """Draw the contact of boundary elements: over the topography, around the enlarged spots, and beside the model's."""
+    from matplotlib.colors import LinearSegmentedColormap, to_rgb
+    from matplotlib.patches import Patch
+
+    from icha.analysis.model_error import contact_of_spots, jaccard
+
+    (_, beside), (enlarged, compared) = panels
+    contact = solution["contact"].transpose("y", "x").values == 1
+    fine = len(contact)
+    spots_cover = contact_of_spots(run, at, fine)
+    draw_whole(beside, block_means(view.heights) * view.scale, len(view.heights), view.side, **view.look)
+    red = LinearSegmentedColormap.from_list("contact", [(*_RED, 0.0), (*_RED, 0.9)])
+    look = {"origin": "lower", "cmap": red, "vmin": 0, "vmax": 1}
+    draw_whole(beside, block_means(contact.astype(float)), fine, view.side, **look)
+    own, borders = _window(contact, view.side / fine, view.corner, view.window)
+    enlarged.contour(own, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
+    palette = np.array([to_rgb(colour) for _, colour in _STATES])
+    draw_whole(compared, block_means(palette[1 * spots_cover + 2 * contact]), fine, view.side, origin="lower")
+    keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]
+    compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
+    truth = float(solution["contact_area_fraction"])
+    beside.set_title(rf"boundary elements, $A/A_0$ = {truth:.3f}", loc="right")
+    compared.set_title(f"overlap {jaccard(spots_cover, contact):.2f}", loc="right")
+
+
+def _frame(panels, enlarged, view):
+    """Letters, limits and labels of all panels, and where the enlarged part lies in the others."""
+    from matplotlib.patches import Rectangle
 
     for ax, letter in zip(panels.ravel(), "abcd", strict=False):
         panel_label(ax, letter)
         ax.tick_params(direction="out", top=False, right=False)
-        start, width = (corner, window) if ax is enlarged else (np.zeros(2), side)
+        start, width = (view.corner, view.window) if ax is enlarged else (np.zeros(2), view.side)
         ax.set_xlim(start[0], start[0] + width)
         ax.set_ylim(start[1], start[1] + width)
         if ax is not enlarged:
             frame = "white" if ax.get_images()[0].get_array().ndim == 2 else "black"
-            ax.add_patch(Rectangle(corner, window, window, fill=False, ec=frame, lw=1.2))
+            ax.add_patch(Rectangle(view.corner, view.window, view.window, fill=False, ec=frame, lw=1.2))
     for ax in panels[:, 0]:
-        ax.set_ylabel(f"y ({length_unit})")
+        ax.set_ylabel(f"y ({view.length_unit})")
     for ax in panels[-1]:
-        ax.set_xlabel(f"x ({length_unit})")
-    bar = fig.colorbar(image, ax=panels, shrink=0.92 if solution is None else 0.46, pad=0.015, aspect=28)
-    bar.set_label(f"height ({height_unit})")
-    return fig
-
-
-def _show_whole(axes, means, n, side, **look):
-    """Show a periodic map of n nodes a side, or `_means` of it; the first row and column come again at the far border.
-
-    Nodes are the centres of the picture's cells.
-    """
-    drawn = np.pad(means, [(0, 1), (0, 1), (0, 0)][: means.ndim], mode="wrap")
-    half = side / n / 2
-    borders = (-half, side - half + side / (len(drawn) - 1))
-    return axes.imshow(drawn, extent=borders * 2, interpolation="antialiased", **look)
+        ax.set_xlabel(f"x ({view.length_unit})")
 
 
 def _window(nodes, cell, corner, window):
@@ -193,14 +282,3 @@ def _window(nodes, cell, corner, window):
     columns, rows = (np.arange(start, start + int(np.ceil(window / cell)) + 2) for start in first)
     borders = tuple(float(edge) * cell for at in (columns, rows) for edge in (at[0] - 0.5, at[-1] + 0.5))
     return nodes[np.ix_(rows % len(nodes), columns % len(nodes))], borders
-
-
-def _means(nodes):
-    """Means over blocks of nodes, as near to equal as can be, where there are too many to be drawn."""
-    count = min(len(nodes), _MOST_CELLS)
-    if count == len(nodes):
-        return nodes
-    starts = np.arange(count) * len(nodes) // count
-    width = np.diff(starts, append=len(nodes))
-    sums = np.add.reduceat(np.add.reduceat(nodes, starts, axis=1), starts, axis=0)
-    return (sums.T / np.outer(width, width)).T

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-
+from icha.datasets.measured_table import read_columns
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
@@ -19,6 +16,8 @@ from icha.figures.curves import (
     draw_ways_back,
     study_curves,
 )
+from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.options import StudyFigure
 from icha.figures.select import name_of_place
 from icha.figures.style import (
     BLACK,
@@ -27,6 +26,7 @@ from icha.figures.style import (
     GREY,
     MARKERS,
     TWO_COLUMNS,
+    legend_handle,
     logarithmic_axes,
     material_label,
     new_figure,
@@ -35,44 +35,82 @@ from icha.figures.style import (
     styled,
 )
 
-CAPTION = (
-    "Real contact area over nominal area against the reduced pressure F/(E* h'rms A0) (a) and against F/(E* A0) (b) "
-    "for several surfaces and rms slopes (shape of the markers) and materials (colour and size). Where there are "
-    "several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
-    "(Student's t). Without "
-    "adhesion the curves of one topography, scaled to different slopes, are one curve in (a); what adhesion adds "
-    "depends on the material and grows as the slope falls. In (b) the slope orders the curves: at a given load the "
-    "area falls as the slope rises. Thin dashed lines, where there are any: the way back, unloading, while the load "
-    "is compressive. Measurements, where given, are drawn as lines."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+def inputs(campaign: Campaign, options: StudyFigure, files: ResultFiles) -> Inputs:
+    """The runs, and tables of measurements that belong to the study, if there are any."""
+    tables = [measurement.path for measurement in _measurements(campaign, options)]
+    return {"campaign": files.dataset} | ({"tables": tables} if tables else {})
+
+
+def arguments(campaign: Campaign, options: StudyFigure) -> dict[str, Any]:
+    """What is to be known of each table."""
+    known = [
+        {
+            "label": measurement.label,
+            "columns": measurement.columns,
+            "load_unit": _load_unit(campaign, measurement),
+            "material": measurement.material,
+            "rms_slope": measurement.rms_slope,
+        }
+        for measurement in _measurements(campaign, options)
+    ]
+    return {"measurements": known} if known else {}
+
+
+def _measurements(campaign, options):
+    return [measurement for measurement in campaign.measurements.values() if measurement.study == options.study]
+
+
+def _load_unit(campaign, measurement) -> float:
+    """What a measured load is divided by to become p/(E* h'rms)."""
+    if not measurement.load_is_pressure:
+        return 1.0
+    return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
+
+
+DECLARATION = Declaration(
+    description="Contact area against load for all slopes and materials, with measurements.",
+    caption=(
+        "Real contact area over nominal area against the reduced pressure F/(E* h'rms A0) (a) and against F/(E* A0) "
+        "(b) for several surfaces and rms slopes (shape of the markers) and materials (colour and size). Where there "
+        "are several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
+        "(Student's t). Without adhesion the curves of one topography, scaled to different slopes, are one curve in "
+        "(a); what adhesion adds depends on the material and grows as the slope falls. In (b) the slope orders the "
+        "curves: at a given load the area falls as the slope rises. Thin dashed lines, where there are any: the way "
+        "back, unloading, while the load is compressive. Measurements, where given, are drawn as lines."
+    ),
+    options=StudyFigure,
+    inputs=inputs,
+    arguments=arguments,
 )
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredAreas:
-    """A measured area-load curve: arrays of p/(E* h'rms) and A/A0, and what was measured, as far as it is known."""
-
-    label: str
-    citation: str
-    reduced_pressure: np.ndarray
-    area_fraction: np.ndarray
-    material: str | None = None
-    rms_slope: float | None = None
-
-
 @styled
-def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[MeasuredAreas] = ()) -> Figure:
+def figure(
+    campaign: xr.DataTree,
+    tables: Sequence[str | os.PathLike] = (),
+    *,
+    study: str,
+    measurements: Sequence[Mapping[str, Any]] = (),
+) -> Figure:
     """Draw all runs of a study.
 
     Parameters
     ----------
     campaign : the campaign dataset.
+    tables : files of measured curves to lay over; in panel (b) only those whose slope is known.
     study : name of the study.
-    measurements : measured curves to lay over; in panel (b) only those whose slope is known.
+    measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (what a
+        load is divided by to become p/(E* h'rms)), and `material` and `rms_slope`, None where they are not known.
 
     Raises
     ------
     ValueError
-        If there is no such study or no run in it.
+        If there is no such study or no run in it, or a table cannot be read.
     """
     curves = study_curves(campaign, study)
     dataset = campaign[study].to_dataset()
@@ -102,54 +140,68 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
         draw_line(right, line, _points_at_load, logarithmic=True, lines=len(curves.lines))
     for ax in (left, right):
         logarithmic_axes(ax)
-    for k, measured in enumerate(measurements):
-        look = {
-            "color": colour.get(measured.material, BLACK),
-            "ls": DASHES[k % len(DASHES)],
-            "lw": 1.1,
-            "zorder": 1,
-        }
-        left.plot(measured.reduced_pressure, measured.area_fraction, label=measured.label, **look)
-        if measured.rms_slope is not None:
-            right.plot(measured.reduced_pressure * measured.rms_slope, measured.area_fraction, **look)
+    for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
+        _draw_measured(left, right, table, known, colour.get(known["material"], BLACK), DASHES[k % len(DASHES)])
     left.set_xlabel(PRESSURE_LABEL)
     right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
     left.set_ylabel(AREA_LABEL)
 
-    several = len({surface for surface, _ in marker}) > 1
+    _add_legends(fig, (left, right), curves, dataset, _Looks(colour, marker, size))
+    if measurements:
+        first = left.get_legend()
+        if first is not None:
+            left.add_artist(first)
+        left.legend(loc="upper left", title="measured")
+    for ax, letter in ((left, "a"), (right, "b")):
+        panel_label(ax, letter)
+    return fig
+
+
+class _Looks(NamedTuple):
+    """Colours of the materials, markers of the surfaces and slopes, sizes of the materials' markers."""
+
+    colour: dict[str, str]
+    marker: dict[tuple[str, float], str]
+    size: dict[str, float]
+
+
+def _draw_measured(left, right, table, known, colour, dashes):
+    """Draw a measured curve; over the load only if its slope is known."""
+    load, area = read_columns(table, known["columns"])
+    pressure, slope = load / known["load_unit"], known["rms_slope"]
+    look = {"color": colour, "ls": dashes, "lw": 1.1, "zorder": 1}
+    left.plot(pressure, area, label=known["label"], **look)
+    if slope is not None:
+        right.plot(pressure * slope, area, **look)
+
+
+def _add_legends(fig, panels, curves, dataset, looks):
+    """Name materials in the first panel and all else in the second, or, where names are long, all below."""
+    left, right = panels
+    several = len({surface for surface, _ in looks.marker}) > 1
     place_handles = [
-        Line2D(
-            [],
-            [],
+        legend_handle(
             ls="none",
-            marker=marker[place],
+            marker=marker,
             mec=GREY,
             mfc="none",
             ms=6,
             label=name_of_place(dataset, *place) if several else slope_label(place[1]),
         )
-        for place in marker
+        for place, marker in looks.marker.items()
     ]
     material_handles = [
-        Line2D(
-            [],
-            [],
-            ls="none",
-            marker="o",
-            mec=colour[m],
-            mfc="none",
-            mew=1.1,
-            ms=size[m],
-            label=material_label(dataset, m),
+        legend_handle(
+            ls="none", marker="o", mec=looks.colour[m], mfc="none", mew=1.1, ms=size, label=material_label(dataset, m)
         )
-        for m in size
+        for m, size in looks.size.items()
     ]
     if curves.scale:
         curves.scale.draw(fig, [left, right])
         named = {line.look["label"]: line.look | {"ls": "none", "ms": 5} for line in curves.lines if line.look["label"]}
-        material_handles = [Line2D([], [], **look) for look in named.values()]
+        material_handles = [legend_handle(**look) for look in named.values()]
     if curves.unloaded:
-        place_handles.append(Line2D([], [], color=GREY, label="unloading", **UNLOADING))
+        place_handles.append(legend_handle(color=GREY, label="unloading", **UNLOADING))
     if curves.several_seeds:
         place_handles.append(band_handle(len(line.runs) for line in curves.lines))
     if several:
@@ -157,17 +209,11 @@ def figure(campaign: xr.DataTree, *, study: str, measurements: Sequence[Measured
         handles = material_handles + place_handles
         fig.set_figheight(fig.get_figheight() + 0.1 * len(handles))
         fig.legend(handles=handles, loc="outside lower center", ncols=2)
-        material_handles, place_handles = [], []
+        return
     if place_handles:
         right.legend(handles=place_handles, loc="lower right")
-    first = left.legend(handles=material_handles, loc="lower right") if material_handles else None
-    if measurements:
-        if first is not None:
-            left.add_artist(first)
-        left.legend(loc="upper left", title="measured")
-    for ax, letter in ((left, "a"), (right, "b")):
-        panel_label(ax, letter)
-    return fig
+    if material_handles:
+        left.legend(handles=material_handles, loc="lower right")
 
 
 def _points(run):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import xarray as xr
-from matplotlib.collections import PatchCollection
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Wedge
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
-from icha.datasets.campaign import find_snapshot, spots_of
+from pydantic import Field
+
+from icha.figures.declaration import Campaign, Declaration
+from icha.figures.options import StudyFigure
 from icha.figures.select import pick, study_runs
 from icha.figures.spots import circles_in_cell, draw_spots
 from icha.figures.style import (
@@ -24,12 +25,41 @@ from icha.figures.style import (
     styled,
     unit_for,
 )
+from icha.support.values import Label, Problem, Seed
 
-CAPTION = (
-    "Contact spots of one topography scaled to several rms slopes, at the same load F/(E* A0) (a) and at the same "
-    "area A/A0 (b), in their true size. At a given load the steeper surface has less contact, and its spots, drawn on "
-    "top, lie within those of the flatter ones. At a given area the spots nearly coincide; there every "
-    "slope fills a sector of its own."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class SlopesFigure(StudyFigure):
+    """A figure of the spots of all slopes, at the same load and at the same area."""
+
+    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
+    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+    material: Label | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
+
+    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
+        """A study that does not keep states of both kinds is one more."""
+        yield from super().study_problems(campaign, study)
+        kinds = [kind for kind, _ in campaign.snapshots_of(self.study) or []]
+        for kind in ("relative_load", "area_fraction"):
+            if kind not in kinds:
+                yield ("study",), self.study, f"has no snapshot of kind {kind}; allowed: a study with one"
+
+
+DECLARATION = Declaration(
+    description=(
+        "Contact spots of all slopes at the same load and at the same area. The study needs snapshots of kinds "
+        "relative_load and area_fraction."
+    ),
+    caption=(
+        "Contact spots of one topography scaled to several rms slopes, at the same load F/(E* A0) (a) and at the same "
+        "area A/A0 (b), in their true size. At a given load the steeper surface has less contact, and its spots, drawn "
+        "on top, lie within those of the flatter ones. At a given area the spots nearly coincide; there every slope "
+        "fills a sector of its own."
+    ),
+    options=SlopesFigure,
 )
 
 # From the largest slope to the smallest, as in the paper: blue, green, red.
@@ -60,6 +90,11 @@ def figure(
     ValueError
         If there is no such study, run or snapshot.
     """
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Patch, Wedge
+
+    from icha.datasets.campaign import find_snapshot, spots_of
+
     runs = study_runs(campaign, study)
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
     seed = pick("seed", seed, [labels.seed for labels, _ in runs if labels.surface == surface])

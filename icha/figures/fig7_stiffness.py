@@ -2,23 +2,40 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
 
 from icha.figures.curves import PRESSURE_LABEL, add_legends, draw_line, say_whose_theories, study_curves
+from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.options import StudyFigure
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 
-CAPTION = (
-    "Contact stiffness K = -dp/du, nominal pressure p over mean separation u, against the reduced pressure F/(E* "
-    "h'rms A0): in units of E* h'rms/h_rms (a) and of p/h_rms (b), where the law K = p/u0 is a constant. Markers: "
-    "ICHA, from the tangent of the equilibrium with the present spots; open ones are without adhesion. Where there "
-    "are several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
-    "(Student's t). States under tension or of negative stiffness have no place on these axes. Line: derivative of "
-    "the adhesionless separation of Yang and Persson for an infinite surface. On a finite surface the stiffness at "
-    "small loads lies above the proportional law, as only its highest parts touch (Pastewka et al., Phys. Rev. E 87 "
-    "(2013) 062809)."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+def inputs(campaign: Campaign, options: StudyFigure, files: ResultFiles) -> Inputs:
+    """The runs, and theories for their first surface."""
+    return {"campaign": files.dataset, "references": files.theories(campaign.studies[options.study].surfaces[0])}
+
+
+DECLARATION = Declaration(
+    description="Contact stiffness against load, with theory.",
+    caption=(
+        "Contact stiffness K = -dp/du, nominal pressure p over mean separation u, against the reduced pressure F/(E* "
+        "h'rms A0): in units of E* h'rms/h_rms (a) and of p/h_rms (b), where the law K = p/u0 is a constant. Markers: "
+        "ICHA, from the tangent of the equilibrium with the present spots; open ones are without adhesion. Where there "
+        "are several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
+        "(Student's t). States under tension or of negative stiffness have no place on these axes. Line: derivative of "
+        "the adhesionless separation of Yang and Persson for an infinite surface. On a finite surface the stiffness at "
+        "small loads lies above the proportional law, as only its highest parts touch (Pastewka et al., Phys. Rev. E "
+        "87 (2013) 062809)."
+    ),
+    options=StudyFigure,
+    inputs=inputs,
 )
 
 

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
 
-from icha.datasets.campaign import spots_of
 from icha.figures.curves import band_handle, draw_mean, material_looks
+from icha.figures.declaration import Declaration
+from icha.figures.options import SnapshotFigure
 from icha.figures.select import first_line, name_of_place, snapshot_label
 from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
 from icha.support.statistics import ensemble
 
-CAPTION = (
-    "Sizes of the contact patches, the areas A of the spots (united ones count as one), at the load given in the "
-    "figure; open markers are without adhesion. Where there are several seeds the lines are means over them, with the "
-    "95 % band of confidence of the mean (Student's t). Number density n(A) per area of a patch and nominal area (a), "
-    "bins with few patches being joined; number of patches larger than A per nominal area (b), down to the largest "
-    "one."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+DECLARATION = Declaration(
+    description="Sizes of the contact patches of every material, on the study's first surface.",
+    caption=(
+        "Sizes of the contact patches, the areas A of the spots (united ones count as one), at the load given in the "
+        "figure; open markers are without adhesion. Where there are several seeds the lines are means over them, with "
+        "the 95 % band of confidence of the mean (Student's t). Number density n(A) per area of a patch and nominal "
+        "area (a), bins with few patches being joined; number of patches larger than A per nominal area (b), down to "
+        "the largest one."
+    ),
+    options=SnapshotFigure,
 )
 
 # Patches per plotted point of the density: bins with less are joined with their neighbours.
@@ -90,6 +99,8 @@ def figure(
 
 def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
     """Areas of the contact patches of one snapshot, m², increasing; spots that just touch have none."""
+    from icha.datasets.campaign import spots_of
+
     area = np.sort(np.pi * spots_of(run, snapshot)["spot_radius"].values ** 2)
     return area[area > 0]
 

@@ -2,26 +2,51 @@
 
 from __future__ import annotations
 
-import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
-from icha.asperity.jkr import WU_RANGE
-from icha.datasets.campaign import find_snapshot
+import numpy as np
+
 from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL, bars_handle
+from icha.figures.declaration import Campaign, Declaration
+from icha.figures.options import SnapshotFigure
 from icha.figures.scale import MOST_COLOURS, places_scale
 from icha.figures.select import NothingToDraw, snapshot_label, study_runs
 from icha.figures.style import COLOURS, GREY, MARKERS, TWO_COLUMNS, new_figure, panel_label, quantity, styled
 from icha.support.statistics import ensemble
+from icha.support.values import Problem
 
-CAPTION = (
-    "Real contact area over nominal area (a) and mean separation over rms height (b) at the load given in the figure, "
-    "against the Tabor parameter of the surface, (R_c Δγ²/E*²)^(1/3) over the range of attraction, with R_c = 1/rms "
-    "curvature. Runs that differ only in the range are joined by a line: at a given surface energy a longer range "
-    "(smaller Tabor parameter) lets asperities jump into contact from farther away. Where there are several seeds the "
-    "points are means over them, and the bars the 95 % confidence of that mean (Student's t). Dashed: without "
-    "adhesion. Shaded: outside the Tabor parameters for which the jump-in distance was verified; single asperities, "
-    "whose radii differ, can lie there for every value of the surface's."
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class TaborFigure(SnapshotFigure):
+    """A figure of one snapshot of all runs of a study, whose materials differ in their range of attraction."""
+
+    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
+        """A study without adhesion is one more."""
+        if not any(campaign.materials[name].surface_energy > 0 for name in study.materials):
+            reason = "has no material with adhesion, so no Tabor parameter; allowed: a study with one"
+            yield ("study",), self.study, reason
+        yield from super().study_problems(campaign, study)
+
+
+DECLARATION = Declaration(
+    description=(
+        "Contact area and mean separation against the Tabor parameter. The study needs materials with adhesion that "
+        "differ in their `interaction_range`."
+    ),
+    caption=(
+        "Real contact area over nominal area (a) and mean separation over rms height (b) at the load given in the "
+        "figure, against the Tabor parameter of the surface, (R_c Δγ²/E*²)^(1/3) over the range of attraction, with "
+        "R_c = 1/rms curvature. Runs that differ only in the range are joined by a line: at a given surface energy a "
+        "longer range (smaller Tabor parameter) lets asperities jump into contact from farther away. Where there are "
+        "several seeds the points are means over them, and the bars the 95 % confidence of that mean (Student's t). "
+        "Dashed: without adhesion. Shaded: outside the Tabor parameters for which the jump-in distance was verified; "
+        "single asperities, whose radii differ, can lie there for every value of the surface's."
+    ),
+    options=TaborFigure,
 )
 
 # The panels reach at least this part of the mean value up and down.
@@ -49,6 +74,9 @@ def figure(
     ValueError
         If there is no such study or snapshot, or no run with adhesion.
     """
+    from icha.asperity.jkr import WU_RANGE
+    from icha.datasets.campaign import find_snapshot
+
     # Of every line the points of every range of attraction, by seed: Tabor parameter, area and separation.
     curves: dict[tuple, dict[float, list]] = {}
     bare: dict[tuple, list] = {}

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from icha.datasets.labels import RunLabels
 from icha.figures.curves import UNLOADING
 from icha.figures.errors import interfaces_of
 from icha.figures.scale import MOST_COLOURS, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, study_runs, ways_back
-from icha.figures.style import COLOURS, GREY, MARKERS, material_label, slope_label
+from icha.figures.style import COLOURS, GREY, MARKERS, legend_handle, material_label, slope_label
 from icha.support.statistics import ensemble
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 # More names than this are written smaller.
 _MANY_NAMES = 12
@@ -179,18 +181,18 @@ class Lines:
             several = self.materials if 1 < len(self.materials) <= MOST_COLOURS else []
             grey = {"color": GREY, "mec": GREY}
             return {
-                material_label(self.interfaces, material): Line2D(
-                    [], [], **look | self.marker((material, *first)) | grey
+                material_label(self.interfaces, material): legend_handle(
+                    **look | self.marker((material, *first)) | grey
                 )
                 for material in several
             }
         if len(self.materials) == 1:
             return {
-                self.name(key): Line2D([], [], color=self.colour(key), **look | self.marker(key)) for key in self.keys
+                self.name(key): legend_handle(color=self.colour(key), **look | self.marker(key)) for key in self.keys
             }
         handles = {
-            material_label(self.interfaces, material): Line2D(
-                [], [], color=self.colour((material, *first)), **look | self.marker((material, *first))
+            material_label(self.interfaces, material): legend_handle(
+                color=self.colour((material, *first)), **look | self.marker((material, *first))
             )
             for material in ([] if self.scale else self.materials)
         }
@@ -199,7 +201,7 @@ class Lines:
             name = self._place_name(place)
             if name:
                 grey = {"mec": GREY, "mfc": GREY, "ls": "none"}
-                handles[name] = Line2D([], [], **look | self.marker((self.materials[0], *place)) | grey)
+                handles[name] = legend_handle(**look | self.marker((self.materials[0], *place)) | grey)
         return handles
 
     def _place_name(self, place):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field
 
 from icha.datasets.labels import RunLabels
-from icha.figures.declaration import Campaign, FigureOptions
+from icha.figures.declaration import Campaign, FigureOptions, Inputs, ResultFiles
 from icha.path.states import Snapshot
-from icha.support.values import Flag, Label, Name, Positive, Problem, Seed, list_of_names, unknown
+from icha.support.values import Label, Name, Positive, Problem, Seed, unknown
 
 
 class StudyFigure(FigureOptions):
@@ -123,139 +123,13 @@ def not_unloaded(campaign: Campaign, location: tuple, name: str, *, in_part: boo
         yield location, name, "is not unloaded; allowed: a study with `unload: true`"
 
 
-class JKRFigure(FigureOptions):
-    """The force-approach curve of one asperity."""
-
-    tabor_parameter: Positive = Field(default=3.0, description="Tabor parameter, which sets the jump-in distance.")
-
-
-class MapFigure(SnapshotFigure, RunFigure):
-    """A figure of one snapshot of one run; what is left out is the study's first."""
-
-
-class SlopesFigure(StudyFigure):
-    """A figure of the spots of all slopes, at the same load and at the same area."""
-
-    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
-    material: Label | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
-
-    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """A study that does not keep states of both kinds is one more."""
-        yield from super().study_problems(campaign, study)
-        kinds = [kind for kind, _ in campaign.snapshots_of(self.study) or []]
-        for kind in ("relative_load", "area_fraction"):
-            if kind not in kinds:
-                yield ("study",), self.study, f"has no snapshot of kind {kind}; allowed: a study with one"
-
-
-class TaborFigure(SnapshotFigure):
-    """A figure of one snapshot of all runs of a study, whose materials differ in their range of attraction."""
-
-    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """A study without adhesion is one more."""
-        if not any(campaign.materials[name].surface_energy > 0 for name in study.materials):
-            reason = "has no material with adhesion, so no Tabor parameter; allowed: a study with one"
-            yield ("study",), self.study, reason
-        yield from super().study_problems(campaign, study)
-
-
-class LoopsFigure(StudyFigure):
-    """A figure of the runs of a study both ways, for one topography."""
-
-    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """A study that does not come back is one more."""
-        yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
-
-
-class PullOffFigure(StudyFigure):
-    """A figure of the pull-off of all runs of some studies."""
-
-    load_studies: list_of_names("Studies that differ in their largest load.") | None = Field(
-        default=None, description="Names of studies that differ in their largest load, for a second panel."
-    )
-    quantity: Literal["pull_off_pressure", "pull_off_over_strength", "pull_off_over_summits"] = Field(
-        default="pull_off_pressure",
-        description="What is drawn: the largest tension, or its part of the interface's strength or of what all "
-        "asperities could pull at once.",
-    )
-
-    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Those of both panels."""
-        return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Studies of the second panel that are not there, and studies that do not come back, are more."""
-        yield from studies_problems(campaign, "load_studies", self.load_studies or ())
-        yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, in_part=False)
-
-
-class LossFigure(FigureOptions):
-    """A figure of the energy lost in the runs of some studies."""
-
-    studies: list_of_names("Studies that are drawn; those that differ in their largest load only make up the lines.")
-    over_surface_energy: Flag = Field(
-        default=True, description="Whether the loss is drawn over the surface energy, or in J/m²."
-    )
-
-    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """All of them."""
-        return tuple(dict.fromkeys(self.studies))
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Studies that are not there, or do not come back."""
-        yield from studies_problems(campaign, "studies", self.studies)
-
-
-class SnapMapFigure(RunFigure):
-    """A figure of the events of one run; what is left out is the study's first."""
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """A study that does not come back is one more."""
-        yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
-
-
-class SourcesFigure(FigureOptions):
-    """A figure of where the model's error comes from."""
-
-    entry: Name = Field(description="Name of the entry of `error_sources` that is drawn: its runs without adhesion.")
-
-    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """The one beside which the entry stands."""
-        return (campaign.error_sources[self.entry].study,)
-
-    def arguments(self) -> dict[str, Any]:
-        """Files only."""
-        return {}
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """What keeps the runs without adhesion of the entry from differing in their seeds only."""
-        yield from unknown(("entry",), self.entry, campaign.error_sources)
-        entry = campaign.error_sources.get(self.entry)
-        if entry is None or entry.study not in campaign.studies:
-            return
-        contacts = campaign.solved(entry)
-        bare = [each for each in contacts if campaign.materials[each.material].surface_energy == 0]
-        for what, asked in (
-            ("surface", [each.surface for each in contacts]),
-            ("rms slope", [each.rms_slope for each in contacts]),
-            ("material without adhesion", [each.material for each in bare]),
-        ):
-            there = list(dict.fromkeys(asked))
-            if len(there) != 1:
-                listed = f" ({', '.join(map(str, there))})" if there else ""
-                reason = f"has not one {what} but {len(there)}{listed}; allowed: an entry with one, and any seeds"
-                yield ("entry",), self.entry, reason
-
-
 def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iterator[Problem]:
     """What is wrong with a list of studies that come back all the way."""
     for index, name in enumerate(names):
         yield from unknown((key, index), name, campaign.studies)
         yield from not_unloaded(campaign, (key, index), name, in_part=False)
+
+
+def model_error_only(campaign: Campaign, options: ComparedFigure, files: ResultFiles) -> Inputs:
+    """The inputs of a figure of the error of the model alone."""
+    return {"model_error": files.model_error}

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
-import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
-from matplotlib.figure import Figure
 
 from icha.figures.style import COLOURS, material_label, unit_for
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # The most that a legend names, with a colour for each.
 MOST_COLOURS = len(COLOURS)
@@ -35,6 +35,9 @@ class Scale:
 
         The darkest colours, in parts of the map from 0 to 0.9, do not show on black.
         """
+        import matplotlib as mpl
+        from matplotlib.colors import to_hex
+
         common = "" if title else _beginning(names)
         self.names = [name.removeprefix(common) for name in names]
         self.title = title or common.rstrip("-_ ")
@@ -43,6 +46,9 @@ class Scale:
 
     def draw(self, figure: Figure, axes: Sequence[Axes]) -> None:
         """Add the bar beside the panels; of many names only some are written."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import BoundaryNorm, ListedColormap
+
         count = len(self.names)
         mappable = ScalarMappable(BoundaryNorm(np.arange(count + 1) - 0.5, count), ListedColormap(self.colours))
         bar = figure.colorbar(mappable, ax=axes, pad=0.015, aspect=28)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
-from icha.datasets.campaign import find_snapshot, loading_stops, reduced_gap, run_labels, select_run
 from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.variables.campaign import COMPLETE, RAGGED
 from icha.figures.style import number, slope_label
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class NothingToDraw(ValueError):
@@ -28,8 +28,12 @@ def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> lis
     ValueError
         If the campaign has no such study.
     """
-    if study not in campaign.children:
-        raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
+    import xarray as xr
+
+    from icha.datasets.campaign import reduced_gap, select_run
+    from icha.datasets.variables.campaign import COMPLETE, RAGGED
+
+    _check_study(campaign, study)
     dataset = campaign[study].to_dataset()
     axes = [dataset[label].values.tolist() for label in LABELS]
     complete = np.argwhere(dataset["status"].transpose(*LABELS).values == COMPLETE)
@@ -42,6 +46,11 @@ def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> lis
     found = (RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True))) for index in complete.tolist())
     runs = [(labels, select_run(campaign, labels)) for labels in found]
     return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
+
+
+def _check_study(campaign, study):
+    if study not in campaign.children:
+        raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
 
 
 def pick(labels: str, wanted, there: list):
@@ -77,8 +86,10 @@ def pick_run(
     ValueError
         If there is no such study or run.
     """
-    if study not in campaign.children:
-        raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
+    from icha.datasets.campaign import run_labels, select_run
+    from icha.datasets.variables.campaign import COMPLETE
+
+    _check_study(campaign, study)
     runs = [labels for labels in run_labels(campaign) if labels.study == study]
     runs = [labels for labels in runs if surface in (None, labels.surface) and seed in (None, labels.seed)]
     runs = [labels for labels in runs if rms_slope is None or np.isclose(rms_slope, labels.rms_slope)]
@@ -94,18 +105,31 @@ def pick_run(
     return labels, select_run(campaign, labels)
 
 
-def check_topography(labels: RunLabels, run: xr.Dataset, surface: xr.Dataset) -> None:
-    """Raise ValueError unless a surface file's dataset is the topography of a run."""
-    if not np.isclose(float(surface["period"]), float(run["period"]), rtol=1e-9) or int(surface["grid"]) != int(
-        run["grid"]
-    ):
+def run_on_topography(
+    campaign: xr.DataTree, study: str, topography: xr.Dataset, **asked
+) -> tuple[RunLabels, xr.Dataset]:
+    """The run that `pick_run` finds, if a surface file's dataset is its topography.
+
+    Raises
+    ------
+    NothingToDraw
+        If it is not complete.
+    ValueError
+        If there is no such study or run, or the surface is another one's.
+    """
+    labels, run = pick_run(campaign, study, **asked)
+    same = np.isclose(float(topography["period"]), float(run["period"]), rtol=1e-9)
+    if not same or int(topography["grid"]) != int(run["grid"]):
         raise ValueError(f"{labels}: the surface given has another period or grid")
-    if "seed" in surface and int(surface["seed"]) != labels.seed:
-        raise ValueError(f"{labels}: the surface given has seed {int(surface['seed'])}")
+    if "seed" in topography and int(topography["seed"]) != labels.seed:
+        raise ValueError(f"{labels}: the surface given has seed {int(topography['seed'])}")
+    return labels, run
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
     """The first loading's stops in the study's list of targets, without those added for snapshots of another kind."""
+    from icha.datasets.campaign import loading_stops
+
     run = run.isel(step=loading_stops(run).values)
     kinds = [str(kind) for kind in run["step_kind"].values]
     main = max(dict.fromkeys(kinds), key=kinds.count, default=None)
@@ -142,6 +166,8 @@ def first_line(
     ValueError
         If there is no such study, run or snapshot.
     """
+    from icha.datasets.campaign import find_snapshot
+
     runs = study_runs(campaign, study)
     first = runs[0][0]
     found: dict[str, Snapshots] = {}

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def circles_in_cell(x, y, radius, period: float, boundary: str) -> np.ndarray:
@@ -19,6 +22,8 @@ def circles_in_cell(x, y, radius, period: float, boundary: str) -> np.ndarray:
 
 def draw_spots(axes: Axes, circles: np.ndarray, **look) -> None:
     """Add circles, (m, 3) of x, y and radius in data units, to axes."""
+    from matplotlib.collections import EllipseCollection
+
     if not len(circles):
         return
     x, y, radius = circles.T

@@ -1,18 +1,23 @@
-"""One look for all figures, and files with the same bytes whenever they are drawn from the same data."""
+"""One look for all figures, and files with the same bytes whenever they are drawn from the same data.
+
+Matplotlib is imported where something is drawn: whoever reads a configuration need not wait for it.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatterSciNotation
 
 from icha.support.atomic_files import whole_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 # Widths of one and of two columns of a journal page, inches.
 ONE_COLUMN = 3.5
@@ -61,16 +66,27 @@ def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
     @wraps(draw)
     def drawn(*args, **kwargs):
-        with mpl.rc_context():
-            mpl.rcdefaults()
-            mpl.rcParams.update(RC)
+        with _in_style():
             return draw(*args, **kwargs)
 
     return drawn
 
 
+@contextmanager
+def _in_style():
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(RC)
+        yield
+
+
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure that belongs to no window and to no global state; sizes in inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(width, height), layout="constrained")
     figure.get_layout_engine().set(w_pad=0.05, h_pad=0.06)
     FigureCanvasAgg(figure)
@@ -79,9 +95,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
     """Write a figure to both formats, without date or name of the software that would change with its version."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(RC)
+    with _in_style():
         with whole_file(png) as temporary:
             figure.savefig(temporary, format="png", metadata={"Software": None})
         with whole_file(pdf) as temporary:
@@ -91,31 +105,23 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
 
 def logarithmic_axes(axes, directions: str = "xy") -> None:
     """Make the axes of these directions logarithmic; between powers of ten only as much is labelled as has room."""
+    from icha.figures.ticks import FewLabels
+
     for direction in directions:
         axes.set(**{f"{direction}scale": "log"})
-        getattr(axes, f"{direction}axis").set_minor_formatter(_FewLabels())
+        getattr(axes, f"{direction}axis").set_minor_formatter(FewLabels())
 
 
-class _FewLabels(LogFormatterSciNotation):
-    """Labels of the ticks between powers of ten: twos and fives where an axis shows less than two powers.
+def line_artist(x, y, **look) -> Line2D:
+    """A line that belongs to no axes yet; `look` as for `Axes.plot`."""
+    from matplotlib.lines import Line2D
 
-    Where these are too few as well, some of the ticks that there are.
-    """
+    return Line2D(x, y, **look)
 
-    _MOST = 3
 
-    def set_locs(self, locs):
-        low, high = sorted(self.axis.get_view_interval())
-        powers = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
-        inside = [at for at in locs if low <= at <= high]
-        digits = [at / 10 ** np.floor(np.log10(at)) for at in inside]
-        chosen = [at for at, digit in zip(inside, digits, strict=True) if np.isclose(digit, (2, 5)).any()]
-        if len(chosen) + powers < 2:
-            chosen = inside[:: -(-len(inside) // self._MOST) or 1]
-        self._chosen = chosen if powers < 2 else []
-
-    def __call__(self, x, pos=None):
-        return super().__call__(x, pos) if x in self._chosen else ""
+def legend_handle(**look) -> Line2D:
+    """A line that only a legend shows."""
+    return line_artist([], [], **look)
 
 
 def panel_label(axes, letter: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import stdtrit
 
 # The part of such bands that hold the mean of infinitely many surfaces.
 CONFIDENCE = 0.95
@@ -36,6 +35,8 @@ def ensemble(samples, axis: int = 0) -> Ensemble:
     The band of n members of standard deviation s is mean ± t s/√n, where t is the quantile of Student's distribution of
     n - 1 degrees of freedom beyond which (1 - 0.95)/2 of it lies (Student, Biometrika 6 (1908) 1).
     """
+    from scipy.special import stdtrit  # here, for figures' declarations need not wait for it
+
     samples = np.moveaxis(np.asarray(samples, float), axis, 0)
     known = np.isfinite(samples)
     count = known.sum(axis=0)

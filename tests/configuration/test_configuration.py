@@ -12,7 +12,6 @@ import icha.surfaces.measured.topography
 from icha.configuration.cases import (
     asperity_cases,
     loop_cases,
-    map_solution,
     run_cases,
     solution_cases,
     source_cases,
@@ -26,7 +25,6 @@ from icha.configuration.schema import json_schema, readme_with_tables
 from icha.configuration.settings import (
     campaign_sha256,
     loop_settings,
-    measurement_settings,
     run_settings,
     run_sha256,
     solution_settings,
@@ -35,6 +33,7 @@ from icha.configuration.settings import (
 )
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.labels import number_label
+from icha.figures.fig4_contact_map import finest_solution
 from icha.references.literature import literature
 from icha.support.units import to_number, to_si
 from icha.support.values import Section
@@ -143,7 +142,8 @@ def test_boundary_elements_stand_beside_the_papers_runs():
     assert energies == {0.0, 0.05}  # with and without adhesion
     for case in cases:
         assert ("reduced_pressure", case.reduced_pressure) in run_settings(campaign, case.run)["path"]["snapshots"]
-    assert map_solution(campaign).material == campaign.figures.fig4_contact_map.material
+    drawn = campaign.figures.fig4_contact_map
+    assert finest_solution(campaign, drawn).material == drawn.material
 
 
 def test_the_validation_varies_what_makes_a_surface():
@@ -838,7 +838,7 @@ def test_the_map_is_compared_with_the_finest_solution_of_its_state(load):
 
     def solution(**figure):
         campaign = load({**changes, "figures": {"fig4_contact_map": {"study": "one", **figure}}}).campaign
-        return map_solution(campaign)
+        return finest_solution(campaign, campaign.figures.fig4_contact_map)
 
     at_load = {"snapshot": {"reduced_pressure": 0.01}}
     assert solution(**at_load).path == "coarse/rough/seed1/slope0.2/soft/p0.01"
@@ -1207,8 +1207,9 @@ def _measurement(**changes):
 
 def test_measurements(load, tmp_path):
     (tmp_path / "points.csv").write_text("p, a\n10, 1\n20, 2.5\n")
-    campaign = load({"measurements": {"lab": _measurement()}}).campaign
-    (settings,) = measurement_settings(campaign, "one")
+    changes = {"measurements": {"lab": _measurement()}, "figures": {"fig5_multi_slope": {"study": "one"}}}
+    campaign = load(changes).campaign
+    (settings,) = campaign.figures.arguments("fig5_multi_slope", campaign)["measurements"]
     assert settings["columns"] == {"p": 1e3, "a": 0.01}
     assert settings["load_unit"] == 25e6 * 0.5
 

@@ -31,6 +31,7 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
+from icha.figures.maps import block_means
 from icha.figures.scale import Scale, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
 from icha.figures.spots import circles_in_cell
@@ -242,7 +243,7 @@ def test_fig4_draws_means_of_large_topographies():
     rng = np.random.default_rng(5)
     for n in (3000, 2048, 1024, 7):
         heights = rng.normal(size=(n, n)) if n < 3000 else np.add.outer(np.arange(n) ** 2.0, np.arange(n) * 10.0)
-        drawn = fig4_contact_map._means(heights)
+        drawn = block_means(heights)
         assert drawn.shape == (min(n, 1024),) * 2
         if n == 2048:
             assert drawn[3, 5] == pytest.approx(heights[6:8, 10:12].mean())
@@ -286,20 +287,24 @@ def test_circles_continue_across_borders():
     assert len(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "free")) == 2
 
 
-def test_fig5_lays_measurements_over_the_curves():
-    measured = fig5_multi_slope.MeasuredAreas(
-        "Someone, 2020", "A paper.", np.array([1e-3, 1e-2, 2e-2]), np.array([2e-3, 2e-2, 4e-2]), "soft", 0.2
-    )
-    without_slope = fig5_multi_slope.MeasuredAreas(
-        "Another", "A paper.", np.array([1e-3, 1e-2, 2e-2]), np.array([3e-3, 3e-2, 5e-2])
-    )
-    left, right = fig5_multi_slope.figure(small.tree(), study="slopes", measurements=[measured, without_slope]).axes
+def test_fig5_lays_measurements_over_the_curves(tmp_path):
+    (tmp_path / "one.csv").write_text("p, a\n1, 0.2\n10, 2\n20, 4\n")
+    (tmp_path / "other.csv").write_text("p, a\n1e-3, 3e-3\n1e-2, 3e-2\n2e-2, 5e-2\n")
+    measured = {"columns": {"p": 1e3, "a": 0.01}, "load_unit": 1e6, "material": "soft", "rms_slope": 0.2}
+    without_slope = {"columns": {"p": 1.0, "a": 1.0}, "load_unit": 1.0, "material": None, "rms_slope": None}
+    left, right = fig5_multi_slope.figure(
+        small.tree(),
+        [tmp_path / "one.csv", tmp_path / "other.csv"],
+        study="slopes",
+        measurements=[measured | {"label": "Someone, 2020"}, without_slope | {"label": "Another"}],
+    ).axes
     found = {line.get_label(): line for line in left.get_lines() if not line.get_label().startswith("_")}
     assert set(found) == {"Someone, 2020", "Another"}
-    np.testing.assert_array_equal(found["Another"].get_ydata(), without_slope.area_fraction)
+    np.testing.assert_allclose(found["Someone, 2020"].get_xydata(), [(1e-3, 2e-3), (1e-2, 2e-2), (2e-2, 4e-2)])
+    np.testing.assert_array_equal(found["Another"].get_ydata(), [3e-3, 3e-2, 5e-2])
     shifted = [line for line in right.get_lines() if len(line.get_xdata()) == 3]
     assert len(shifted) == 1
-    np.testing.assert_allclose(shifted[0].get_xdata(), measured.reduced_pressure * 0.2)
+    np.testing.assert_allclose(shifted[0].get_xdata(), [2e-4, 2e-3, 4e-3])
 
 
 def test_fig5_slope_orders_the_curves_at_equal_load():
@@ -619,7 +624,7 @@ def test_only_complete_runs_are_drawn():
 
 @pytest.mark.parametrize("module", FIGURES + COMPARED, ids=lambda module: module.__name__)
 def test_captions_are_sentences(module):
-    assert len(module.CAPTION) > 100 and module.CAPTION.endswith(".")
+    assert len(module.DECLARATION.caption) > 100 and module.DECLARATION.caption.endswith(".")
 
 
 def test_units_as_people_write_them():

@@ -520,4 +520,4 @@ def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, module)
 
 def test_captions_end():
     for module in MODULES:
-        assert module.CAPTION.endswith(".") and "  " not in module.CAPTION
+        assert module.DECLARATION.caption.endswith(".") and "  " not in module.DECLARATION.caption

@@ -57,11 +57,10 @@ class Page(HTMLParser):
 
 @pytest.fixture
 def write(tmp_path):
-    save(fig1_jkr.figure(), tmp_path / "figures" / "fig1_jkr.png", tmp_path / "figures" / "fig1_jkr.pdf")
+    files = [tmp_path / "figures" / f"fig1_jkr.{ending}" for ending in ("png", "pdf")]
+    save(fig1_jkr.figure(), *files)
     write_surface(tmp_path / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
-    picture = ReportFigure(
-        "fig1_jkr", fig1_jkr.CAPTION, tmp_path / "figures" / "fig1_jkr.png", tmp_path / "figures" / "fig1_jkr.pdf"
-    )
+    picture = ReportFigure("fig1_jkr", fig1_jkr.DECLARATION.caption, *files)
 
     def written(name="report.html", **changes):
         arguments = {

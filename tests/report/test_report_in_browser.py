@@ -38,7 +38,7 @@ def folder(tmp_path_factory):
     ):
         files = [folder / "figures" / f"{name}.{ending}" for ending in ("png", "pdf")]
         save(figure, *files)
-        pictures.append(ReportFigure(name, module.CAPTION, *files, studies))
+        pictures.append(ReportFigure(name, module.DECLARATION.caption, *files, studies))
     write_times_page(folder / "benchmarks" / "index.html", [Benchmark("runs/one", 75.0, 120.0)])
     write_report(
         folder / "report.html",

@@ -10,6 +10,7 @@ from icha.datasets.campaign import campaign_tree, select_run
 from icha.datasets.files import read_campaign, read_run, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
+from icha.figures.drawing import draw_figure
 from icha.figures.fig2_area_and_gap import figure
 from icha.figures.select import NothingToDraw
 
@@ -113,8 +114,6 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
 
 
 def test_a_campaign_of_failed_runs_only_is_a_dataset_and_an_empty_page(sweep, dataset, tmp_path):
-    from draw_figure import draw_figure
-
     file, _ = dataset({name: sweep(name, STICKY)[0] for name in ("one", "two")})
     tree = read_campaign(file)
     assert tree["sticky"].sizes["step"] == 0
@@ -122,7 +121,7 @@ def test_a_campaign_of_failed_runs_only_is_a_dataset_and_an_empty_page(sweep, da
     with pytest.raises(NothingToDraw):
         figure(tree, study="sticky")
     files = [tmp_path / f"fig2.{ending}" for ending in ("png", "pdf")]
-    draw_figure("fig2_area_and_gap", *files, data={"campaign": file}, options={"study": "sticky"})
+    draw_figure("fig2_area_and_gap", *files, inputs={"campaign": str(file)}, arguments={"study": "sticky"})
     assert all(file.stat().st_size > 1000 for file in files)
 
 

@@ -11,8 +11,8 @@ from command_line import campaign_configuration
 from fingerprint import code_fingerprint
 from publishable import refuse_unpublishable
 
-from icha.configuration.cases import asperity_cases, loop_cases, map_solution, run_cases, solution_cases, source_cases, surface_cases
-from icha.configuration.settings import campaign_sha256, loop_settings, measurement_settings, run_settings, run_sha256, solution_settings, source_settings, surface_settings
+from icha.configuration.cases import asperity_cases, loop_cases, run_cases, solution_cases, source_cases, surface_cases
+from icha.configuration.settings import campaign_sha256, loop_settings, run_settings, run_sha256, solution_settings, source_settings, surface_settings
 from icha.configuration.named_files import with_files_beside_it
 from icha.planning.costs import job_threads
 from icha.publication.attributes import discovery_attributes
@@ -62,7 +62,6 @@ ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
 
 
 wildcard_constraints:
-    name="|".join(CAMPAIGN.figures.drawn()) or "none",
     entry="[a-z0-9_-]+",
     asperity="hertz|mu[0-9.]+",
     study="[a-z0-9_-]+",
@@ -112,15 +111,6 @@ def minutes_of(wildcards):
     return 120 if study.unload or study.turning_points else 30
 
 
-def figure_memory(name):
-    """Megabytes that a figure needs: the map holds a topography."""
-    return 2000 + (
-        16 * max(points_of(name) for name, _ in surface_cases(CAMPAIGN)) // 10**6
-        if name in ("fig4_contact_map", "fig16_snap_map")
-        else 0
-    )
-
-
 def solution_of(wildcards):
     return SOLUTION_CASES["{entry}/{surface}/seed{seed}/slope{slope}/{material}/p{pressure}.nc".format(**wildcards)]
 
@@ -155,78 +145,6 @@ def case_of(wildcards):
 
 def settings_of(wildcards):
     return run_settings(CAMPAIGN, case_of(wildcards))
-
-
-def sources_drawn(entry):
-    """Files of an entry of error sources without adhesion."""
-    return [
-        file
-        for file, case in zip(ERROR_SOURCES, SOURCE_CASES.values(), strict=True)
-        if case.entry == entry and CAMPAIGN.materials[case.material].surface_energy == 0
-    ]
-
-
-def loops_of(study):
-    """Files of boundary elements both ways beside a study."""
-    return [
-        file
-        for file, case in zip(LOOPS, LOOP_CASES.values(), strict=True)
-        if CAMPAIGN.boundary_element_loops[case.entry].study == study
-    ]
-
-
-def figure_data(name):
-    """Files that a figure needs, by the names of its arguments."""
-    options = CAMPAIGN.figures.drawn()[name]
-    if name == "fig1_jkr":
-        return {}
-    if name == "fig12_error_sources":
-        return {"error_sources": sources_drawn(options.entry)}
-    if name in ("fig10_model_error", "fig11_distribution_error"):
-        return {"model_error": MODEL_ERROR[0]}
-    data = {"campaign": DATASET}
-    if name == "fig15_loss":
-        return data
-    study = CAMPAIGN.studies[options.study]
-    if name == "fig13_loops" and loops_of(options.study):
-        data["loops"] = loops_of(options.study)
-    if name == "fig16_snap_map":
-        case = options.run(CAMPAIGN)
-        data["surface"] = f"{RESULTS}/surfaces/{case.surface}/seed{case.seed}.nc"
-    if name in ("fig2_area_and_gap", "fig7_stiffness"):
-        data["references"] = f"{RESULTS}/references/{study.surfaces[0]}.nc"
-    if name in ("fig2_area_and_gap", "fig3_distributions"):
-        if any(entry.study == options.study for entry in CAMPAIGN.boundary_elements.values()):
-            data["model_error"] = MODEL_ERROR[0]
-    if name == "fig4_contact_map":
-        case = options.run(CAMPAIGN)
-        data["surface"] = f"{RESULTS}/surfaces/{case.surface}/seed{case.seed}.nc"
-        solution = map_solution(CAMPAIGN)
-        if solution is not None:
-            data["solution"] = f"{RESULTS}/references/boundary_elements/{solution.path}.nc"
-    if name == "fig5_multi_slope":
-        files = [m.path for m in CAMPAIGN.measurements.values() if m.study == options.study]
-        if files:
-            data["measurements"] = files
-    return data
-
-
-def figure_options(name):
-    """Arguments of a figure other than data."""
-    options = CAMPAIGN.figures.drawn()[name].model_dump(exclude={"snapshot", "entry"}, exclude_none=True)
-    snapshot = getattr(CAMPAIGN.figures.drawn()[name], "snapshot", None)
-    if snapshot is not None:
-        options["kind"], options["target"] = snapshot.target
-    if name in ("fig4_contact_map", "fig16_snap_map") and "surface" in options:
-        options["surface_name"] = options.pop("surface")
-    return options
-
-
-def measurements_of(name):
-    """What is to be known of the measurements that are laid over a figure; their files are its input."""
-    if name != "fig5_multi_slope":
-        return []
-    return measurement_settings(CAMPAIGN, CAMPAIGN.figures.drawn()[name].study)
 
 
 def what_is_published(wildcards):

@@ -1,6 +1,5 @@
 """Write the report of a campaign, and what its jobs took."""
 
-import importlib
 from pathlib import Path
 
 import yaml
@@ -8,6 +7,7 @@ from job import guarded
 
 from icha.analysis.checks import read_checks
 from icha.datasets.files import read_campaign
+from icha.figures.registry import DECLARATIONS
 from icha.report.report import (
     ReportFigure,
     read_benchmarks,
@@ -32,9 +32,7 @@ def make_report(
         page,
         campaign=read_campaign(campaign),
         figures=[
-            ReportFigure(
-                name, importlib.import_module(f"icha.figures.{name}").CAPTION, png, pdf, studies_of(asked, name)
-            )
+            ReportFigure(name, DECLARATIONS[name].caption, png, pdf, studies_of(asked, name))
             for name, (png, pdf) in figures.items()
         ],
         checks=read_checks(checks),
