@@ -14,8 +14,9 @@ import numpy as np
 import icha
 from icha import simulation
 from icha.datasets.files import write_dataset
+from icha.equilibrium import observables
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.half_space import interaction as elasticity
+from icha.half_space import interaction
 
 MODULUS, SURFACE_ENERGY, RANGE = 25e6, 0.05, 2.071e-9
 SNAPSHOT = [("reduced_pressure", 0.01)]
@@ -103,17 +104,17 @@ def main(kind, adhesion, answer):
     with contextlib.ExitStack() as watched:
         for owner, name, stage in (
             (simulation, "find_summits", "summits"),
-            (simulation, "gap_distribution", "fields of the snapshot"),
-            (simulation, "pressure_distribution", "fields of the snapshot"),
+            (observables, "gap_distribution", "fields of the snapshot"),
+            (observables, "pressure_distribution", "fields of the snapshot"),
         ):
             watched.enter_context(mock.patch.object(owner, name, stages.timed(stage, getattr(owner, name))))
         watched.enter_context(mock.patch.object(simulation, "follow", stages.timed_steps("path", simulation.follow)))
         for owner, name, what in (
             (InteractingAsperities, "equilibrium", "equilibria"),
-            (elasticity.Interaction, "tangent", "linearisations"),
-            (elasticity.Tangent, "__call__", "products with the tangent"),
-            (elasticity.Tangent, "nearly", "products with the tangent"),
-            (elasticity.Interaction, "displacement", "displacements"),
+            (interaction.Interaction, "tangent", "linearisations"),
+            (interaction.Tangent, "__call__", "products with the tangent"),
+            (interaction.Tangent, "nearly", "products with the tangent"),
+            (interaction.Interaction, "displacement", "displacements"),
         ):
             watched.enter_context(mock.patch.object(owner, name, stages.counted(what, getattr(owner, name))))
 

@@ -326,12 +326,14 @@ def site(tmp_path_factory):
     return pages, folder
 
 
+@pytest.mark.slow
 def test_every_page_is_in_the_site(site):
     pages, _ = site
     sources = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md") if "_build" not in path.parts}
     assert sources <= set(pages)
 
 
+@pytest.mark.slow
 def test_every_link_within_the_site_leads_somewhere(site):
     pages, folder = site
     broken = []
@@ -349,6 +351,7 @@ def test_every_link_within_the_site_leads_somewhere(site):
     assert not broken, "\n".join(broken)
 
 
+@pytest.mark.slow
 def test_the_site_needs_no_network(site):
     pages, folder = site
     remote = [f"{name}: {each}" for name, page in pages.items() for each in page.fetched if urlsplit(each).netloc]
