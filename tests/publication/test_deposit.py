@@ -6,7 +6,6 @@ import getpass
 import hashlib
 import importlib.metadata
 import importlib.util
-import itertools
 import json
 import os
 import random
@@ -16,7 +15,6 @@ import subprocess
 import time
 import zipfile
 import zlib
-from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -27,30 +25,22 @@ import small_campaign as small
 import xarray as xr
 import yaml
 from conftest import REPOSITORY, copy_project, snakemake_command
-from markdown_it import MarkdownIt
-from mdit_py_plugins.dollarmath import dollarmath_plugin
 from PIL import Image, PngImagePlugin
-from publications import ALL, COMMIT, LEAST, ORCID
 from traces import traces
 from typer.testing import CliRunner
 
-from icha.analysis.checks import check_campaign, read_checks
+from icha.analysis.checks import read_checks
 from icha.cli import app
 from icha.configuration.load import load_configuration
 from icha.configuration.named_files import with_files_beside_it
-from icha.configuration.publication import Author, Funding, KnownFailure
+from icha.configuration.publication import KnownFailure
 from icha.configuration.settings import campaign_sha256
-from icha.planning.costs import Cost
 from icha.planning.plan import whole_cost
 from icha.publication import deposit as deposits
 from icha.publication import dictionary
-from icha.publication.attributes import discovery_attributes
 from icha.publication.deposit import make_deposit
 from icha.publication.deposit_files import contents, verify_deposit
 from icha.publication.dictionary import data_dictionary, kind_of
-from icha.publication.environment import differences, refuse_other_environment
-from icha.publication.licences import known_licence, licence_page
-from icha.publication.readme import markdown, readme
 from icha.publication.source import committed_source
 from icha.support.checksums import write_checksum
 
@@ -334,174 +324,6 @@ def test_the_page_for_readers_tells_the_numbers(published):
     for path in re.findall(r"`([\w./-]+)`", page):
         if "/" in path and not path.startswith("source/docs/"):
             assert (published / path).exists(), path
-
-
-# What Markdown, HTML or a table would take for something else.
-ODD = [
-    *(
-        "<load>",
-        "*x*",
-        "**x**",
-        "_x_",
-        "__a b__",
-        "a_b_c _d e_",
-        "`code`",
-        "[text](address)",
-        "![image]",
-        "~~gone~~",
-        "a | b",
-    ),
-    *(
-        "\\",
-        "\\|",
-        "\\*x\\*",
-        "$\\alpha_0^2$",
-        "&lt;",
-        "&#60;",
-        "R&D &c",
-        "<!-- not here -->",
-        "<b>bold</b>",
-        "# one #",
-        "> two",
-    ),
-    *(
-        "- three",
-        "+ four",
-        "5. five",
-        "6) six",
-        "1.5 mm",
-        "-7 °C",
-        "---",
-        "===",
-        "***",
-        "```",
-        "~~~",
-        "[a]: b",
-        "a ||| b |",
-    ),
-    *(
-        "小_明_",
-        "https://example.org/~me/a_b_?c=1&d=*2*_e_.",
-        "see (https://example.org/a|b).",
-        "trailing\\",
-        "* list",
-        "^ _ ^",
-    ),
-]
-
-
-# That of GitHub, with its formulas; what is no link by its brackets is none.
-MARKDOWN = MarkdownIt("gfm-like", {"linkify": False}).use(dollarmath_plugin)
-
-
-def shown(text, kind="paragraph"):
-    """What a reader sees of all paragraphs, headings or cells of a page."""
-    tokens = MARKDOWN.parse(text)
-    said = []
-    for opened, inline in itertools.pairwise(tokens):
-        if opened.type == f"{kind}_open":
-            plain = {"text", "text_special", "link_open", "link_close", "code_inline"}
-            assert {child.type for child in inline.children} <= plain
-            said.append("".join(child.content for child in inline.children))
-    return said
-
-
-def test_texts_are_shown_as_they_are_written_wherever_they_stand():
-    for odd in ODD:
-        escaped = markdown(odd)
-        assert shown(f"Before.\n\n{escaped}\n\nAfter.\n") == ["Before.", odd, "After."]
-        assert shown(f"# {escaped}\n", "heading") == [odd]
-        assert shown(f"> {escaped}\n") == [odd]
-        assert shown(f"a {escaped} {escaped} z\n") == [f"a {odd} {odd} z"]
-        assert shown(f"| a | b |\n|---|---|\n| {escaped} | {escaped} |\n", "td") == [odd, odd]
-
-
-def test_links_lead_to_the_address():
-    for odd in ("https://example.org/~me/a_b_?c=1&d=*2*.", "see (https://example.org/~me/a_b_?c=1&d=*2*)!"):
-        tokens = MARKDOWN.parse(markdown(odd))[1].children
-        (link,) = (token.attrs["href"] for token in tokens if token.type == "link_open")
-        assert link == "https://example.org/~me/a_b_?c=1&d=*2"
-
-
-@pytest.fixture(scope="module")
-def small_readme():
-    """A function that writes the page of the small campaign in `small_campaign`, with one of its runs failed."""
-    reason = "it is stuck | at <A/A0> = *1*"
-    failed = small.runs()[0][0]
-    runs = [(labels, run.assign_attrs(incomplete=reason) if labels == failed else run) for labels, run in small.runs()]
-    tree = small.campaign_tree(runs, attrs={"campaign": "small"})
-    checks = [replace(check, value=-check.value) for check in check_campaign(tree)]
-
-    def written(publication, checks=checks):
-        campaign = load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign
-        return readme(
-            publication,
-            campaign=campaign,
-            licence=known_licence("CC0-1.0"),
-            commit=COMMIT,
-            dataset=tree,
-            checks=checks,
-            model_error=None,
-            dictionary=[],
-            sizes={"dataset/smoke.nc": 2_000_000, "report.html": 340_000, "source/icha/asperity/jkr.py": 10**9},
-            cost=Cost(60.0, 2e8, 7e6),
-        )
-
-    written.failed, written.reason, written.steps = str(failed), reason, small.runs()[0][1].sizes["step"]
-    return written
-
-
-def test_the_page_shows_whatever_texts_a_publication_has(small_readme):
-    title, other = "Two <loads> | *one* `law`: $E^*$ _x_ [1]", "R&D &lt; `q` | _K_ *"
-    publication = LEAST.model_copy(
-        update={
-            "title": title,
-            "summary": f"{other}\n{other}\n  \n- no list\n\n1. {title}\n",
-            "authors": [Author(family_names=other, given_names="*Jo*", affiliation=f"<{other}>"), Author(name=title)],
-            "funding": [Funding(funder=other, award_title=title)],
-            "known_failures": [KnownFailure(run=small_readme.failed, reason=other)],
-        }
-    )
-    page = small_readme(publication)
-    assert shown(page, "heading")[0] == title
-    tokens = [token for token in MARKDOWN.parse(page) if token.type in ("inline", "html_block")]
-    said = ["".join(child.content for child in token.children or ()) for token in tokens]
-    assert not any(token.type == "html_block" for token in tokens)
-    assert said[1:4] == [f"{other} {other}", "- no list", f"1. {title}"]
-    assert f"Funded by {other} ({title})." in said
-    (citation,) = (text for text in said if text.startswith(other + ", *Jo*; "))
-    assert title in citation
-    for cell in (f"*Jo* {other}", f"<{other}>", small_readme.failed, small_readme.reason, other):
-        assert cell in said, cell
-    assert "ORCID" not in said
-
-
-def test_makers_have_columns_only_for_what_is_known_of_them(small_readme):
-    one, two = Author(name="A_B team"), Author(family_names="Wang", given_names="Ming")
-    page = small_readme(LEAST.model_copy(update={"authors": [one, two]}))
-    assert "Made by A_B team; Ming Wang.\n" in page and "made by" not in page
-    known = one.model_copy(update={"ror": "https://ror.org/03yrm5c26"})
-    page = small_readme(LEAST.model_copy(update={"authors": [known, two]}))
-    table = "| made by | affiliation |\n|---|---|\n| A_B team | <https://ror.org/03yrm5c26> |\n| Ming Wang |  |\n"
-    assert table in page
-    page = small_readme(ALL)
-    assert shown(page, "th")[:3] == ["made by", "ORCID", "affiliation"]
-
-
-def test_the_page_says_what_failed_and_that_it_fails_again(small_readme):
-    known = [KnownFailure(run=small_readme.failed, reason="It | shows it.")]
-    page = small_readme(LEAST.model_copy(update={"known_failures": known}))
-    cells = shown(page, "td")
-    at = cells.index(small_readme.failed)
-    assert cells[at : at + 4] == [small_readme.failed, str(small_readme.steps), small_readme.reason, "It | shows it."]
-    assert cells.count(small_readme.reason) == 1  # and not where it is said what the check is
-    completed = cells[cells.index("completed") :][:5]
-    assert completed == ["completed", "6", "-1", "0", "0 if the run reached the end of its path, else 1"]
-    assert "-0" not in cells
-    assert "One of them did not reach the end of its path" in page and "complete.\n" not in page
-    assert "The check `completed` fails for the run that is listed under *Design*" in page
-    assert "What failed here fails again" in page
-    assert "The results take 2.34 MB of disk, 200 MB of memory" in page
 
 
 def committed_commit(published):
@@ -799,205 +621,3 @@ def test_zips_with_other_files_are_said(tmp_path, names, said):
             with pytest.warns() if name in archive.namelist() else open(os.devnull):
                 archive.writestr(name, b"read")
     assert any(said in line for line in verify_deposit(tmp_path / "a.zip"))
-
-
-# The source.
-
-
-def git(folder, *arguments):
-    who = ["-c", "user.name=nobody", "-c", "user.email=nobody@example.org"]
-    return subprocess.run(["git", *who, *arguments], cwd=folder, check=True, capture_output=True, text=True).stdout
-
-
-@pytest.fixture
-def repository(tmp_path):
-    """A repository with what the program's has, in small."""
-    folder = tmp_path / "repository"
-    for name, text in {
-        "Snakefile": "rule all:\n",
-        "uv.lock": "version = 1\n",
-        ".gitignore": "__pycache__/\nresults/\n",
-        ".gitattributes": "icha/data.txt export-ignore\n*.txt text eol=crlf\nicha/id.py export-subst\n",
-        "icha/physics.py": "ONE = 1\n",
-        "icha/id.py": "COMMIT = '$Format:%H$'\n",
-        "icha/data.txt": "1\n2\n",
-        "icha/mit Umlaut ä.txt": "ä\n",
-        "workflow/rules/runs.smk": "rule run:\n",
-        "profiles/default/config.yaml": "cores: 2\n",
-        "config/config.yaml": "name: mine\n",
-        "docs/page.md": "# Page\n",
-    }.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(text.encode())
-    (folder / "workflow/tool.sh").write_text("#!/bin/sh\n")
-    (folder / "workflow/tool.sh").chmod(0o755)
-    git(folder, "init", "--quiet")
-    git(folder, "add", ".")
-    git(folder, "commit", "--quiet", "--message", "All")
-    return folder
-
-
-def test_source_is_what_was_committed_byte_by_byte(repository, tmp_path):
-    source = committed_source(repository)
-    assert source.commit == git(repository, "rev-parse", "HEAD").strip()
-    source.export(tmp_path / "export")
-    exported = files_of(tmp_path / "export")
-    assert set(exported) == set(git(repository, "-c", "core.quotePath=false", "ls-files").splitlines())
-    for name, path in exported.items():
-        assert path.read_bytes() == (repository / name).read_bytes(), name
-    assert {name for name, path in exported.items() if path.stat().st_mode & 0o111} == {"workflow/tool.sh"}
-
-
-@pytest.mark.parametrize(
-    ("spoil", "said"),
-    [
-        (lambda r: (r / "icha/physics.py").write_text("ONE = 2\n"), "changed: icha/physics.py"),
-        (lambda r: (r / "docs/page.md").write_text("# Pages\n"), "changed: docs/page.md"),
-        (lambda r: (r / "icha/physics.py").unlink(), "changed: icha/physics.py"),
-        (lambda r: (r / "icha/more.py").write_text("TWO = 2\n"), "not committed: icha/more.py"),
-        (lambda r: (r / "profiles/default/more.yaml").write_text(""), "not committed: profiles/default/more.yaml"),
-        (lambda r: (r / "workflow/rules/ä b.smk").write_text(""), "not committed: workflow/rules/ä b.smk"),
-    ],
-)
-def test_changes_that_are_not_committed_are_refused(repository, spoil, said):
-    spoil(repository)
-    with pytest.raises(ValueError, match=f"git commit(.|\n)*{re.escape(said)}"):
-        committed_source(repository)
-
-
-def test_changes_cannot_be_hidden(repository, monkeypatch, tmp_path):
-    (repository / "icha/more.py").write_text("TWO = 2\n")
-    git(repository, "add", "icha/more.py")
-    with pytest.raises(ValueError, match=r"not committed: icha/more\.py"):
-        committed_source(repository)
-    git(repository, "reset", "--quiet")
-    (repository / ".git/info/exclude").write_text("more.py\n")
-    (tmp_path / "ignore").write_text("more.py\n")
-    (tmp_path / "gitconfig").write_text(f"[core]\nexcludesFile = {tmp_path / 'ignore'}\n")
-    monkeypatch.setenv("GIT_CONFIG_GLOBAL", str(tmp_path / "gitconfig"))
-    assert git(repository, "status", "--porcelain") == ""
-    with pytest.raises(ValueError, match=r"not committed: icha/more\.py"):
-        committed_source(repository)
-    (repository / "icha/more.py").unlink()
-    git(repository, "update-index", "--assume-unchanged", "icha/physics.py")
-    (repository / "icha/physics.py").write_text("ONE = 2\n")
-    assert git(repository, "status", "--porcelain") == ""
-    with pytest.raises(ValueError, match=r"changed: icha/physics\.py"):
-        committed_source(repository)
-
-
-def test_configurations_results_and_other_files_are_no_part_of_the_program(repository):
-    commit = committed_source(repository).commit
-    (repository / "config/config.yaml").write_text("name: yours\n")
-    for name in ("config/campaigns/new.yaml", "results/x.nc", "icha/__pycache__/physics.pyc", "notes.txt"):
-        (repository / name).parent.mkdir(parents=True, exist_ok=True)
-        (repository / name).write_text("")
-    source = committed_source(repository)
-    assert source.commit == commit and "notes.txt" not in source.files
-
-
-def test_a_project_may_be_a_part_of_a_repository_and_of_a_shallow_clone(repository, tmp_path, monkeypatch):
-    outer = tmp_path / "outer"
-    shutil.copytree(repository, outer / "sub/contact", ignore=shutil.ignore_patterns(".git"))
-    (outer / "private.txt").write_text("not of the project\n")
-    git(outer, "init", "--quiet")
-    git(outer, "add", ".")
-    git(outer, "commit", "--quiet", "--message", "All")
-    (outer / "private.txt").write_text("changed, too\n")
-    git(outer, "commit", "--quiet", "--all", "--message", "More")
-    git(tmp_path, "clone", "--quiet", "--depth", "1", f"file://{outer}", "shallow")
-    for folder in (outer, tmp_path / "shallow"):
-        # Where git thinks that it is called from a hook.
-        monkeypatch.setenv("GIT_DIR", str(repository / ".git"))
-        source = committed_source(folder / "sub/contact")
-        monkeypatch.delenv("GIT_DIR")
-        assert source.commit == git(outer, "rev-parse", "HEAD").strip()
-        target = tmp_path / f"of_{folder.name}"
-        source.export(target)
-        own = {name: path.read_bytes() for name, path in files_of(repository).items() if not name.startswith(".git/")}
-        assert {name: path.read_bytes() for name, path in files_of(target).items()} == own
-
-
-def test_folders_without_a_commit_are_refused(repository, tmp_path, monkeypatch):
-    plain = shutil.copytree(repository, tmp_path / "plain", ignore=shutil.ignore_patterns(".git"))
-    with pytest.raises(ValueError, match=r"is not under git(.|\n)*git init"):
-        committed_source(plain)
-    git(plain, "init", "--quiet")
-    with pytest.raises(ValueError, match="nothing is committed yet"):
-        committed_source(plain)
-    (repository / "link").symlink_to("Snakefile")
-    git(repository, "add", "link")
-    git(repository, "commit", "--quiet", "--message", "Link")
-    with pytest.raises(ValueError, match=r"files only(.|\n)*link"):
-        committed_source(repository)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ValueError, match="git: no such program"):
-        committed_source(repository)
-
-
-# The environment and the licence.
-
-
-def test_another_environment_than_the_locked_one_is_refused(tmp_path):
-    version = importlib.metadata.version("numpy")
-
-    def lock(*packages):
-        text = "\n".join(
-            f'[[package]]\nname = "{name}"\nversion = "{number}"\nsource = {{ {source} }}\n'
-            for name, number, source in packages
-        )
-        (tmp_path / "uv.lock").write_text(f"version = 1\n{text}")
-        return tmp_path / "uv.lock"
-
-    index = 'registry = "https://pypi.org/simple"'
-    own = ("icha", "99.0", 'editable = "."')
-    # Locked for another Python, not installed, and the project itself.
-    assert differences(lock(own, ("numpy", "0.1", index), ("numpy", version, index), ("no-such", "1", index))) == []
-    wrong = differences(lock(own, ("NumPy", "0.1", index)))
-    assert wrong == [f"  numpy: {version} is installed, 0.1 is locked"]
-    with pytest.raises(ValueError, match=r"make environment(.|\n)*icha: imported from(.|\n)*numpy: "):
-        refuse_other_environment(tmp_path)
-
-
-def test_licences_are_those_of_spdx():
-    for identifier, words in {
-        "CC-BY-4.0": "Section 3 – License Conditions",
-        "CC-BY-SA-4.0": "Section 4 – Sui Generis Database Rights",
-        "CC0-1.0": "Statement of Purpose",
-        "ODbL-1.0": "Database",
-    }.items():
-        licence = known_licence(identifier)
-        assert licence.identifier == identifier and words in licence.text
-        page = licence_page(licence, source="source")
-        assert licence.name in page and licence.address in page and page.endswith(licence.text)
-    other = known_licence("PDDL-1.0")
-    assert other.text == "" and other.address == "https://spdx.org/licenses/PDDL-1.0.html"
-    assert "PDDL-1.0" in licence_page(other, source="source")
-    for wrong in ("CC-BY", "my own", "MIT OR CC0-1.0", "LicenseRef-mine", "CC-BY-4.0+", ""):
-        with pytest.raises(ValueError, match="is no licence that SPDX knows; allowed: one identifier"):
-            known_licence(wrong)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ("cc-by-4.0", "is not written as SPDX writes it; allowed: 'CC-BY-4.0'"),
-        (" CC0-1.0", "is not written as SPDX writes it; allowed: 'CC0-1.0'"),
-        ("GPL-3.0", "is an identifier that SPDX has deprecated; allowed: 'GPL-3.0-only', 'GPL-3.0-or-later'"),
-        ("LGPL-2.1+", "is an identifier that SPDX has deprecated; allowed: 'LGPL-2.1-or-later'"),
-        ("eCos-2.0", "has deprecated; allowed: a current one of https://spdx.org/licenses"),
-    ],
-)
-def test_licences_are_written_as_spdx_writes_them(wrong, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
-        known_licence(wrong)
-
-
-def test_creators_of_a_dataset_keep_their_places():
-    found = discovery_attributes(ALL)
-    assert found["creator_name"] == "Josiah Carberry; California Digital Library; Zoë Öre Ünal"
-    assert found["creator_type"] == "person; institution; person"
-    assert found["creator_url"] == f"https://orcid.org/{ORCID}; https://ror.org/03yrm5c26; "
-    assert found["creator_institution"] == "California Digital Library; ; Nowhere <Institute> & Sons"
-    assert found["keywords"] == "adhesion, rough surfaces, soft"
-    assert set(discovery_attributes(LEAST)) == {"creator_name", "creator_type", "product_version"}
