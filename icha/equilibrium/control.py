@@ -28,7 +28,7 @@ def derivative(problem: Problem, quantity: str, state: ContactState) -> float:
     """Its derivative with respect to the mean separation, at unchanged contacts."""
     sites, c = state.sites, state.in_contact
     a, R = state.contact_radius[c], sites.radius_of_curvature[c]
-    growth = radius_response(problem.law, a, R, state.approach[c], sites.jump_off[c]) * state.response[c]
+    growth = radius_response(problem.law, a, R, sites.approach[c], sites.jump_off[c]) * sites.response[c]
     return float(np.sum(gradient_by_radius(problem, quantity, a, R) * growth))
 
 

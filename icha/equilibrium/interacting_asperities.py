@@ -8,9 +8,9 @@ import numpy as np
 
 from icha.contact.events import Events
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control
-from icha.equilibrium import equilibrium as search
 from icha.equilibrium.control import derivative, held_value
 from icha.equilibrium.energy import stored_energy
+from icha.equilibrium.equilibrium import equilibrium
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.states import ContactState, untouched
 from icha.half_space.free_square import mean_displacement
@@ -48,7 +48,7 @@ class InteractingAsperities(Problem):
         FullContact
             If the contact spreads over the whole surface.
         """
-        return search.equilibrium(self, state, separation, control, let_go=let_go)
+        return equilibrium(self, state, separation, control, spots_let_go=let_go)
 
     def pressure(self, state: ContactState) -> float:
         """Total force over nominal area, Pa."""

@@ -12,7 +12,7 @@ from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
 from icha.contact.failures import NotConverged
 from icha.contact.model import Control
-from icha.equilibrium.equilibrium import RESIDUAL_TOLERANCE
+from icha.equilibrium.equations import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.ewald import HalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
@@ -325,15 +325,15 @@ def assert_consistent(contact, state):
 def counting(monkeypatch, most):
     """Count the rounds of events, and stop at more than `most`."""
     calls = []
-    original = icha.equilibrium.equilibrium._Search._events
+    original = icha.equilibrium.equilibrium.happen
 
     def events(*arguments):
-        changed = original(*arguments)
+        search, changed = original(*arguments)
         calls.append(changed)
         assert sum(calls) <= most, "the rounds do not end"
-        return changed
+        return search, changed
 
-    monkeypatch.setattr(icha.equilibrium.equilibrium._Search, "_events", events)
+    monkeypatch.setattr(icha.equilibrium.equilibrium, "happen", events)
     return calls
 
 

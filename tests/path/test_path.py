@@ -7,7 +7,7 @@ from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, 
 from icha.analysis.checks import check_run
 from icha.asperity.jkr import JKR
 from icha.contact.failures import NotConverged
-from icha.equilibrium.equilibrium import RESIDUAL_TOLERANCE
+from icha.equilibrium.equations import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.path.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE

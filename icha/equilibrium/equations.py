@@ -1,0 +1,93 @@
+"""The equations of equilibrium, eq. (4), at given approaches, and how far these are from fulfilling them.
+
+The unknowns are the local approaches delta_i of the spots in contact:
+
+    delta_i + w_i(a(delta)) = h_i - u,        a_i = a_law(delta_i),
+
+with w_i the displacement by all other spots and all images and u the mean separation. On a free half-space there are
+no images, and u is the separation of the surface's mean plane and the half-space far away from it, which falls below
+zero as the loaded part sinks in; the mean gap is u plus the mean of w over the square. Below the jump-off approach a
+spot keeps its jump-off radius while the equations are solved (zero for Hertz's law), so that they are defined
+everywhere and, without adhesion, smooth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from icha.contact.model import PRESSURE, Control
+from icha.equilibrium.control import held_value
+from icha.equilibrium.problem import Problem
+from icha.equilibrium.sites import Sites
+from icha.half_space.interaction import Interaction
+
+# Largest equilibrium error in units of h_rms at which an equilibrium counts as found.
+RESIDUAL_TOLERANCE = 1e-9
+# Relative error of a load or an area that was asked for.
+TARGET_TOLERANCE = 1e-11
+# Of what a load is made up of, the part below which it counts as none when its error is measured.
+_SMALLEST_LOAD = 1e-4
+# One weighs as much as the other in a solve.
+_MISS_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
+# The near pairs are good for radii of an approach that is larger by so much of h_rms, and by this factor then.
+_APPROACH_AHEAD = 0.02
+_RADIUS_AHEAD = 1.2
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One evaluation of the equations.
+
+    approach, a (contact radii) and error (n,), m; level (n,): the heights with which the sites would be in equilibrium,
+    m. separation, m. miss: of the held quantity, in its unit. gross: pressure by the repulsive parts of the forces
+    alone, Pa. interaction: by which the displacement was computed.
+    """
+
+    approach: np.ndarray
+    separation: float
+    a: np.ndarray
+    level: np.ndarray
+    error: np.ndarray
+    miss: float
+    gross: float
+    interaction: Interaction
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The equations of a table of sites; control: a load or an area to hold, with the separation one more unknown."""
+
+    problem: Problem
+    sites: Sites
+    control: Control | None = None
+
+    def at(self, approach, separation: float, interaction: Interaction | None = None) -> Point:
+        """Evaluate at approaches (n,) and a separation, m; interaction: the last one, which may still serve."""
+        problem, sites, law = self.problem, self.sites, self.problem.law
+        part, R = sites.present, sites.radius_of_curvature
+        a = np.zeros(len(sites))
+        a[part] = law.contact_radius(approach[part], R[part])
+        outdated = interaction is None or interaction.half_space is not sites.half_space
+        if outdated or np.any(a > interaction.pairs.largest_radius):
+            ahead = np.where(part, approach + _APPROACH_AHEAD * problem.rms_height, 0.0)
+            largest = np.where(part, _RADIUS_AHEAD * law.contact_radius(ahead, R), 0.0)
+            interaction = Interaction.between(law, sites.half_space, R, largest)
+        level = approach + interaction.displacement(a) + separation
+        error = np.where(part, level - sites.height, 0.0)
+        miss = gross = 0.0
+        if self.control is not None:
+            miss = held_value(problem, self.control.quantity, a[part], R[part]) - self.control.target
+            if self.control.quantity == PRESSURE:
+                gross = float(np.sum(law.repulsive_force(a[part], R[part]))) / problem.area
+        return Point(approach, separation, a, level, error, miss, gross, interaction)
+
+    def size(self, point: Point, miss_weight: float = _MISS_WEIGHT) -> float:
+        """Largest error in units of h_rms, the control's relative miss with its weight."""
+        size = float(np.max(np.abs(point.error), initial=0.0)) / self.problem.rms_height
+        if self.control is None:
+            return size
+        # A load that is next to nothing beside the attraction and repulsion that make it up is met as well as they are.
+        unit = max(abs(self.control.target), _SMALLEST_LOAD * point.gross)
+        return max(size, abs(point.miss) / unit * miss_weight)

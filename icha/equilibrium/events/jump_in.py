@@ -1,0 +1,136 @@
+"""Jump-in: free asperities whose approach reaches that at which contact forms, eq. (3), become sites.
+
+Without adhesion contact forms at an approach of zero and without a jump: there all asperities are sites that may come
+into contact, and who does comes out of the iteration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from icha.asperity.coalescence import covering_spot
+from icha.contact.events import JUMP_IN, SPLIT
+from icha.equilibrium.equations import Point
+from icha.equilibrium.search import Search
+from icha.equilibrium.sites import CONTACT, TRIAL
+from icha.half_space.interaction import displacement_at
+
+# Free asperities are looked at that can have come into contact since they were last looked at: their approach grows by
+# at most so many times the fall of the separation; and, as spots jump, by so much at once, in h_rms and in the largest
+# jump-off approach: on the way to an equilibrium that is a guess, at the equilibrium a bound.
+_FASTEST_APPROACH = 3.0
+_PROBABLE_APPROACH = 1.2
+_SUDDEN_GUESS = 0.02, 2.0
+_SUDDEN_BOUND = 1.0, 10.0
+
+
+def with_candidates(search: Search, separation: float) -> Search:
+    """Without adhesion: with sites of the asperities that will probably come into contact at a separation, m."""
+    fall = search.seen_at - separation
+    hopeful = search.seen + _PROBABLE_APPROACH * fall + _sudden(search.problem, _SUDDEN_GUESS) > 0
+    candidates = np.flatnonzero(hopeful & search.free)
+    # Where contact was lost the approach is not known, but small.
+    expected = np.where(np.isfinite(fall), search.seen + fall, 0.0)
+    return _admitted(search, candidates, TRIAL, expected[candidates])
+
+
+def jump_in(search: Search, point: Point, margin: float) -> tuple[Search, bool]:
+    """Sites of the free asperities beyond jump-in by more than the margin (m); and whether there were any.
+
+    Those that lie under a spot are taken into it. What has just fallen out of a united spot was in contact, and stays
+    so wherever there is a stable state.
+    """
+    problem, law, asperities = search.problem, search.problem.law, search.problem.asperities
+    spots = np.flatnonzero((point.a > 0) & search.sites.present)
+    a, there = point.a[spots], search.sites.position[spots]
+    search, looked_at = _looked_at(search, point, spots, margin)
+    fell = search.fallen[looked_at] >= 0
+    needed = problem.jump_in[looked_at] + margin
+    needed[fell] = law.jump_off_approach(asperities.radius_of_curvature[looked_at[fell]])
+    ready = search.seen[looked_at] >= needed
+    if not problem.adhesive:
+        ready &= search.seen[looked_at] > 0
+    locked, holder = search.locked.copy(), search.holder.copy()
+    locked[looked_at[fell & ~ready]] = True
+    ready = looked_at[ready]
+    barred = locked[ready]
+    pending, ready = int(np.count_nonzero(barred)), ready[~barred]
+    under = covering_spot(asperities.position[ready], there, a, asperities.cell)
+    holder[ready[under >= 0]] = spots[under[under >= 0]]
+    ready = _first_of_each_group(search, ready[under < 0])
+    source = search.fallen[ready]
+    none = np.full(len(search.fallen), -1)
+    search = replace(search, locked=locked, holder=holder, pending=pending, fallen=none)
+    if not len(ready):
+        return search, False
+    stay, joining = np.unique(source[source >= 0]), ready[source < 0]
+    search = search.noting(SPLIT, search.sites.position[stay], search.sites.members[stay])
+    if problem.adhesive:
+        R = asperities.radius_of_curvature[joining]
+        energy = -law.energy(law.contact_radius(search.seen[joining], R), R)
+        search = search.noting(JUMP_IN, asperities.position[joining], 1, energy, joining)
+    return _admitted(search, ready, CONTACT if problem.adhesive else TRIAL, search.seen[ready]), True
+
+
+def _sudden(problem, reach):
+    """By how much the approach of an asperity can grow at once, m."""
+    heights, jumps = reach
+    largest_jump = -problem.law.jump_off_approach(np.max(problem.asperities.radius_of_curvature))
+    return heights * problem.rms_height + jumps * largest_jump
+
+
+def _looked_at(search, point, spots, margin):
+    """The search with the approaches of the free asperities that can have come into contact, and which these are."""
+    problem, asperities, sites = search.problem, search.problem.asperities, search.sites
+    reach = search.seen + _FASTEST_APPROACH * np.abs(search.seen_at - point.separation)
+    reach += _sudden(problem, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
+    looked_at = np.flatnonzero((reach >= problem.jump_in) & search.free)
+    w = displacement_at(
+        problem.law,
+        asperities.period,
+        asperities.position[looked_at],
+        sites.position[spots],
+        point.a[spots],
+        sites.radius_of_curvature[spots],
+        sites.half_space.ewald.once,
+    )
+    seen, seen_at = search.seen.copy(), search.seen_at.copy()
+    seen[looked_at] = asperities.height[looked_at] - point.separation - w
+    seen_at[looked_at] = point.separation
+    return replace(search, seen=seen, seen_at=seen_at), looked_at
+
+
+def _first_of_each_group(search, joining):
+    """Of asperities (k,) that would lie in each other's contacts, the largest; the others have to wait."""
+    asperities = search.problem.asperities
+    if len(joining) < 2:
+        return joining
+    position = asperities.position[joining]
+    a = search.problem.law.contact_radius(search.seen[joining], asperities.radius_of_curvature[joining])
+    under = covering_spot(position, position, a, asperities.cell, larger_than=a)
+    return joining[under < 0]
+
+
+def _admitted(search, asperity, status, approach):
+    """With sites of free asperities (k,) with approaches (k,), m."""
+    if not len(asperity):
+        return search
+    asperities, holder = search.problem.asperities, search.holder
+    if status == CONTACT:
+        holder = holder.copy()
+        holder[asperity] = len(search.sites) + np.arange(len(asperity))
+    sites = search.sites.extended(
+        search.problem.law,
+        position=asperities.position[asperity],
+        height=asperities.height[asperity],
+        radius_of_curvature=asperities.radius_of_curvature[asperity],
+        asperity=asperity,
+        members=np.ones(len(asperity), dtype=int),
+        parts=np.full(len(asperity), None),
+        approach=approach,
+        status=status,
+        known=False,
+    )
+    return replace(search, sites=sites, holder=holder)
