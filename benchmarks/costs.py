@@ -31,7 +31,7 @@ from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning import costs
 from icha.references.boundary_elements import boundary_elements
-from icha.references.error_sources import error_sources
+from icha.references.error_sources.variants import error_sources
 from icha.references.loops import boundary_element_loop
 from icha.simulation import simulate
 

@@ -13,10 +13,10 @@ from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 from icha.references.boundary_elements import boundary_elements
-from icha.references.dataset import reference_dataset
-from icha.references.error_sources import error_sources
+from icha.references.error_sources.variants import error_sources
 from icha.references.loops import boundary_element_loop
 from icha.references.one_asperity import hertz_asperity, one_asperity
+from icha.references.theories import reference_dataset
 from icha.surfaces.moments import spectral_moments
 
 HARD = icha.Material(contact_modulus=1e9, surface_energy=0.0, interaction_range=1e-8)

@@ -117,7 +117,7 @@ def model_error_variables() -> str:
 def theory_variables() -> str:
     """The variables of the theories of a surface."""
     import icha
-    from icha.references.dataset import reference_dataset
+    from icha.references.theories import reference_dataset
     from icha.surfaces.moments import spectral_moments
 
     spectrum = _small_spectrum()

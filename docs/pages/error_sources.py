@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from icha.references.error_sources import BESIDE, CATEGORIES, chain, effects, relative_radius, shape_ratio
+from icha.references.error_sources.chain import BESIDE, CATEGORIES, chain, effects, relative_radius, shape_ratio
 from pages.tables import Table, means, pressures
 
 NAMES = {

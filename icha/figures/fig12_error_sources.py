@@ -172,7 +172,7 @@ def _draw_ratios(ax, error_sources, name):
 
 
 def _draw_effects(ax, error_sources):
-    from icha.references.error_sources import effects
+    from icha.references.error_sources.chain import effects
 
     mean = sum(effects(one) for one in error_sources) / len(error_sources)
     p = mean["reduced_pressure"].values
@@ -194,7 +194,7 @@ def _draw_effects(ax, error_sources):
 
 
 def _draw_single_spots(ax, error_sources):
-    from icha.references.error_sources import relative_radius, shape_ratio, shape_ratio_of_fourth_order
+    from icha.references.error_sources.chain import relative_radius, shape_ratio, shape_ratio_of_fourth_order
 
     x, ratio, expected = (
         np.concatenate([quantity(one)[one["pair_patch_nodes"].values >= _LEAST_NODES] for one in error_sources])

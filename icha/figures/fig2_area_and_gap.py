@@ -74,7 +74,7 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    references : theories and points for the study's first surface (`icha.references.reference_dataset`), if any.
+    references : theories and points for the study's first surface (`icha.references.theories`), if any.
     model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements beside runs, if any.
     study : name of the study.
 

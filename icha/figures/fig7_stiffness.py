@@ -46,7 +46,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     Parameters
     ----------
     campaign : the campaign dataset.
-    references : theory for the study's first surface (`icha.references.reference_dataset`), if any.
+    references : theory for the study's first surface (`icha.references.theories`), if any.
     study : name of the study.
 
     Raises

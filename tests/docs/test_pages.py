@@ -10,7 +10,7 @@ from write_pages import render
 
 import icha
 from icha.analysis.model_error import model_error
-from icha.references.error_sources import error_sources as sources_of
+from icha.references.error_sources.variants import error_sources as sources_of
 from icha.references.one_asperity import hertz_asperity
 from icha.references.one_asperity import one_asperity as compare_asperity
 

@@ -48,7 +48,7 @@ from icha.figures.style import (
     slope_label,
     unit_for,
 )
-from icha.references import reference_dataset
+from icha.references.theories import reference_dataset
 from icha.support.statistics import ensemble
 from icha.surfaces.moments import spectral_moments
 

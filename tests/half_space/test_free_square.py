@@ -18,7 +18,7 @@ from icha.half_space.free_square import image_potential, mean_displacement
 from icha.half_space.grid_displacement import DisplacementField, displacement_field
 from icha.half_space.interaction import Interaction, displacement_at
 from icha.references.boundary_elements import boundary_elements
-from icha.references.error_sources import error_sources
+from icha.references.error_sources.variants import error_sources
 from icha.surfaces.summits import Asperities, find_summits
 
 MODULUS, RANGE = 1.0, 1e-3

@@ -10,23 +10,17 @@ from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.figures import fig12_error_sources
 from icha.path.follow import follow
 from icha.references.boundary_elements import NodalState, contact_state, perimeter_correction
-from icha.references.error_sources import (
+from icha.references.error_sources.chain import (
     CATEGORIES,
-    Discs,
     chain,
-    contact_patches,
-    discs_apart,
     effects,
-    error_sources,
-    fourth_order_terms,
-    independent_discs,
-    match,
-    paraboloids,
     shape_ratio,
     shape_ratio_of_fourth_order,
-    summit_curvatures,
-    union_area_fraction,
 )
+from icha.references.error_sources.paraboloids import fourth_order_terms, paraboloids, summit_curvatures
+from icha.references.error_sources.spot_by_spot import contact_patches, match
+from icha.references.error_sources.variants import error_sources
+from icha.references.error_sources.without_unions import Discs, discs_apart, independent_discs, union_area_fraction
 from icha.surfaces.summits import Asperities, find_summits
 
 HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)

@@ -9,7 +9,7 @@ from scipy.special import erfc
 
 from icha import Material, SelfAffineSpectrum
 from icha.asperity.jkr import JKR
-from icha.references import summits
+from icha.references import summit_theories as theories
 from icha.surfaces.moments import SpectralMoments, spectral_moments
 from icha.surfaces.summits import find_summits
 
@@ -38,7 +38,7 @@ def test_summit_statistics_are_those_of_the_random_field():
     curvature = share @ mean
     height = 1.5 / alpha * curvature
     variance = 1 - 1.5 / alpha + (1.5 / alpha) ** 2 * (share @ mean**2 - curvature**2)
-    found = summits.gaussian_summits(SpectralMoments(1.0, 1.0, alpha))
+    found = theories.gaussian_summits(SpectralMoments(1.0, 1.0, alpha))
     assert found.density == pytest.approx(density, rel=3e-3)
     assert found.mean_height == pytest.approx(height, rel=3e-3)
     assert found.deviation**2 == pytest.approx(variance, rel=3e-3)
@@ -46,7 +46,7 @@ def test_summit_statistics_are_those_of_the_random_field():
 
 
 def test_mccools_rounded_constant():
-    found = summits.gaussian_summits(SpectralMoments(1.0, 1.0, 4.0))
+    found = theories.gaussian_summits(SpectralMoments(1.0, 1.0, 4.0))
     assert found.deviation**2 == pytest.approx(1 - 0.8968 / 4, abs=5e-5)
 
 
@@ -54,7 +54,7 @@ def test_summits_found_on_surfaces_are_those_of_the_theory():
     # Twelve surfaces, the spread among which is the statistical error of their mean.
     spectrum = SelfAffineSpectrum(100e-6, 10e-6, 100e-6 / 32, 0.8)
     surfaces = [spectrum.realise(grid=256, seed=seed) for seed in range(12)]
-    theory = summits.gaussian_summits(spectral_moments(surfaces[0]))
+    theory = theories.gaussian_summits(spectral_moments(surfaces[0]))
     found = [find_summits(surface) for surface in surfaces]
 
     def compare(values, expected):
@@ -70,14 +70,14 @@ def test_summits_found_on_surfaces_are_those_of_the_theory():
 
 def test_moments_that_no_isotropic_surface_has_are_refused():
     with pytest.raises(ValueError, match=r"Nayak's parameter is 1\.2.*at least 1\.5"):
-        summits.gaussian_summits(SpectralMoments(1.0, 1.0, 1.2))
+        theories.gaussian_summits(SpectralMoments(1.0, 1.0, 1.2))
 
 
 # --- Greenwood & Williamson -----------------------------------------------------------------------------------
 
 
 def random_heights(count=2_000_000):
-    theory = summits.gaussian_summits(MOMENTS)
+    theory = theories.gaussian_summits(MOMENTS)
     return theory, theory.mean_height + theory.deviation * np.random.default_rng(1).standard_normal(count)
 
 
@@ -90,53 +90,53 @@ def test_greenwood_williamson_is_the_sum_over_random_summits():
         area = np.pi * theory.radius_of_curvature * depth.sum() * per_area
         force = 4 / 3 * math.sqrt(theory.radius_of_curvature) * np.sum(depth**1.5) * per_area / MOMENTS.rms_slope
         noise = 5 / math.sqrt(len(depth))
-        assert float(summits.greenwood_williamson_area(u, MOMENTS)) == pytest.approx(area, rel=noise)
-        assert float(summits.greenwood_williamson_pressure(u, MOMENTS)) == pytest.approx(force, rel=noise)
+        assert float(theories.greenwood_williamson_area(u, MOMENTS)) == pytest.approx(area, rel=noise)
+        assert float(theories.greenwood_williamson_pressure(u, MOMENTS)) == pytest.approx(force, rel=noise)
 
 
 def test_greenwood_williamson_area_in_closed_form():
-    theory = summits.gaussian_summits(MOMENTS)
+    theory = theories.gaussian_summits(MOMENTS)
     t = (SEPARATIONS * MOMENTS.rms_height - theory.mean_height) / theory.deviation
     first = np.exp(-(t**2) / 2) / math.sqrt(2 * np.pi) - t * erfc(t / math.sqrt(2)) / 2
     expected = np.pi * theory.density * theory.radius_of_curvature * theory.deviation * first
-    np.testing.assert_allclose(summits.greenwood_williamson_area(SEPARATIONS, MOMENTS), expected, rtol=1e-12)
+    np.testing.assert_allclose(theories.greenwood_williamson_area(SEPARATIONS, MOMENTS), expected, rtol=1e-12)
 
 
 def test_high_planes_see_an_exponential_of_heights():
     # Far up the tail of the Gaussian is nearly the exponential exp(-t z/sigma), for which area over load is constant,
     # A E*/F = pi R l/(4/3 R^(1/2) Gamma(5/2) l^(3/2)) = sqrt(pi R/l) with l = sigma/t.
-    theory = summits.gaussian_summits(MOMENTS)
+    theory = theories.gaussian_summits(MOMENTS)
     t = 9.0
     u = (theory.mean_height + t * theory.deviation) / MOMENTS.rms_height
-    area, p = summits.greenwood_williamson_area(u, MOMENTS), summits.greenwood_williamson_pressure(u, MOMENTS)
+    area, p = theories.greenwood_williamson_area(u, MOMENTS), theories.greenwood_williamson_pressure(u, MOMENTS)
     expected = math.sqrt(math.pi * theory.radius_of_curvature * t / theory.deviation) * MOMENTS.rms_slope
     assert float(area / p) == pytest.approx(expected, rel=0.02)
 
 
 def test_area_over_load_varies_slowly_and_lies_below_bush_gibson_and_thomas():
     p = np.geomspace(1e-5, 1e-2, 4)
-    ratio = summits.greenwood_williamson_area(summits.greenwood_williamson_separation(p, MOMENTS), MOMENTS) / p
+    ratio = theories.greenwood_williamson_area(theories.greenwood_williamson_separation(p, MOMENTS), MOMENTS) / p
     assert np.all(np.diff(ratio) < 0) and np.all(np.diff(ratio) > -0.25)
-    assert np.all(ratio < summits.BUSH_GIBSON_THOMAS_SLOPE) and np.all(ratio > 1.5)
+    assert np.all(ratio < theories.BUSH_GIBSON_THOMAS_SLOPE) and np.all(ratio > 1.5)
 
 
 def test_without_adhesion_neither_slope_nor_length_matters():
     scaled = MOMENTS.scaled_to_rms_slope(0.2)
     longer = SpectralMoments(MOMENTS.m0 * 1e6, MOMENTS.m2, MOMENTS.m4 / 1e6)
-    for law in (summits.greenwood_williamson_area, summits.greenwood_williamson_pressure):
+    for law in (theories.greenwood_williamson_area, theories.greenwood_williamson_pressure):
         for other in (scaled, longer):
             np.testing.assert_allclose(law(SEPARATIONS, other), law(SEPARATIONS, MOMENTS), rtol=1e-12)
 
 
 def test_separation_at_pressure_is_the_inverse():
     p = np.array([[1e-6, 1e-4], [1e-2, 0.1]])
-    u = summits.greenwood_williamson_separation(p, MOMENTS)
+    u = theories.greenwood_williamson_separation(p, MOMENTS)
     assert u.shape == p.shape
-    np.testing.assert_allclose(summits.greenwood_williamson_pressure(u, MOMENTS), p, rtol=1e-9)
+    np.testing.assert_allclose(theories.greenwood_williamson_pressure(u, MOMENTS), p, rtol=1e-9)
     with pytest.raises(ValueError, match="greater than 0"):
-        summits.greenwood_williamson_separation(0.0, MOMENTS)
+        theories.greenwood_williamson_separation(0.0, MOMENTS)
     with pytest.raises(ValueError, match="outside what summits reach"):
-        summits.greenwood_williamson_separation(1e-40, MOMENTS)
+        theories.greenwood_williamson_separation(1e-40, MOMENTS)
 
 
 # --- Fuller & Tabor -------------------------------------------------------------------------------------------
@@ -144,18 +144,18 @@ def test_separation_at_pressure_is_the_inverse():
 
 @PULLED
 def test_without_adhesion_it_is_greenwood_and_williamsons(pulled):
-    area = summits.fuller_tabor_area(SEPARATIONS, MOMENTS, BARE, pulled=pulled)
-    pressure = summits.fuller_tabor_pressure(SEPARATIONS, MOMENTS, BARE, pulled=pulled)
-    np.testing.assert_allclose(area, summits.greenwood_williamson_area(SEPARATIONS, MOMENTS), rtol=1e-10)
-    np.testing.assert_allclose(pressure, summits.greenwood_williamson_pressure(SEPARATIONS, MOMENTS), rtol=1e-10)
+    area = theories.fuller_tabor_area(SEPARATIONS, MOMENTS, BARE, pulled=pulled)
+    pressure = theories.fuller_tabor_pressure(SEPARATIONS, MOMENTS, BARE, pulled=pulled)
+    np.testing.assert_allclose(area, theories.greenwood_williamson_area(SEPARATIONS, MOMENTS), rtol=1e-10)
+    np.testing.assert_allclose(pressure, theories.greenwood_williamson_pressure(SEPARATIONS, MOMENTS), rtol=1e-10)
 
 
 @PULLED
 def test_weak_adhesion_changes_little(pulled):
-    bare = summits.greenwood_williamson_pressure(SEPARATIONS, MOMENTS)
+    bare = theories.greenwood_williamson_pressure(SEPARATIONS, MOMENTS)
     errors = []
     for energy in (1e-4, 1e-6, 1e-8):
-        pressure = summits.fuller_tabor_pressure(SEPARATIONS, MOMENTS, Material(MODULUS, energy, 2e-9), pulled=pulled)
+        pressure = theories.fuller_tabor_pressure(SEPARATIONS, MOMENTS, Material(MODULUS, energy, 2e-9), pulled=pulled)
         errors.append(np.max(np.abs(pressure / bare - 1)))
     assert errors[0] > errors[1] > errors[2] and errors[2] < 1e-3
 
@@ -171,14 +171,14 @@ def test_it_is_the_sum_over_random_summits(pulled):
         a = law.contact_radius(approach[approach > first], R)
         noise = 5 / math.sqrt(len(a))
         area, force = np.sum(np.pi * a**2) * per_area, law.force(a, R)
-        own = float(summits.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled)) * MODULUS * MOMENTS.rms_slope
-        assert float(summits.fuller_tabor_area(u, MOMENTS, SOFT, pulled=pulled)) == pytest.approx(area, rel=noise)
+        own = float(theories.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled)) * MODULUS * MOMENTS.rms_slope
+        assert float(theories.fuller_tabor_area(u, MOMENTS, SOFT, pulled=pulled)) == pytest.approx(area, rel=noise)
         assert own == pytest.approx(force.sum() * per_area, abs=5 * math.sqrt(np.sum(force**2)) * per_area)
 
 
 @PULLED
 def test_it_is_the_integral_over_the_heights(pulled):
-    theory = summits.gaussian_summits(MOMENTS)
+    theory = theories.gaussian_summits(MOMENTS)
     law, R = JKR(SOFT), theory.radius_of_curvature
     first = float(law.jump_off_approach(R)) if pulled else 0.0
 
@@ -194,18 +194,18 @@ def test_it_is_the_integral_over_the_heights(pulled):
             for low, high in ((first, middle), (middle, first + 12 * theory.deviation))
         ]
         expected = sum(parts) / (MODULUS * MOMENTS.rms_slope)
-        own = float(summits.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled))
+        own = float(theories.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled))
         assert own == pytest.approx(expected, rel=1e-6)
 
 
 def test_adhesion_enlarges_the_area_and_pulling_more_so():
-    bare = summits.greenwood_williamson_area(SEPARATIONS, MOMENTS)
-    pressed = summits.fuller_tabor_area(SEPARATIONS, MOMENTS, SOFT)
-    pulled = summits.fuller_tabor_area(SEPARATIONS, MOMENTS, SOFT, pulled=True)
+    bare = theories.greenwood_williamson_area(SEPARATIONS, MOMENTS)
+    pressed = theories.fuller_tabor_area(SEPARATIONS, MOMENTS, SOFT)
+    pulled = theories.fuller_tabor_area(SEPARATIONS, MOMENTS, SOFT, pulled=True)
     assert np.all(bare < pressed) and np.all(pressed < pulled)
-    forces = [summits.fuller_tabor_pressure(SEPARATIONS, MOMENTS, SOFT, pulled=way) for way in (False, True)]
+    forces = [theories.fuller_tabor_pressure(SEPARATIONS, MOMENTS, SOFT, pulled=way) for way in (False, True)]
     assert np.all(forces[1] < forces[0]) and np.all(
-        forces[0] < summits.greenwood_williamson_pressure(SEPARATIONS, MOMENTS)
+        forces[0] < theories.greenwood_williamson_pressure(SEPARATIONS, MOMENTS)
     )
 
 
@@ -213,7 +213,7 @@ def test_summits_of_one_height_are_pulled_off_at_jkrs_force():
     # With hardly any spread of heights all summits let go together: at most 3/2 pi dgamma R each.
     energy = 1.0
     moments = SpectralMoments(1e-12, 0.5, 0.5**2 * 1.5 / 1e-12)
-    theory = summits.gaussian_summits(moments)
+    theory = theories.gaussian_summits(moments)
     material = Material(1.0, energy, 1e-9)  # so soft that jump-off lies far beyond the spread
     law = JKR(material)
     assert -law.jump_off_approach(theory.radius_of_curvature) > 1e3 * theory.deviation
@@ -221,5 +221,5 @@ def test_summits_of_one_height_are_pulled_off_at_jkrs_force():
         law.approach(np.cbrt(9 * np.pi * energy * theory.radius_of_curvature**2 / 8), theory.radius_of_curvature)
     )
     u = (theory.mean_height - approach) / moments.rms_height
-    tension = float(summits.fuller_tabor_pressure(u, moments, material, pulled=True)) * moments.rms_slope
+    tension = float(theories.fuller_tabor_pressure(u, moments, material, pulled=True)) * moments.rms_slope
     assert tension == pytest.approx(-theory.density * 1.5 * np.pi * energy * theory.radius_of_curvature, rel=1e-3)

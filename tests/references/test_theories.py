@@ -8,8 +8,9 @@ from scipy.integrate import quad
 
 import icha
 from icha.datasets.files import read_dataset, write_dataset
-from icha.references import persson, reference_dataset, summits
+from icha.references import persson, summit_theories
 from icha.references.literature import literature
+from icha.references.theories import reference_dataset
 from icha.surfaces.moments import spectral_moments
 
 P = np.array([1e-6, 1e-4, 1e-2, 0.1, 0.5])
@@ -23,8 +24,8 @@ def test_small_pressures_give_the_linear_laws():
     tiny = 1e-8
     assert persson.persson_area(tiny) / tiny == pytest.approx(math.sqrt(8 / math.pi), rel=1e-9)
     assert persson.PERSSON_SLOPE == pytest.approx(1.596, abs=5e-4)
-    assert summits.BUSH_GIBSON_THOMAS_SLOPE == pytest.approx(2.507, abs=5e-4)
-    np.testing.assert_allclose(summits.bush_gibson_thomas_area(P) / P, math.sqrt(2 * math.pi))
+    assert summit_theories.BUSH_GIBSON_THOMAS_SLOPE == pytest.approx(2.507, abs=5e-4)
+    np.testing.assert_allclose(summit_theories.bush_gibson_thomas_area(P) / P, math.sqrt(2 * math.pi))
 
 
 def test_persson_area_grows_to_full_contact():
@@ -153,8 +154,8 @@ def test_no_entry_of_the_literature_is_left_out_above():
 def test_published_areas_lie_between_the_theories():
     gfmd, slope = literature("gfmd_area"), literature("area_slope")
     p, area = np.array(gfmd["reduced_pressure"][:3]), np.array(gfmd["area_fraction"][:3])
-    assert np.all(persson.persson_area(p) < area) and np.all(area < summits.bush_gibson_thomas_area(p))
-    assert persson.PERSSON_SLOPE < slope["area_slope"] < summits.BUSH_GIBSON_THOMAS_SLOPE
+    assert np.all(persson.persson_area(p) < area) and np.all(area < summit_theories.bush_gibson_thomas_area(p))
+    assert persson.PERSSON_SLOPE < slope["area_slope"] < summit_theories.BUSH_GIBSON_THOMAS_SLOPE
     few = area < slope["largest_area_fraction"]
     np.testing.assert_allclose(area[few] / p[few], slope["area_slope"], rtol=0.2)
 
@@ -191,10 +192,10 @@ def test_reference_dataset_holds_the_theories_at_their_own_slopes():
     dataset = reference_dataset(None, moments, {(0.2, "soft"): soft})
     area = dataset["summit_area_fraction"].values
     p, u = (dataset[f"greenwood_williamson_reduced_{name}"].values for name in ("pressure", "separation"))
-    np.testing.assert_allclose(summits.greenwood_williamson_area(u, moments), area, rtol=1e-9)
-    np.testing.assert_allclose(summits.greenwood_williamson_pressure(u, moments), p, rtol=1e-9)
+    np.testing.assert_allclose(summit_theories.greenwood_williamson_area(u, moments), area, rtol=1e-9)
+    np.testing.assert_allclose(summit_theories.greenwood_williamson_pressure(u, moments), p, rtol=1e-9)
     (curve,) = np.flatnonzero((dataset["fuller_tabor_rms_slope"] == 0.2) & (dataset["fuller_tabor_material"] == "soft"))
     p, u = (dataset[f"fuller_tabor_reduced_{name}"].values[curve] for name in ("pressure", "separation"))
     own = moments.scaled_to_rms_slope(0.2)
-    np.testing.assert_allclose(summits.fuller_tabor_area(u, own, soft), area, rtol=1e-9)
-    np.testing.assert_allclose(summits.fuller_tabor_pressure(u, own, soft), p, rtol=1e-9)
+    np.testing.assert_allclose(summit_theories.fuller_tabor_area(u, own, soft), area, rtol=1e-9)
+    np.testing.assert_allclose(summit_theories.fuller_tabor_pressure(u, own, soft), p, rtol=1e-9)

@@ -5,7 +5,7 @@ from job import attributes, guarded
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
-from icha.references.error_sources import error_sources
+from icha.references.error_sources.variants import error_sources
 
 
 def find_error_sources(surface, output, *, rms_slope, material, attributes, **settings):

@@ -5,7 +5,7 @@ from job import attributes, guarded
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_spectral_moments
-from icha.references.dataset import reference_dataset
+from icha.references.theories import reference_dataset
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 

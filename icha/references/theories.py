@@ -9,13 +9,13 @@ import xarray as xr
 
 from icha.asperity.material import Material
 from icha.datasets.attributes import THEORY, discovery
-from icha.references import persson, summits
+from icha.references import persson, summit_theories
 from icha.references.literature import literature
 from icha.surfaces.moments import SpectralMoments
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 REDUCED_PRESSURES = np.geomspace(1e-5, 1.0, 101)
-SUMMIT_AREAS = np.geomspace(1e-5, summits.SEPARATE_SUMMITS_AREA_LIMIT, 81)
+SUMMIT_AREAS = np.geomspace(1e-5, summit_theories.SEPARATE_SUMMITS_AREA_LIMIT, 81)
 
 
 def reference_dataset(
@@ -32,7 +32,7 @@ def reference_dataset(
     ----------
     spectrum : of the surface; without one (a measured surface) there is no Persson theory of its separation and
         stiffness.
-    moments : of the surface at any rms slope; without them there are no theories of separate summits.
+    moments : of the surface at any rms slope; without them there are no theories of separate summit_theories.
     adhesive : the materials with adhesion that lie against it, by rms slope and name: a curve of Fuller & Tabor each.
     reduced_pressures : p/(E* h'_rms), increasing and positive.
     attrs : further global attributes.
@@ -93,8 +93,8 @@ def _persson(pressure, spectrum):
             "persson_reduced_separation": _variable(dim, separation, f"{_SEPARATION}, Yang and Persson", _YANG),
             "persson_reduced_stiffness": _variable(dim, stiffness, named, _YANG),
         }
-    linear = pressure[summits.bush_gibson_thomas_area(pressure) <= summits.SEPARATE_SUMMITS_AREA_LIMIT]
-    area, named = summits.bush_gibson_thomas_area(linear), f"{_AREA}, Bush, Gibson and Thomas"
+    linear = pressure[summit_theories.bush_gibson_thomas_area(pressure) <= summit_theories.SEPARATE_SUMMITS_AREA_LIMIT]
+    area, named = summit_theories.bush_gibson_thomas_area(linear), f"{_AREA}, Bush, Gibson and Thomas"
     return variables | {
         "linear_pressure": _variable("linear_point", linear, _PRESSURE),
         "bush_gibson_thomas_area_fraction": _variable("linear_point", area, named, _BUSH),
@@ -103,8 +103,8 @@ def _persson(pressure, spectrum):
 
 def _separate_summits(moments, adhesive):
     dim, by = "summit_point", "Greenwood and Williamson"
-    separation = summits.separation_at(summits.greenwood_williamson_area, SUMMIT_AREAS, moments)
-    pressure = summits.greenwood_williamson_pressure(separation, moments)
+    separation = summit_theories.separation_at(summit_theories.greenwood_williamson_area, SUMMIT_AREAS, moments)
+    pressure = summit_theories.greenwood_williamson_pressure(separation, moments)
     alpha = moments.nayak_parameter
     variables = {
         "nayak_parameter": _variable((), alpha, "Nayak's parameter m0 m4/m2^2: breadth of the spectrum"),
@@ -117,8 +117,8 @@ def _separate_summits(moments, adhesive):
     curves = []
     for (rms_slope, _), material in adhesive.items():
         own = moments.scaled_to_rms_slope(rms_slope)
-        separation = summits.separation_at(summits.fuller_tabor_area, SUMMIT_AREAS, own, material)
-        curves.append((summits.fuller_tabor_pressure(separation, own, material), separation))
+        separation = summit_theories.separation_at(summit_theories.fuller_tabor_area, SUMMIT_AREAS, own, material)
+        curves.append((summit_theories.fuller_tabor_pressure(separation, own, material), separation))
     pressures, separations = np.moveaxis(np.array(curves), 1, 0)
     slopes, names = zip(*adhesive, strict=True)
     curve, by = "fuller_tabor_curve", "Fuller and Tabor"
