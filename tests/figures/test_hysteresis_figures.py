@@ -508,6 +508,7 @@ def test_runs_that_were_not_separated_have_no_pull_off_and_no_loss(surface, modu
     assert len(curves(fig13_loops.figure(partial, study="one").axes[0])[1]) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.split(".")[-1])
 def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, module):
     save(draw(module, one(), surface, "one"), tmp_path / "a.png", tmp_path / "a.pdf")
@@ -516,8 +517,3 @@ def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, module)
     for kind in ("png", "pdf"):
         first, second = ((tmp_path / f"{each}.{kind}").read_bytes() for each in "ab")
         assert first == second and len(first) > 5000
-
-
-def test_captions_end():
-    for module in MODULES:
-        assert module.DECLARATION.caption.endswith(".") and "  " not in module.DECLARATION.caption

@@ -333,6 +333,7 @@ def test_surfaces_show_spectra_and_where_measurements_come_from(write, tmp_path)
     assert text.count("<polyline") == 40 and text.count('<path class="curve"') == 3, "only some have a name"
 
 
+@pytest.mark.slow
 def test_long_tables_are_folded_and_cut_and_say_so(write, tmp_path):
     count = MOST_ROWS + 20
     runs = [

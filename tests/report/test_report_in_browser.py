@@ -20,7 +20,10 @@ from icha.report.report import Benchmark, ReportFigure, read_surface_statistics,
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=f"no Chromium on the path, under none of {', '.join(NAMES)}")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason=f"no Chromium on the path, under none of {', '.join(NAMES)}"),
+]
 
 
 @pytest.fixture(scope="module")
