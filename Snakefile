@@ -3,7 +3,7 @@
 
 from snakemake.utils import min_version
 
-min_version("9.9")
+min_version("9.14")
 
 
 include: "workflow/rules/common.smk"
@@ -53,59 +53,59 @@ localrules:
 rule all:
     default_target: True
     input:
-        CONFIG_USED,
+        FILES.configuration,
         list(COPIED),
-        SURFACES,
-        RUNS,
-        REFERENCES,
-        DATASET,
-        COMPARISON,
-        MODEL_ERROR,
-        CHECKS,
-        VERDICT,
-        FIGURES,
-        REPORT,
+        list(FILES.surfaces),
+        list(FILES.runs),
+        FILES.references,
+        FILES.dataset,
+        FILES.comparison,
+        FILES.model_error,
+        FILES.checks,
+        FILES.verdict,
+        FILES.figures,
+        FILES.report,
 
 
 rule surfaces:
     input:
-        SURFACES,
+        list(FILES.surfaces),
 
 
 rule runs:
     input:
-        SURFACES,
-        RUNS,
+        list(FILES.surfaces),
+        list(FILES.runs),
 
 
 rule references:
     input:
-        SURFACES,
-        REFERENCES,
+        list(FILES.surfaces),
+        FILES.references,
 
 
 rule dataset:
     input:
         rules.runs.input,
-        DATASET,
-        COMPARISON,
-        MODEL_ERROR,
-        CHECKS,
-        VERDICT,
+        FILES.dataset,
+        FILES.comparison,
+        FILES.model_error,
+        FILES.checks,
+        FILES.verdict,
 
 
 rule figures:
     input:
-        FIGURES,
+        FILES.figures,
 
 
 rule report:
     input:
-        REPORT,
+        FILES.report,
 
 
 rule publish:
     input:
         rules.all.input,
-        f"{DEPOSIT}/SHA256SUMS",
-        f"{DEPOSIT}.zip",
+        f"{FILES.deposit}/SHA256SUMS",
+        f"{FILES.deposit}.zip",

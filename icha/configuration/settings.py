@@ -62,6 +62,16 @@ def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabel
     }
 
 
+def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
+    """Slopes and materials with adhesion of a surface's runs, each once."""
+    pairs = dict.fromkeys((case.rms_slope, case.material) for case in run_cases(campaign) if case.surface == surface)
+    return [
+        {"rms_slope": rms_slope, "name": name, "material": campaign.materials[name].model_dump()}
+        for rms_slope, name in pairs
+        if campaign.materials[name].surface_energy > 0
+    ]
+
+
 def run_sha256(campaign: Campaign, case: RunLabels) -> str:
     """Checksum of everything that determines a run."""
     topography = campaign.topography(case.surface)

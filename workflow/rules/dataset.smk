@@ -1,21 +1,22 @@
-# config.used.yaml: what was asked for; dataset/<campaign>.nc: all runs in one file, a group per study; aggregated/<campaign>.nc: the runs of every
-# study at common loads; aggregated/model_error.nc: the runs against boundary elements; checks.json: what every result
-# must satisfy.
+# What was asked for; all runs in one file, a group per study; the runs of every study at common loads; the runs against
+# boundary elements; what every result must satisfy, and whether it does.
+
+from icha.configuration.settings import campaign_sha256
+from icha.publication.attributes import discovery_attributes
 
 
 rule configuration:
     input:
         as_it_is(list(COPIED.values())),
     output:
-        CONFIG_USED,
+        FILES.configuration,
         list(COPIED),
     log:
-        f"{LOGS}/configuration.log",
+        "<logs>/configuration.log",
     benchmark:
-        f"{BENCHMARKS}/configuration.jsonl"
+        "<benchmarks>/configuration.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=200,
         runtime=2,
@@ -30,22 +31,21 @@ rule configuration:
 
 rule campaign_dataset:
     input:
-        RUNS,
+        list(FILES.runs),
     output:
-        DATASET,
+        FILES.dataset,
     log:
-        f"{LOGS}/dataset.log",
+        "<logs>/dataset.log",
     benchmark:
-        f"{BENCHMARKS}/dataset.jsonl"
+        "<benchmarks>/dataset.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=30,
     params:
-        labels=LABELS,
-        size=len(RUNS),
+        labels=[tuple(labels) for labels in FILES.runs.values()],
+        size=len(FILES.runs),
         attributes=as_it_is(
             ATTRIBUTES
             | discovery_attributes(PUBLICATION)
@@ -60,16 +60,15 @@ rule campaign_dataset:
 
 rule comparison:
     input:
-        DATASET,
+        FILES.dataset,
     output:
-        COMPARISON,
+        FILES.comparison,
     log:
-        f"{LOGS}/aggregated.log",
+        "<logs>/aggregated.log",
     benchmark:
-        f"{BENCHMARKS}/aggregated.jsonl"
+        "<benchmarks>/aggregated.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=4000,
         runtime=30,
@@ -84,22 +83,21 @@ rule comparison:
 
 rule model_error:
     input:
-        campaign=DATASET,
-        solutions=SOLUTIONS,
+        campaign=FILES.dataset,
+        solutions=list(FILES.solutions),
     output:
-        f"{RESULTS}/aggregated/model_error.nc",
+        "<results>/aggregated/model_error.nc",
     log:
-        f"{LOGS}/model_error.log",
+        "<logs>/model_error.log",
     benchmark:
-        f"{BENCHMARKS}/model_error.jsonl"
+        "<benchmarks>/model_error.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=4000,
         runtime=30,
     params:
-        labels=SOLUTION_LABELS,
+        labels=[tuple(labels) for labels in FILES.solutions.values()],
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("measure_model_error.py"),
     message:
@@ -110,23 +108,22 @@ rule model_error:
 
 rule checks:
     input:
-        dataset=DATASET,
-        solutions=SOLUTIONS,
+        dataset=FILES.dataset,
+        solutions=list(FILES.solutions),
     output:
-        CHECKS,
+        FILES.checks,
     log:
-        f"{LOGS}/checks.log",
+        "<logs>/checks.log",
     benchmark:
-        f"{BENCHMARKS}/checks.jsonl"
+        "<benchmarks>/checks.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=4000,
         runtime=30,
     params:
-        labels=LABELS,
-        solution_labels=SOLUTION_LABELS,
+        labels=[tuple(labels) for labels in FILES.runs.values()],
+        solution_labels=[tuple(labels) for labels in FILES.solutions.values()],
         code=code_of("check_results.py"),
     message:
         "Checks of the results"
@@ -137,16 +134,15 @@ rule checks:
 # A failed check stops the campaign here; the report, which shows all checks, is made nevertheless.
 rule verdict:
     input:
-        CHECKS,
+        FILES.checks,
     output:
-        VERDICT,
+        FILES.verdict,
     log:
-        f"{LOGS}/verdict.log",
+        "<logs>/verdict.log",
     benchmark:
-        f"{BENCHMARKS}/verdict.jsonl"
+        "<benchmarks>/verdict.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=200,
         runtime=5,

@@ -3,10 +3,9 @@
 
 from icha.figures.declaration import ResultFiles
 from icha.figures.registry import DECLARATIONS
+from icha.planning.resources import figure_memory
 
 RESULT_FILES = ResultFiles(RESULTS, CAMPAIGN.name)
-# The largest topography of the campaign.
-MOST_POINTS = max(points_of(surface) for surface, _ in surface_cases(CAMPAIGN))
 
 
 wildcard_constraints:
@@ -17,17 +16,16 @@ rule figure:
     input:
         unpack(lambda wildcards: CAMPAIGN.figures.inputs(wildcards.name, CAMPAIGN, RESULT_FILES)),
     output:
-        png=f"{RESULTS}/figures/{{name}}.png",
-        pdf=f"{RESULTS}/figures/{{name}}.pdf",
+        png="<results>/figures/{name}.png",
+        pdf="<results>/figures/{name}.pdf",
     log:
-        f"{LOGS}/figures/{{name}}.log",
+        "<logs>/figures/{name}.log",
     benchmark:
-        f"{BENCHMARKS}/figures/{{name}}.jsonl"
+        "<benchmarks>/figures/{name}.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
-        mem_mb=lambda wildcards: 2000 + DECLARATIONS[wildcards.name].holds_topography * 16 * MOST_POINTS // 10**6,
+        mem_mb=lambda wildcards: figure_memory(CAMPAIGN, holds_topography=DECLARATIONS[wildcards.name].holds_topography),
         runtime=10,
     params:
         arguments=lambda wildcards: CAMPAIGN.figures.arguments(wildcards.name, CAMPAIGN),

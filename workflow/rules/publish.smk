@@ -1,19 +1,21 @@
 # publish/<campaign>-<version>/ and its .zip: everything that a reader needs, with checksums. See docs/howto/publish.md.
 
+from icha.publication.source import committed_source
+from publishable import refuse_unpublishable
+
 
 rule deposit:
     input:
-        what_is_published,
+        lambda wildcards: published(),
     output:
-        checksums=f"{DEPOSIT}/SHA256SUMS",
-        archive=f"{DEPOSIT}.zip",
+        checksums=f"{FILES.deposit}/SHA256SUMS",
+        archive=f"{FILES.deposit}.zip",
     log:
-        f"{LOGS}/publish.log",
+        "<logs>/publish.log",
     benchmark:
-        f"{BENCHMARKS}/publish.jsonl"
+        "<benchmarks>/publish.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=500,
         runtime=30,
@@ -27,3 +29,22 @@ rule deposit:
         "Deposit {PUBLICATION.version}"
     script:
         "../scripts/publish.py"
+
+
+def published():
+    """The files of a deposit; ends the program where there can be none, before anything is computed."""
+    refuse_unpublishable(CONFIGURATION, workflow.basedir)
+    return [
+        FILES.configuration,
+        *INPUTS,
+        *FILES.surfaces,
+        *FILES.runs,
+        *FILES.references,
+        FILES.dataset,
+        FILES.comparison,
+        *FILES.model_error,
+        FILES.checks,
+        FILES.verdict,
+        *FILES.figures,
+        FILES.report,
+    ]

@@ -1,33 +1,29 @@
-# references/<surface>.nc: what theories say of a surface, and published points;
-# references/boundary_elements/<entry>/<surface>/seed<k>/slope<g>/<material>/p<p*>.nc: one load each, by boundary
-# elements on the topography of the run;
-# references/loops/<entry>/<surface>/seed<k>/slope<g>/<material>.nc: boundary elements both ways;
-# references/error_sources/<entry>/<surface>/seed<k>/slope<g>/<material>.nc: variants between the model and them;
-# references/one_asperity/<hertz or mu<mu>>.nc: where the answer is known.
+# What runs are compared with: what theories say of a surface, and published points; boundary elements on the topography
+# of a run, one load each or both ways; variants between the model and them; one asperity, where the answer is known.
+
+from icha.configuration.settings import adhesive_contacts, loop_settings, solution_settings, source_settings
+from icha.planning.resources import solver_memory
 
 
 rule reference:
     input:
         surface=lambda wildcards: next(
-            f"{RESULTS}/surfaces/{name}/seed{seed}.nc"
-            for name, seed in surface_cases(CAMPAIGN)
-            if name == wildcards.surface
+            file for file, (surface, _) in FILES.surfaces.items() if surface == wildcards.surface
         ),
     output:
-        f"{RESULTS}/references/{{surface}}.nc",
+        "<results>/references/{surface}.nc",
     log:
-        f"{LOGS}/references/{{surface}}.log",
+        "<logs>/references/{surface}.log",
     benchmark:
-        f"{BENCHMARKS}/references/{{surface}}.jsonl"
+        "<benchmarks>/references/{surface}.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=600,
         runtime=10,
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
-        adhesive=lambda wildcards: adhesive_contacts(wildcards.surface),
+        adhesive=lambda wildcards: adhesive_contacts(CAMPAIGN, wildcards.surface),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("make_references.py"),
     message:
@@ -38,21 +34,20 @@ rule reference:
 
 rule boundary_elements:
     input:
-        surface=f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+        surface="<results>/surfaces/{surface}/seed{seed}.nc",
     output:
-        f"{RESULTS}/references/boundary_elements/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}/p{{pressure}}.nc",
+        "<results>/references/boundary_elements/{entry}/<contact>/p{pressure}.nc",
     log:
-        f"{LOGS}/boundary_elements/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}/p{{pressure}}.log",
+        "<logs>/boundary_elements/{entry}/<contact>/p{pressure}.log",
     benchmark:
-        f"{BENCHMARKS}/boundary_elements/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}/p{{pressure}}.jsonl"
+        "<benchmarks>/boundary_elements/{entry}/<contact>/p{pressure}.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
-        mem_mb=lambda wildcards: solution_memory(wildcards.surface, CAMPAIGN.boundary_elements[wildcards.entry]),
+        mem_mb=lambda wildcards: solver_memory(CAMPAIGN, wildcards.surface, CAMPAIGN.boundary_elements[wildcards.entry]),
         runtime=240,
     params:
-        settings=lambda wildcards: solution_settings(CAMPAIGN, solution_of(wildcards)),
+        settings=lambda wildcards: solution_settings(CAMPAIGN, held(FILES.solutions, results.SOLUTION, wildcards)),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("solve_boundary_elements.py"),
     message:
@@ -64,21 +59,22 @@ rule boundary_elements:
 
 rule boundary_element_loop:
     input:
-        surface=f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+        surface="<results>/surfaces/{surface}/seed{seed}.nc",
     output:
-        f"{RESULTS}/references/loops/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.nc",
+        "<results>/references/loops/{entry}/<contact>.nc",
     log:
-        f"{LOGS}/loops/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.log",
+        "<logs>/loops/{entry}/<contact>.log",
     benchmark:
-        f"{BENCHMARKS}/loops/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.jsonl"
+        "<benchmarks>/loops/{entry}/<contact>.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
-        mem_mb=lambda wildcards: solution_memory(wildcards.surface, CAMPAIGN.boundary_element_loops[wildcards.entry]),
+        mem_mb=lambda wildcards: solver_memory(
+            CAMPAIGN, wildcards.surface, CAMPAIGN.boundary_element_loops[wildcards.entry]
+        ),
         runtime=480,
     params:
-        settings=lambda wildcards: loop_settings(CAMPAIGN, loop_of(wildcards)),
+        settings=lambda wildcards: loop_settings(CAMPAIGN, held(FILES.loops, results.LOOP, wildcards)),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("follow_boundary_elements.py"),
     message:
@@ -90,21 +86,22 @@ rule boundary_element_loop:
 
 rule error_sources:
     input:
-        surface=f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+        surface="<results>/surfaces/{surface}/seed{seed}.nc",
     output:
-        f"{RESULTS}/references/error_sources/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.nc",
+        "<results>/references/error_sources/{entry}/<contact>.nc",
     log:
-        f"{LOGS}/error_sources/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.log",
+        "<logs>/error_sources/{entry}/<contact>.log",
     benchmark:
-        f"{BENCHMARKS}/error_sources/{{entry}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.jsonl"
+        "<benchmarks>/error_sources/{entry}/<contact>.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
-        mem_mb=lambda wildcards: solution_memory(wildcards.surface, CAMPAIGN.error_sources[wildcards.entry]),
+        mem_mb=lambda wildcards: solver_memory(CAMPAIGN, wildcards.surface, CAMPAIGN.error_sources[wildcards.entry]),
         runtime=480,
     params:
-        settings=lambda wildcards: source_settings(CAMPAIGN, sources_of(wildcards)),
+        settings=lambda wildcards: source_settings(
+            CAMPAIGN, held(FILES.error_sources, results.ERROR_SOURCES, wildcards)
+        ),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("find_error_sources.py"),
     message:
@@ -116,19 +113,18 @@ rule error_sources:
 
 rule one_asperity:
     output:
-        f"{RESULTS}/references/one_asperity/{{asperity}}.nc",
+        "<results>/references/one_asperity/{asperity}.nc",
     log:
-        f"{LOGS}/one_asperity/{{asperity}}.log",
+        "<logs>/one_asperity/{asperity}.log",
     benchmark:
-        f"{BENCHMARKS}/one_asperity/{{asperity}}.jsonl"
+        "<benchmarks>/one_asperity/{asperity}.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=800,
         runtime=120,
     params:
-        tabor_parameter=lambda wildcards: asperity_cases(CAMPAIGN)[wildcards.asperity],
+        tabor_parameter=lambda wildcards: held(FILES.one_asperity, results.ONE_ASPERITY, wildcards),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("press_one_asperity.py"),
     message:

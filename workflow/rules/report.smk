@@ -4,30 +4,29 @@
 
 rule report_page:
     input:
-        campaign=DATASET,
-        comparison=COMPARISON,
-        checks=CHECKS,
-        model_error=MODEL_ERROR,
-        configuration=CONFIG_USED,
-        surfaces=SURFACES,
-        figures=FIGURES,
+        campaign=FILES.dataset,
+        comparison=FILES.comparison,
+        checks=FILES.checks,
+        model_error=FILES.model_error,
+        configuration=FILES.configuration,
+        surfaces=list(FILES.surfaces),
+        figures=FILES.figures,
     output:
-        page=REPORT,
-        times=RUN_TIMES,
+        page=FILES.report,
+        times=FILES.run_times,
     log:
-        f"{LOGS}/report.log",
+        "<logs>/report.log",
     benchmark:
-        f"{BENCHMARKS}/report.jsonl"
+        "<benchmarks>/report.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: 1
     resources:
         mem_mb=4000,
         runtime=10,
     params:
         figures=list(CAMPAIGN.figures.drawn()),
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
-        benchmarks=BENCHMARKS,
+        benchmarks=f"{RESULTS}/benchmarks",
         code=code_of("make_report.py", *(f"icha.figures.{name}" for name in CAMPAIGN.figures.drawn())),
     message:
         "Report"

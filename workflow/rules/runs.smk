@@ -1,27 +1,30 @@
-# runs/<study>/<surface>/seed<k>/slope<g>/<material>.nc: one loading sweep each.
+# One loading sweep each.
+
+from icha.configuration.settings import run_settings, run_sha256
+from icha.planning.resources import sweep_minutes
 
 
 rule run:
     input:
-        surface=f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+        surface="<results>/surfaces/{surface}/seed{seed}.nc",
     output:
-        f"{RESULTS}/runs/{{study}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.nc",
+        "<results>/runs/{study}/<contact>.nc",
     log:
-        f"{LOGS}/runs/{{study}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.log",
+        "<logs>/runs/{study}/<contact>.log",
     benchmark:
-        f"{BENCHMARKS}/runs/{{study}}/{{surface}}/seed{{seed}}/slope{{slope}}/{{material}}.jsonl"
+        "<benchmarks>/runs/{study}/<contact>.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: lambda wildcards: threads_of(wildcards.surface)
+    threads: lambda wildcards: surface_threads(CAMPAIGN, wildcards.surface)
     resources:
-        mem_mb=lambda wildcards: memory_of(wildcards.surface),
-        runtime=minutes_of,
+        mem_mb=lambda wildcards: surface_memory(CAMPAIGN, wildcards.surface),
+        runtime=lambda wildcards: sweep_minutes(CAMPAIGN, wildcards.study, wildcards.surface),
     params:
-        settings=settings_of,
+        settings=lambda wildcards: run_settings(CAMPAIGN, held(FILES.runs, results.RUN, wildcards)),
         attributes=lambda wildcards: ATTRIBUTES
         | {
             "study": wildcards.study,
-            "config_sha256": run_sha256(CAMPAIGN, case_of(wildcards)),
+            "config_sha256": run_sha256(CAMPAIGN, held(FILES.runs, results.RUN, wildcards)),
         },
         code=code_of("run_sweep.py"),
     message:

@@ -1,20 +1,27 @@
-# surfaces/<surface>/seed<k>.nc: topographies at rms slope 1, shared by all slopes and materials.
+# Topographies at rms slope 1, shared by all slopes and materials.
+
+from icha.configuration.settings import surface_settings
+from icha.planning.resources import surface_memory, surface_threads
 
 
 rule surface:
     input:
-        unpack(height_map),
+        unpack(
+            lambda wildcards: (
+                {} if (surface := CAMPAIGN.surfaces[wildcards.surface]).random else {"height_map": surface.path}
+            )
+        ),
     output:
-        f"{RESULTS}/surfaces/{{surface}}/seed{{seed}}.nc",
+        "<results>/surfaces/{surface}/seed{seed}.nc",
     log:
-        f"{LOGS}/surfaces/{{surface}}/seed{{seed}}.log",
+        "<logs>/surfaces/{surface}/seed{seed}.log",
     benchmark:
-        f"{BENCHMARKS}/surfaces/{{surface}}/seed{{seed}}.jsonl"
+        "<benchmarks>/surfaces/{surface}/seed{seed}.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: lambda wildcards: threads_of(wildcards.surface)
+    threads: lambda wildcards: surface_threads(CAMPAIGN, wildcards.surface)
     resources:
-        mem_mb=lambda wildcards: memory_of(wildcards.surface),
+        mem_mb=lambda wildcards: surface_memory(CAMPAIGN, wildcards.surface),
         runtime=30,
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
