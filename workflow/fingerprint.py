@@ -3,6 +3,9 @@
 Snakemake's own trigger looks at the time stamp of the script, and at nothing behind it. A fingerprint is taken
 from the syntax trees, so comments, docstrings, formatting, touched files and fresh clones change nothing, and an
 edit of a module changes exactly the jobs that use it.
+
+(`grimp` knows what imports what as well, and as fast, but only within a package: not of scripts, nor of data files. The
+trees are read for the fingerprints in any case.)
 """
 
 import ast
@@ -15,34 +18,28 @@ PACKAGE = "icha"
 
 
 def code_fingerprint(script: str | Path, *modules: str) -> str:
-    """Fingerprint of a script, of what it imports from the package or from beside itself, and so on.
-
-    `modules` are those that the script imports by a name it is told only when it runs. Packages on the way to a
-    module are not part of it; data files are, if they lie beside a module whose text names them.
-    """
-    found: dict[Path, None] = {}
-    pending = [Path(script), *(_module_file(name) for name in modules)]
-    while pending:
-        file = pending.pop()
-        if file not in found:
-            found[file] = None
-            pending += _imports(file)
-    digest = hashlib.sha256()
-    for name in sorted(_name(file) for file in found):
-        digest.update(name.encode())
-    for file in sorted(found, key=_name):
+    """Fingerprint of the files that a script is made of (`files_of`)."""
+    files = files_of(script, *modules)
+    digest = hashlib.sha256("".join(files).encode())
+    for file in files.values():
         digest.update(_digest(file))
     return digest.hexdigest()[:16]
 
 
-def imported_modules(*scripts: Path) -> list[str]:
-    """Names of the modules of the package that some scripts import at their top."""
-    names = {}
-    for script in scripts:
-        for node in _tree(script).body:
-            if isinstance(node, ast.ImportFrom) and node.module.split(".")[0] == PACKAGE:
-                names[node.module] = None
-    return list(names)
+def files_of(script: str | Path, *modules: str) -> dict[str, Path]:
+    """Files of a script, of what it imports from the package or from beside itself, and so on, by their sorted names.
+
+    `modules` are those that the script imports by a name it is told only when it runs. Packages on the way to a
+    module are not part of it; data files are, if they lie beside a module whose text names them.
+    """
+    found: set[Path] = set()
+    pending = [Path(script), *(_module_file(name) for name in modules)]
+    while pending:
+        file = pending.pop()
+        if file not in found:
+            found.add(file)
+            pending += _imports(file)
+    return {_name(file): file for file in sorted(found, key=_name)}
 
 
 @cache

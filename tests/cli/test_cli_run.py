@@ -112,6 +112,7 @@ def test_damaged_files_are_made_again(project):
     assert "1 job failed:\n  Verdict" in done.stdout
 
 
+@pytest.mark.slow
 def test_it_goes_on_after_it_was_stopped(project):
     # So many that it is still at it when it is stopped.
     program, how = command(project, "runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..60}}")

@@ -31,6 +31,7 @@ def reference(tmp_path_factory):
     return faults.Reference(project, scratch, targets=("runs", "references"))
 
 
+@pytest.mark.slow
 def test_killed_calls_leave_nothing_behind_and_the_next_goes_on(reference):
     place, chance = reference.empty(), random.Random(1)
     for victim, moment in ((faults.VICTIMS[1], 0.5), (faults.VICTIMS[0], 0.5)):
@@ -40,6 +41,7 @@ def test_killed_calls_leave_nothing_behind_and_the_next_goes_on(reference):
     assert faults.computed_again(before, place) == []
 
 
+@pytest.mark.slow
 def test_flipped_bits_are_found_by_the_one_of_two_calls_that_may_run(reference):
     place = reference.copy()
     kinds = {"surface": "middle", "run": "start", "boundary elements": "end"}

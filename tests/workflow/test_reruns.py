@@ -57,10 +57,21 @@ def replace(file, old, new):
 
 def add_statement(file):
     """Change what a module does, if only by a name that nobody asks for."""
+    assert file.is_file()
     with file.open("a", encoding="utf-8") as module:
         module.write("\n_ADDED_BY_A_TEST = 1\n")
 
 
+@pytest.fixture
+def fingerprint(monkeypatch):
+    """The module of the workflow."""
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import fingerprint
+
+    return fingerprint
+
+
+@pytest.mark.slow
 def test_nothing_runs_twice(project):
     assert planned(project) == ({}, [])
 
@@ -82,6 +93,7 @@ def test_comments_docstrings_formatting_and_touch_run_nothing(project):
     assert planned(project) == ({}, [])
 
 
+@pytest.mark.slow
 def test_a_fresh_clone_with_unpacked_results_runs_nothing(smoke, tmp_path):
     clone = copy_project(smoke, tmp_path / "elsewhere")
     now = time.time()
@@ -92,25 +104,40 @@ def test_a_fresh_clone_with_unpacked_results_runs_nothing(smoke, tmp_path):
     assert planned(clone) == ({}, [])
 
 
+SOLVERS = {"solve_boundary_elements", "follow_boundary_elements", "find_error_sources", "press_one_asperity"}
+
+
 @pytest.mark.parametrize(
-    ("module", "beside"),
+    ("module", "scripts"),
     {
-        "equilibrium": {"error_sources", "one_asperity"},
-        "jkr": {"reference", "error_sources", "one_asperity"},
-        "elasticity": {"error_sources", "one_asperity"},
-        "simulation": set(),
-        "path": {"error_sources"},
-        "dissipation": {"error_sources"},
+        "equilibrium/equilibrium": {"run_sweep", "find_error_sources", "press_one_asperity"},
+        "asperity/jkr": {"run_sweep", "make_references", "find_error_sources", "press_one_asperity"},
+        "half_space/interaction": {"run_sweep", "find_error_sources", "press_one_asperity"},
+        "simulation": {"run_sweep"},
+        "path/loading": {"run_sweep", "find_error_sources"},
+        "path/energy_balance": {"run_sweep", "find_error_sources"},
+        # Boundary elements know nothing of the model: they are not solved again.
+        "references/boundary_elements": SOLVERS,
+        "references/persson": {"make_references"},
+        "surfaces/spectrum": {"make_surface", "make_references"},
+        "configuration/campaign": {"publish"},
+        "report/report": {"make_report"},
     }.items(),
 )
-def test_the_physics_runs_sweeps_and_what_follows(module, beside, project):
-    add_statement(project / f"icha/{module}.py")
+def test_scripts_whose_fingerprint_a_module_is_part_of(module, scripts, fingerprint):
+    folder = REPOSITORY / "workflow/scripts"
+    having = {file.stem for file in folder.glob("*.py") if f"icha/{module}.py" in fingerprint.files_of(file)}
+    assert having == scripts
+
+
+def test_the_physics_runs_sweeps_and_what_follows(project):
+    add_statement(project / "icha/simulation.py")
     jobs, _ = planned(project)
     assert jobs["run"] == 12
-    # Boundary elements know nothing of the model: they are not solved again.
-    assert set(jobs) == WHAT_FOLLOWS_RUNS | beside
+    assert set(jobs) == WHAT_FOLLOWS_RUNS
 
 
+@pytest.mark.slow
 def test_the_spectrum_runs_surfaces_and_all_that_needs_them(project):
     add_statement(project / "icha/surfaces/spectrum.py")
     jobs, _ = planned(project)
@@ -118,6 +145,7 @@ def test_the_spectrum_runs_surfaces_and_all_that_needs_them(project):
     assert set(jobs) == ALL_RULES - {"configuration", "one_asperity"}
 
 
+@pytest.mark.slow
 def test_other_authors_run_the_dataset_which_names_them_and_no_sweep(project):
     replace(project / "config/campaigns/smoke.yaml", "name: ICHA developers", "name: A team")
     jobs, _ = planned(project)
@@ -125,6 +153,7 @@ def test_other_authors_run_the_dataset_which_names_them_and_no_sweep(project):
     assert not {"surface", "run", *BESIDE_RUNS} & set(jobs)
 
 
+@pytest.mark.slow
 def test_another_licence_runs_all_that_names_it(project):
     replace(project / "config/campaigns/smoke.yaml", "license: CC-BY-4.0", "license: CC0-1.0")
     jobs, _ = planned(project)
@@ -138,12 +167,14 @@ def test_a_figure_runs_itself_and_the_report(project):
     assert "Figure fig3_distributions" in messages
 
 
+@pytest.mark.slow
 def test_the_style_runs_all_figures(project):
     add_statement(project / "icha/figures/style.py")
     jobs, _ = planned(project)
     assert jobs == {"figure": len(FIGURES), "report_page": 1}
 
 
+@pytest.mark.slow
 def test_boundary_elements_run_without_the_sweeps(project):
     add_statement(project / "icha/references/boundary_elements.py")
     jobs, _ = planned(project)
@@ -152,6 +183,7 @@ def test_boundary_elements_run_without_the_sweeps(project):
     assert set(jobs) == {"boundary_elements", "boundary_element_loop", "error_sources", "one_asperity"} | what_follows
 
 
+@pytest.mark.slow
 def test_a_finer_grid_costs_its_own_solutions(project):
     replace(project / "config/campaigns/smoke.yaml", "refinement: 2", "refinement: 3")
     jobs, messages = planned(project)
@@ -160,6 +192,7 @@ def test_a_finer_grid_costs_its_own_solutions(project):
     assert not [message for message in messages if "cmc_300nm" in message]
 
 
+@pytest.mark.slow
 def test_a_solution_that_is_lost_is_the_only_one_computed_again(project):
     (project / "results/smoke/references/boundary_elements/adhesive/challenge/seed2/slope1/cmc_300nm/p0.01.nc").unlink()
     jobs, _ = planned(project)
@@ -167,30 +200,35 @@ def test_a_solution_that_is_lost_is_the_only_one_computed_again(project):
     assert "run" not in jobs
 
 
+@pytest.mark.slow
 def test_the_page_template_runs_the_report(project):
-    with (project / "icha/templates/report.html").open("a") as template:
+    with (project / "icha/report/templates/report.html").open("a") as template:
         template.write("<!-- changed -->\n")
     assert planned(project)[0] == {"report_page": 1}
 
 
+@pytest.mark.slow
 def test_literature_runs_references_and_what_shows_them(project):
-    replace(project / "icha/reference/literature.json", "0.185", "0.186")
+    replace(project / "icha/references/literature.json", "0.185", "0.186")
     jobs, messages = planned(project)
     assert set(jobs) == {"reference", "figure", "report_page"}
     assert "Figure fig2_area_and_gap" in messages
 
 
+@pytest.mark.slow
 def test_a_script_runs_its_own_rule_and_what_follows(project):
     add_statement(project / "workflow/scripts/compare_runs.py")
     assert set(planned(project)[0]) == {"comparison", "report_page"}
 
 
+@pytest.mark.slow
 def test_the_configurations_model_runs_nothing(project):
-    for name in ("model", "load", "expansion", "design", "problems"):
+    for name in ("campaign", "load", "cases", "design", "studies"):
         add_statement(project / f"icha/configuration/{name}.py")
     assert planned(project) == ({}, [])
 
 
+@pytest.mark.slow
 def test_another_way_to_write_a_value_runs_no_sweep(project):
     replace(project / "config/campaigns/smoke.yaml", "25 MPa", "25000 kPa")
     jobs, _ = planned(project)
@@ -198,6 +236,7 @@ def test_another_way_to_write_a_value_runs_no_sweep(project):
     assert "configuration" in jobs
 
 
+@pytest.mark.slow
 def test_a_value_runs_the_sweeps_that_it_concerns(project):
     replace(project / "config/campaigns/smoke.yaml", "2 mJ/m^2", "3 mJ/m^2")
     jobs, _ = planned(project)
@@ -206,6 +245,7 @@ def test_a_value_runs_the_sweeps_that_it_concerns(project):
     assert jobs["reference"] == 1 and not {"surface", "boundary_elements", "error_sources"} & set(jobs)
 
 
+@pytest.mark.slow
 def test_a_new_seed_costs_its_own_sweeps(project):
     replace(project / "config/campaigns/smoke.yaml", "seeds: [1, 2]", "seeds: [1, 2, 3]")
     jobs, messages = planned(project)
@@ -214,6 +254,7 @@ def test_a_new_seed_costs_its_own_sweeps(project):
     assert all("seed 3" in message for message in messages if message.startswith(own))
 
 
+@pytest.mark.slow
 def test_an_option_of_a_figure_draws_that_figure(project):
     replace(project / "config/campaigns/smoke.yaml", "fig1_jkr: {}", "fig1_jkr: {tabor_parameter: 4}")
     jobs, messages = planned(project)
@@ -221,14 +262,12 @@ def test_an_option_of_a_figure_draws_that_figure(project):
     assert "Figure fig1_jkr" in messages
 
 
-def test_fingerprints_refuse_imports_that_they_cannot_follow(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    from fingerprint import code_fingerprint
-
+def test_fingerprints_refuse_imports_that_they_cannot_follow(tmp_path, fingerprint):
     script = tmp_path / "script.py"
     script.write_text("from icha import simulate\n")
     with pytest.raises(ValueError, match="from the module that defines it"):
-        code_fingerprint(script)
+        fingerprint.code_fingerprint(script)
     script = tmp_path / "other.py"
     script.write_text("from icha.simulation import simulate\n")
-    assert code_fingerprint(script) != code_fingerprint(REPOSITORY / "workflow/scripts/publish.py")
+    publish = REPOSITORY / "workflow/scripts/publish.py"
+    assert fingerprint.code_fingerprint(script) != fingerprint.code_fingerprint(publish)

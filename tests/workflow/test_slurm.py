@@ -134,6 +134,7 @@ def calls(tmp_path_factory):
     return {"spoilt": spoilt, "whole": whole, "refused": refused, "plan": plan}
 
 
+@pytest.mark.slow
 def test_runs_go_through_slurm_in_fewer_submissions_than_runs(calls):
     call = calls["spoilt"]
     submitted = sorted(call.comments.values())
@@ -144,6 +145,7 @@ def test_runs_go_through_slurm_in_fewer_submissions_than_runs(calls):
     assert call.said.count("SLURM jobid") == len(call.records) == 4
 
 
+@pytest.mark.slow
 def test_batches_ask_for_the_cores_and_the_memory_of_what_runs_side_by_side(calls):
     call = calls["spoilt"]
     batches = [record for record in call.records if call.comments[record["JobId"]] == "rule_runs_run"]
@@ -155,6 +157,7 @@ def test_batches_ask_for_the_cores_and_the_memory_of_what_runs_side_by_side(call
     assert surfaces["ProcCnt"] == "2" and "mem=1200M" in surfaces["Tres"] and surfaces["TimeLimit"] == "30"
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_is_reported_and_stops_no_other(calls):
     call = calls["spoilt"]
     assert call.returncode != 0
@@ -172,6 +175,7 @@ def test_a_run_that_fails_is_reported_and_stops_no_other(calls):
     assert call.said.count(f"/{failed}.log") >= 1
 
 
+@pytest.mark.slow
 def test_the_next_call_computes_what_is_missing_and_nothing_else(calls):
     before, call = calls["spoilt"], calls["whole"]
     assert call.returncode == 0, call.said
@@ -180,6 +184,7 @@ def test_the_next_call_computes_what_is_missing_and_nothing_else(calls):
     assert before.results.items() <= call.results.items()
 
 
+@pytest.mark.slow
 def test_results_are_those_of_a_local_run_byte_for_byte(calls, tmp_path):
     project = project_with_campaign(tmp_path / "project")
     local = snakemake(project, configuration=CONFIGURATION)
@@ -189,6 +194,7 @@ def test_results_are_those_of_a_local_run_byte_for_byte(calls, tmp_path):
     assert calls["whole"].results == expected
 
 
+@pytest.mark.slow
 def test_outdated_results_are_not_taken_for_new_ones_when_their_jobs_never_ran(calls):
     refused, plan = calls["refused"], calls["plan"]
     assert refused.returncode != 0 and not refused.records
@@ -198,6 +204,7 @@ def test_outdated_results_are_not_taken_for_new_ones_when_their_jobs_never_ran(c
     assert plan.returncode == 0 and f"run {len(outdated)}" in " ".join(plan.stdout.split())
 
 
+@pytest.mark.slow
 def test_nothing_is_left_behind():
     slurm_is_needed()
     with single_node() as node:
@@ -215,6 +222,7 @@ def test_nothing_is_left_behind():
     assert left == []
 
 
+@pytest.mark.slow
 def test_a_slurm_of_the_machine_is_left_alone(monkeypatch, tmp_path):
     monkeypatch.setattr("os.geteuid", lambda: 0)
     monkeypatch.setattr("shutil.which", lambda name: f"/usr/sbin/{name}")
