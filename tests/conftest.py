@@ -25,8 +25,10 @@ settings.register_profile("fast", max_examples=40, deadline=None, derandomize=Tr
 settings.register_profile("thorough", settings.get_profile("fast"), max_examples=1000)
 settings.load_profile("fast")
 
-# Files whose tests take minutes, the longest first: begun last, they would keep one core waiting.
-LONG = ("every_case_ends", "reruns", "boundary_elements", "workflow", "slurm", "cli_run", "loops", "dissipation")
+# Files whose tests take longest, quick or slow ones, the longest first: begun last, they would keep one core waiting.
+# Those of the figures stand between the two that look at the campaign, which only the first of them has to wait for.
+LONG = ("every_case_ends", "workflow", "figures", "reruns", "slurm", "boundary_elements", "cli_run", "report", "deposit")
+LONG += ("energy_balance", "simulation", "unloading", "faults", "loops")
 
 
 def pytest_collection_modifyitems(items):
