@@ -26,7 +26,7 @@ settings.register_profile("thorough", settings.get_profile("fast"), max_examples
 settings.load_profile("fast")
 
 # Files whose tests take longest, quick or slow ones, the longest first: begun last, they would keep one core waiting.
-# Those of the figures stand between the two that look at the campaign, which only the first of them has to wait for.
+# Those of the figures stand between two that look at the campaign: only the first of them has to wait for it.
 LONG = ("every_case_ends", "workflow", "figures", "reruns", "slurm", "boundary_elements", "cli_run", "report", "deposit")
 LONG += ("energy_balance", "simulation", "unloading", "faults", "loops")
 
