@@ -27,8 +27,8 @@ settings.load_profile("fast")
 
 # Files whose tests take longest, quick or slow ones, the longest first: begun last, they would keep one core waiting.
 # Those of the figures stand between two that look at the campaign: only the first of them has to wait for it.
-LONG = ("every_case_ends", "workflow", "figures", "reruns", "slurm", "boundary_elements", "cli_run", "report", "deposit")
-LONG += ("energy_balance", "simulation", "unloading", "faults", "loops")
+LONG = ("every_case_ends", "workflow", "figures", "reruns", "slurm", "boundary_elements", "cli_run", "report")
+LONG += ("deposit", "energy_balance", "simulation", "unloading", "faults", "loops")
 
 
 def pytest_collection_modifyitems(items):
