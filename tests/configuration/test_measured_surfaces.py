@@ -1,9 +1,18 @@
 """The section of a measured surface."""
 
 import pytest
+from demo_configuration import measured_surface
 
+from icha.configuration.cases import (
+    run_cases,
+)
+from icha.configuration.errors import ConfigurationError
 from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.configuration.settings import (
+    surface_settings,
+)
 from icha.surfaces.measured.settings import Preparation
+from icha.surfaces.measured.topography import prepared_topography
 
 SECTION = {"kind": "measured", "path": "scan.npy", "boundary": "mirror", "height_unit": "nm", "size": "90 um"}
 
@@ -50,3 +59,52 @@ def test_wrong_sections_are_refused_in_words(change, words):
         MeasuredSurface.model_validate(SECTION | change)
     for word in words:
         assert word in str(raised.value)
+
+
+def test_a_measured_surface_at_its_own_slope(load):
+    campaign = load({"surfaces.rough": measured_surface(), "studies.one.rms_slopes": "measured"}).campaign
+    (case,) = run_cases(campaign)
+    topography = campaign.topography("rough")
+    assert (case.seed, case.rms_slope) == (0, topography.rms_slope)
+    assert (topography.grid, topography.period, topography.boundary) == (128, 64e-6, "periodic")
+    assert prepared_topography(
+        campaign.surfaces["rough"].path, surface_settings_of_file(campaign, "rough")
+    ).rms_slope == pytest.approx(case.rms_slope, rel=1e-5)
+
+
+def surface_settings_of_file(campaign, name):
+    return {key: value for key, value in surface_settings(campaign, name).items() if key != "kind"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"path": "none.txt"}, "surfaces.rough.path: "),
+        ({"boundary": "reflecting"}, "surfaces.rough.boundary: 'reflecting' is not a choice; allowed: 'periodic'"),
+        ({"boundary": None}, "surfaces.rough.boundary: the key is missing; needed: What lies beyond the edges"),
+        ({"missing": "refuse"}, "surfaces.rough.missing: 'refuse'"),
+        ({"height_unit": None}, "surfaces.rough.height_unit: "),
+        ({"height_unit": "kg"}, "surfaces.rough.height_unit: 'kg'"),
+        ({"size": ["1 mm"]}, "surfaces.rough.size: ['1 mm'] has 1 entries; allowed: one length"),
+        ({"crop": {"x": "0 um", "y": "0 um", "side": "1 mm"}}, "surfaces.rough.crop: "),
+        ({"crop": {"x": "0 um", "z": "0 um"}}, "surfaces.rough.crop.z: unknown key"),
+        ({"taper": 0.7}, "surfaces.rough.taper: 0.7 is out of range; allowed: a number in (0, 0.5]"),
+        ({"boundary": "mirror", "taper": 0.2}, "taper: is for boundary window, this one is mirror; allowed"),
+        ({"boundary": "periodic", "detrend": "tilt"}, "detrend: 'tilt' would break the periodicity; allowed"),
+        ({"format": "xyz"}, "surfaces.rough.path: "),
+        ({"hurst": 0.8}, "surfaces.rough.hurst: unknown key"),
+    ],
+)
+def test_mistakes_about_measured_surfaces(changes, message, load, tmp_path):
+    section = {key: value for key, value in measured_surface(**changes).items() if value is not None}
+    with pytest.raises(ConfigurationError) as error:
+        load({"surfaces.rough": section})
+    lines = str(error.value).splitlines()
+    assert any(message in line and line.startswith(f"{tmp_path}/campaign.yaml: ") for line in lines), lines
+    assert all("allowed: " in line or "needed: " in line for line in lines), lines
+
+
+def test_slopes_that_no_surface_has_are_a_warning(load):
+    changes = {"surfaces.rough": measured_surface(height_unit="um"), "studies.one.rms_slopes": "measured"}
+    (warning,) = load(changes).campaign.warnings()
+    assert "surfaces.rough: the topography has an rms slope of 145" in warning and "units" in warning

@@ -1,0 +1,185 @@
+"""The runs that a study asks for: lists, what goes along together, cases, varied parameters."""
+
+import numpy as np
+import pytest
+from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
+
+from icha.configuration.cases import (
+    run_cases,
+    solution_cases,
+    surface_cases,
+)
+from icha.configuration.design import value_label
+from icha.configuration.settings import (
+    run_settings,
+    surface_settings,
+)
+
+BAD = {
+    # key, value, what the message must say of it
+    "parameter that nobody has": ("studies.one.vary", {"hrust": [0.8]}, "studies.one.vary.hrust: unknown key (did you"),
+    "varied value out of range": (
+        "studies.one.vary",
+        {"hurst": [0.5, 1.5]},
+        "studies.one.vary.hurst[1]: 1.5 is out of range; allowed: a number in (0, 1]",
+    ),
+    "varied value twice": (
+        "studies.one.vary",
+        {"hurst": [0.6, 0.6]},
+        "studies.one.vary.hurst: [0.6, 0.6] 0.6 is given",
+    ),
+    "varied value without its unit": (
+        "studies.one.vary",
+        {"surface_energy": [5]},
+        "studies.one.vary.surface_energy[0]: 5 the unit is missing; allowed: energy per area",
+    ),
+    "varied grid too coarse for its surface": (
+        "studies.one.vary",
+        {"grid": [80, 16]},
+        "studies.one.vary.grid[1]: 16 gives 1.6 grid cells per shortest wavelength",
+    ),
+    "varied cut-off too short for the grid": (
+        "studies.one.vary",
+        {"short_wavelength": ["10 um", "1 um"]},
+        "studies.one.vary.short_wavelength[1]: '1 um' grid of 'rough': 80 gives 0.8 grid cells",
+    ),
+    "lists of different length together": (
+        "",
+        {"studies.one.vary": {"hurst": [0.5, 0.6, 0.7]}, "studies.one.zip": [["rms_slopes", "hurst"]]},
+        "rms_slopes has 2, hurst has 3 entries; allowed: lists of the same length",
+    ),
+    "list that is not there together": (
+        "studies.one.zip",
+        [["rms_slopes", "hurst"]],
+        "studies.one.zip[0][1]: 'hurst' is no list of this study; allowed: surfaces, seeds, rms_slopes, materials",
+    ),
+    "list together twice": (
+        "studies.one.zip",
+        [["rms_slopes", "seeds"], ["seeds", "materials"]],
+        "studies.one.zip[1][0]: 'seeds' goes along with two other lists",
+    ),
+    "case of an unknown surface": (
+        "studies.one.cases",
+        [{"surface": "rouhg"}],
+        "studies.one.cases[0].surface: 'rouhg' is not defined; allowed: rough",
+    ),
+    "case with an unknown key": (
+        "studies.one.cases",
+        [{"surfaces": ["rough"]}],
+        "studies.one.cases[0].surfaces: unknown key (did you mean 'surface'?)",
+    ),
+    "case with a wrong value": (
+        "studies.one.cases",
+        [{"hurst": 0.7}, {"hurst": 7}],
+        "studies.one.cases[1].hurst: 7 is out of range",
+    ),
+    "no slopes and cases without one": (
+        "",
+        {"studies.one.rms_slopes": None, "studies.one.cases": [{"rms_slope": 0.1}, {"seed": 2}]},
+        "studies.one.rms_slopes: the key is missing; needed: Rms slopes",
+    ),
+    "measured slope of a random surface": (
+        "studies.one.rms_slopes",
+        "measured",
+        "studies.one.rms_slopes[0]: 'measured' surface 'rough' is made at random and has no slope of its own",
+    ),
+    "more runs than anybody waits for": (
+        "studies.one.seeds",
+        "1..100000",
+        "studies.one: asks for 200000 runs; allowed",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
+def test_mistakes_are_named(case, refused):
+    refused(*BAD[case])
+
+
+def paths(campaign):
+    return [case.path.removeprefix("one/") for case in run_cases(campaign)]
+
+
+def test_random_surfaces_and_files_share_a_study(load, tmp_path):
+    np.save(tmp_path / "own.npy", np.random.default_rng(1).random((16, 16)))
+    campaign = load({"surfaces.own": file_surface("own.npy"), "studies.one.surfaces": ["rough", "own"]}).campaign
+    assert surface_cases(campaign) == [("rough", 1), ("rough", 2), ("own", 0)]
+    assert len(paths(campaign)) == 2 * 2 + 2
+
+
+def test_parameters_are_varied_each_with_each(load):
+    vary = {"hurst": [0.6, 0.8], "surface_energy": ["5 mJ/m^2", "0.00001 kJ/m^2"], "grid": 96}
+    campaign = load({"studies.one.vary": vary, "studies.one.rms_slopes": [0.2], "studies.one.seeds": [1]}).campaign
+    assert paths(campaign) == [
+        f"rough-hurst{hurst}-grid96/seed1/slope0.2/soft-surface_energy{energy}"
+        for hurst in ("0.6", "0.8")
+        for energy in ("5mJ", "10mJ")
+    ]
+    case = run_cases(campaign)[-1]
+    assert surface_settings(campaign, case.surface)["hurst"] == 0.8
+    assert surface_settings(campaign, case.surface)["grid"] == 96
+    assert run_settings(campaign, case)["material"]["surface_energy"] == 0.01
+    assert run_settings(campaign, case)["material"]["contact_modulus"] == 25e6
+
+
+def test_lists_that_go_along_together(load):
+    changes = {
+        "studies.one.vary": {"hurst": [0.5, 0.9]},
+        "studies.one.zip": [["rms_slopes", "hurst"]],
+        "studies.one.seeds": "3..5",
+    }
+    expected = {(f"rough-hurst{hurst}", seed, slope) for hurst, slope in ((0.5, 0.2), (0.9, 1.0)) for seed in (3, 4, 5)}
+    cases = run_cases(load(changes).campaign)
+    assert {(case.surface, case.seed, case.rms_slope) for case in cases} == expected
+    assert len(cases) == len(expected)
+
+
+def test_an_explicit_list_of_runs(load):
+    cases = [{"seed": 7, "rms_slope": 0.5, "interaction_range": "40 nm"}, {"rms_slope": 1.5}]
+    assert paths(load({"studies.one.cases": cases}).campaign) == [
+        "rough/seed7/slope0.5/soft-interaction_range40nm",
+        "rough/seed1/slope1.5/soft",
+        "rough/seed2/slope1.5/soft",
+    ]
+    whole = {"surface": "rough", "seed": 1, "rms_slope": 0.1, "material": "soft"}
+    alone = {"surfaces": None, "seeds": None, "rms_slopes": None, "materials": None, "snapshots": None}
+    changes = {f"studies.one.{key}": value for key, value in alone.items()} | {"studies.one.cases": [whole]}
+    assert paths(load(changes).campaign) == ["rough/seed1/slope0.1/soft"]
+
+
+def test_what_names_a_varied_surface_means_its_variants(load):
+    changes = {
+        **LONG_RANGE,
+        "studies.one.vary": {"hurst": [0.5, 0.9]},
+        "boundary_elements": {"truth": TRUTH | {"surfaces": ["rough"], "rms_slopes": [1.0]}},
+        "figures": {"fig4_contact_map": {"study": "one", "surface": "rough", "seed": 2}},
+    }
+    campaign = load(changes).campaign
+    assert {case.surface for case in solution_cases(campaign)} == {"rough-hurst0.5", "rough-hurst0.9"}
+    assert len(solution_cases(campaign)) == 2 * 2 * 2
+    assert campaign.figures.fig4_contact_map.surface == "rough-hurst0.5"
+    used = load({**changes, "boundary_elements": {"truth": TRUTH | {"surfaces": ["rough-hurst0.9"]}}}).campaign
+    assert {case.surface for case in solution_cases(used)} == {"rough-hurst0.9"}
+
+
+@pytest.mark.parametrize(
+    ("value", "label"), [(4e-8, "40nm"), (1.5625e-6, "1.5625um"), (0.1, "100mm"), (1e-4, "100um"), (12.0, "12m")]
+)
+def test_names_of_variants_are_read_by_people(value, label, load):
+    assert value_label(load().campaign.surfaces["rough"].model_copy(update={"period": value}), "period") == label
+
+
+def test_the_preparation_of_a_measured_surface_is_varied(load):
+    changes = {
+        "surfaces.rough": measured_surface(),
+        "studies.one.rms_slopes": "measured",
+        "studies.one.vary": {"detrend": ["tilt", "curvature"], "boundary": ["mirror", "free"]},
+    }
+    cases = run_cases(load(changes).campaign)
+    assert [case.surface for case in cases] == [
+        f"rough-detrend{detrend}-boundary{boundary}"
+        for detrend in ("tilt", "curvature")
+        for boundary in ("mirror", "free")
+    ]
+    # A mirror image has the slope of what it is of; a plane is part of a slope, and a paraboloid of another.
+    assert len({case.rms_slope for case in cases}) > 1

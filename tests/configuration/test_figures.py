@@ -1,0 +1,115 @@
+"""Section `figures`."""
+
+import pytest
+from demo_configuration import LONG_RANGE, TRUTH
+
+from icha.configuration.cases import (
+    source_cases,
+)
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.settings import (
+    source_settings,
+)
+from icha.figures.fig4_contact_map import finest_solution
+
+BAD = {
+    # key, value, what the message must say of it
+    "figure of a loss without a way back": (
+        "figures",
+        {"fig15_loss": {"studies": ["one"]}},
+        "figures.fig15_loss.studies[0]: 'one' is not unloaded",
+    ),
+    "figure of loops without a way back": ("figures", {"fig13_loops": {"study": "one"}}, "is not unloaded"),
+    "figure of pull-off of no study": (
+        "figures",
+        {"fig14_pull_off": {"study": "one", "load_studies": ["two"]}},
+        "figures.fig14_pull_off.load_studies[0]: 'two' is not defined",
+    ),
+    "figure of no study": ("figures", {"fig2_area_and_gap": {"study": "two"}}, "'two' is not defined; allowed: one"),
+    "unknown figure": ("figures", {"fig7": {}}, "figures.fig7: unknown key"),
+    "figure without its snapshots": (
+        "figures",
+        {"fig6_spots_by_slope": {"study": "one"}},
+        "has no snapshot of kind relative_load",
+    ),
+    "figure of another snapshot": (
+        "figures",
+        {"fig3_distributions": {"study": "one", "snapshot": {"area_fraction": 0.1}}},
+        "'area_fraction 0.1' is no snapshot of study 'one'; allowed: area_fraction 0.02",
+    ),
+    "map of a seed that is not there": (
+        "figures",
+        {"fig4_contact_map": {"study": "one", "seed": 9}},
+        "figures.fig4_contact_map.seed: 9 is not in study 'one'; allowed: 1, 2",
+    ),
+    "error without boundary elements": (
+        "figures",
+        {"fig10_model_error": {"study": "one"}},
+        "figures.fig10_model_error.study: 'one' has no boundary elements beside it",
+    ),
+    "figure of unknown error sources": (
+        "figures",
+        {"fig12_error_sources": {"entry": "why"}},
+        "figures.fig12_error_sources.entry: 'why' is not defined",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
+def test_mistakes_are_named(case, refused):
+    refused(*BAD[case])
+
+
+def test_figures_of_snapshots_need_one(load):
+    figures = {"fig3_distributions": {"study": "one"}}
+    load({"figures": figures})
+    with pytest.raises(ConfigurationError, match=r"fig3_distributions\.study: 'one' keeps no snapshot to draw"):
+        load({"figures": figures, "studies.one.snapshots": []})
+
+
+def test_the_figure_of_tabor_parameters_needs_adhesion(load):
+    figures = {"fig9_tabor": {"study": "one"}}
+    load({"figures": figures})
+    with pytest.raises(ConfigurationError, match=r"fig9_tabor\.study: 'one' has no material with adhesion"):
+        load({"figures": figures, "materials.soft.surface_energy": "0 J/m^2"})
+
+
+def test_the_map_is_compared_with_the_finest_solution_of_its_state(load):
+    entries = {"coarse": TRUTH, "fine": TRUTH | {"refinement": 2, "seeds": [2]}}
+    changes = {**LONG_RANGE, "boundary_elements": entries}
+
+    def solution(**figure):
+        campaign = load({**changes, "figures": {"fig4_contact_map": {"study": "one", **figure}}}).campaign
+        return finest_solution(campaign, campaign.figures.fig4_contact_map)
+
+    at_load = {"snapshot": {"reduced_pressure": 0.01}}
+    assert solution(**at_load).path == "coarse/rough/seed1/slope0.2/soft/p0.01"
+    assert solution(**at_load, seed=2, rms_slope=1.0).path == "fine/rough/seed2/slope1/soft/p0.01"
+    assert solution(snapshot={"area_fraction": 0.02}) is None
+
+
+def test_the_sources_of_the_error_are_drawn_without_adhesion(load):
+    changes = {
+        **LONG_RANGE,
+        "error_sources": {"why": TRUTH | {"seeds": [2]}},
+        "figures": {"fig12_error_sources": {"entry": "why"}},
+    }
+    with pytest.raises(ConfigurationError, match=r"fig12_error_sources\.entry: 'why' has not one material"):
+        load(changes)
+    bare = changes | {"materials.soft.surface_energy": "0 J/m^2"}
+    # Its mean over the seeds is that of one surface at one slope.
+    with pytest.raises(ConfigurationError, match=r"entry: 'why' has not one rms slope but 2 \(0\.2, 1\.0\)"):
+        load(bare)
+    del bare["figures"]
+    campaign = load(bare).campaign
+    cases = source_cases(campaign)
+    assert [case.path for case in cases] == [f"why/rough/seed2/slope{slope}/soft" for slope in ("0.2", "1")]
+    assert source_settings(campaign, cases[1]) == {
+        "material": {"contact_modulus": 25e6, "surface_energy": 0.0, "interaction_range": pytest.approx(120e-9)},
+        "rms_slope": 1.0,
+        "seed": 2,
+        "reduced_pressures": [0.003, 0.01],
+        "refinement": 2,
+        "tolerance": 1e-8,
+    }
+    assert campaign.snapshots_of("one") == [("area_fraction", 0.02)]  # the runs are none of their concern

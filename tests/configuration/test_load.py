@@ -1,0 +1,60 @@
+"""Files of configurations: what is no configuration, overrides, all mistakes at once."""
+
+import pytest
+
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.load import load_configuration
+from icha.configuration.yaml_files import read_yaml
+
+
+def test_all_mistakes_are_named_at_once(load):
+    with pytest.raises(ConfigurationError) as error:
+        load({"name": "A B", "surfaces.rough.hurst": 2, "materials.soft.surface_energy": "1 m", "extra": 1})
+    assert len(str(error.value).splitlines()) == 4
+
+
+def test_overrides_are_checked_and_named(load, tmp_path):
+    assert load(overrides={"surfaces": {"rough": {"hurst": 0.5}}}).campaign.surfaces["rough"].hurst == 0.5
+    with pytest.raises(ConfigurationError) as error:
+        load({"title": 1}, overrides={"surfaces": {"rough": {"hurst": 5}}})
+    assert sorted(line.split(": ")[0] for line in str(error.value).splitlines()) == [
+        "--config",
+        f"{tmp_path}/campaign.yaml",
+    ]
+
+
+def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
+    configuration = load(overrides={"surfaces": {"rough": {"hurst": 0.5}}})
+    again = tmp_path / "used.yaml"
+    again.write_text(configuration.text)
+    assert load_configuration(again) == configuration
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "the file is empty"),
+        (b"- 1\n", "the file is a list"),
+        (b"a: [1\n", "allowed: a YAML mapping"),
+        (b"a: 1\nb: 1\na: 2\n", "line 3: key 'a' is given twice"),
+        (b"m:\n  x: {k: 1, k: 2}\n", "line 2: key 'k' is given twice"),
+        (b"\xff\xfe\x00", "not a text file"),
+        (b"a: !!python/object:os.system {}\n", "allowed: a YAML mapping"),
+    ],
+)
+def test_files_that_are_no_configuration(content, message, tmp_path):
+    file = tmp_path / "campaign.yaml"
+    file.write_bytes(content)
+    with pytest.raises(ConfigurationError, match=message) as error:
+        load_configuration(file)
+    assert str(error.value).startswith(str(file))
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(ConfigurationError, match="No such file"):
+        load_configuration(tmp_path / "none.yaml")
+
+
+def test_days_that_no_calendar_has_are_text_until_they_are_checked(tmp_path):
+    (tmp_path / "one.yaml").write_text("publication: {date: 2026-02-30}")
+    assert read_yaml(tmp_path / "one.yaml") == {"publication": {"date": "2026-02-30"}}

@@ -1,0 +1,21 @@
+"""Section `materials`."""
+
+import pytest
+
+BAD = {
+    # key, value, what the message must say of it
+    "unknown key": ("materials.soft.modulus", "25 MPa", "materials.soft.modulus: unknown key"),
+    "missing key": ("materials.soft.surface_energy", None, "materials.soft.surface_energy: the key is missing"),
+    "missing unit": ("materials.soft.contact_modulus", 25e6, "the unit is missing; allowed: pressure with its unit"),
+    "wrong dimension": ("materials.soft.surface_energy", "50 mJ/m^3", "is not a unit of energy per area"),
+    "negative modulus": ("materials.soft.contact_modulus", "-25 MPa", "'-25 MPa' is too small"),
+    "zero modulus": ("materials.soft.contact_modulus", "0 MPa", "greater than 0"),
+    "negative surface energy": ("materials.soft.surface_energy", "-1 mJ/m^2", "0 or greater"),
+    "zero range": ("materials.soft.interaction_range", "0 nm", "greater than 0"),
+    "name of a material": ("materials.Soft", {}, "materials.Soft: 'Soft' is not a name"),
+}
+
+
+@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
+def test_mistakes_are_named(case, refused):
+    refused(*BAD[case])

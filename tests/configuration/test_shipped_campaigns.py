@@ -1,0 +1,109 @@
+"""The campaigns that are part of the project."""
+
+import numpy as np
+import pytest
+from demo_configuration import REPOSITORY
+
+from icha.configuration.cases import (
+    run_cases,
+    solution_cases,
+    surface_cases,
+)
+from icha.configuration.load import load_configuration
+from icha.configuration.settings import (
+    run_settings,
+)
+from icha.figures.fig4_contact_map import finest_solution
+from icha.references.literature import literature
+
+SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_campaigns_are_valid(path):
+    campaign = load_configuration(path).campaign
+    assert run_cases(campaign)
+    assert not campaign.warnings()
+    assert path.name == "config.yaml" or campaign.name == path.stem
+
+
+def test_the_papers_campaign():
+    campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
+    assert campaign.name == "paper"
+    cases = run_cases(campaign)
+    assert len(cases) == 3 + 9
+    assert len({case.path for case in cases}) == 12
+    assert surface_cases(campaign) == [("challenge", 1), ("mcghee", 1)]
+    challenge, mcghee = campaign.surfaces["challenge"], campaign.surfaces["mcghee"]
+    assert mcghee.period == 1000 * challenge.period == 0.1
+    assert challenge.cells_per_short_wave == pytest.approx(8)
+    ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][3:]
+    assert ratios == pytest.approx([8.333e-9, 4.0e-9, 1.905e-9], rel=1e-3)
+
+
+def test_boundary_elements_stand_beside_the_papers_runs():
+    campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
+    cases = solution_cases(campaign)
+    assert {case.run for case in cases} <= set(run_cases(campaign))
+    assert len({case.path for case in cases}) == len(cases)
+    energies = {campaign.materials[case.material].surface_energy for case in cases}
+    assert energies == {0.0, 0.05}  # with and without adhesion
+    for case in cases:
+        assert ("reduced_pressure", case.reduced_pressure) in run_settings(campaign, case.run)["path"]["snapshots"]
+    drawn = campaign.figures.fig4_contact_map
+    assert finest_solution(campaign, drawn).material == drawn.material
+
+
+def test_the_validation_varies_what_makes_a_surface():
+    campaign = load_configuration(REPOSITORY / "config/campaigns/validation.yaml").campaign
+    entries = [case for case in solution_cases(campaign) if case.entry in ("adhesionless", "adhesive")]
+    surfaces = [campaign.surfaces[name] for name in dict.fromkeys(case.surface for case in entries)]
+    assert {surface.hurst for surface in surfaces} == {0.3, 0.5, 0.8}
+    assert len({surface.rolloff_wavelength for surface in surfaces}) >= 3
+    assert len({surface.short_wavelength for surface in surfaces}) >= 3
+    for name in {case.surface for case in entries}:
+        for energy in (0.0, 0.05):
+            seeds = {
+                case.seed
+                for case in entries
+                if case.surface == name and campaign.materials[case.material].surface_energy == energy
+            }
+            assert len(seeds) >= 3
+
+
+def test_the_whole_challenge():
+    challenge = literature("contact_mechanics_challenge")
+    campaign = load_configuration(REPOSITORY / "config/campaigns/cmc_full.yaml").campaign
+    surface, study = campaign.surfaces["challenge"], campaign.studies["challenge"]
+    for name in ("period", "rolloff_wavelength", "short_wavelength"):
+        assert getattr(surface, name) == pytest.approx(challenge[f"{name}_m"])
+    assert (surface.hurst, study.rms_slopes) == (challenge["hurst"], [challenge["rms_slope"]])
+    assert surface.cells_per_short_wave >= 8
+    cmc = campaign.materials["cmc"]
+    assert cmc.contact_modulus == challenge["contact_modulus_Pa"]
+    assert cmc.surface_energy == challenge["surface_energy_J_m2"]
+    assert cmc.interaction_range == challenge["interaction_range_m"]
+    assert campaign.materials["cmc_adhesionless"].surface_energy == 0
+    areas = np.array(study.targets.area_fractions)
+    assert len(areas) == 20 and areas[-1] == 0.1
+    np.testing.assert_allclose(np.diff(np.log(areas)), np.log(areas[-1] / areas[0]) / 19, rtol=0.03)
+    pressure = challenge["reference_pressure_Pa"] / challenge["contact_modulus_Pa"] / challenge["rms_slope"]
+    assert [snapshot.target for snapshot in study.snapshots] == [("reduced_pressure", pytest.approx(pressure))]
+
+
+def test_tabor_parameters_of_the_tabor_campaign():
+    challenge = literature("contact_mechanics_challenge")
+    campaign = load_configuration(REPOSITORY / "config/campaigns/tabor.yaml").campaign
+    whole = load_configuration(REPOSITORY / "config/campaigns/cmc_full.yaml").campaign
+    assert campaign.surfaces == whole.surfaces
+    found = []
+    for name in campaign.studies["tabor"].materials:
+        material = campaign.materials[name]
+        length = material.surface_energy / material.contact_modulus
+        mu = np.cbrt(length**2 * challenge["rms_curvature_radius_m"]) / material.interaction_range
+        if name == "adhesionless":
+            assert mu == 0
+        else:
+            assert float(name.removeprefix("mu_").replace("_", ".")) == pytest.approx(mu, rel=2e-3)
+            found.append(mu)
+    np.testing.assert_allclose(found, np.arange(1, 5.1, 0.5), rtol=2e-3)

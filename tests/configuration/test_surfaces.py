@@ -1,0 +1,114 @@
+"""Section `surfaces`: random ones, and those of files."""
+
+import numpy as np
+import pytest
+from demo_configuration import (
+    file_surface,
+)
+
+from icha.configuration.cases import (
+    run_cases,
+    surface_cases,
+)
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.settings import (
+    surface_settings,
+)
+from icha.datasets.labels import number_label
+
+BAD = {
+    # key, value, what the message must say of it
+    "unknown key of a surface": ("surfaces.rough.hrust", 0.8, "surfaces.rough.hrust: unknown key"),
+    "missing unit in text": ("surfaces.rough.period", "100", "surfaces.rough.period: '100' the unit is missing"),
+    "unknown unit": ("surfaces.rough.period", "100 umm", "'umm' is not a known unit"),
+    "unit on a number": ("surfaces.rough.hurst", "0.8 m", "is a pure number and takes no unit"),
+    "infinite length": ("surfaces.rough.period", "1e999 m", "is not finite"),
+    "not a number of metres": ("surfaces.rough.period", "nan m", "is not a number with a unit"),
+    "boolean quantity": ("surfaces.rough.period", True, "is not a number with a unit"),
+    "Hurst exponent 0": ("surfaces.rough.hurst", 0, "(0, 1]"),
+    "Hurst exponent above 1": ("surfaces.rough.hurst", 1.2, "surfaces.rough.hurst: 1.2 is out of range"),
+    "boolean Hurst exponent": ("surfaces.rough.hurst", True, "surfaces.rough.hurst: True is not a number"),
+    "NaN": ("surfaces.rough.hurst", float("nan"), "is not finite"),
+    "cut-off below two cells": ("surfaces.rough.grid", 19, "1.9 grid cells per shortest wavelength"),
+    "grid is no integer": ("surfaces.rough.grid", 80.0, "is not an integer"),
+    "boolean grid": ("surfaces.rough.grid", True, "is not an integer"),
+    "q0 below qL": ("surfaces.rough.rolloff_wavelength", "101 um", "longer than the period (q0 < qL)"),
+    "q1 at q0": ("surfaces.rough.short_wavelength", "20 um", "not shorter than the roll-off wavelength (q1 <= q0)"),
+    "unknown kind of surface": ("surfaces.rough.kind", "fractal", "allowed: self_affine, file"),
+    "unknown amplitudes": ("surfaces.rough.amplitudes", "random", "'fixed' or 'gaussian'"),
+    "no surfaces": ("surfaces", {}, "surfaces: {} is empty"),
+    "surfaces no mapping": ("surfaces", [1], "is not a mapping"),
+    "section no mapping": ("surfaces.rough", 3, "surfaces.rough"),
+    "grid beyond any memory": ("surfaces.rough.grid", 10**9, "surfaces.rough.grid"),
+    "missing surface file": (
+        "surfaces.rough",
+        {"kind": "file", "path": "none.npy", "height_unit": "um", "period": "1 mm"},
+        "no such file",
+    ),
+    "height unit": (
+        "surfaces.rough",
+        {"kind": "file", "path": "none.npy", "height_unit": "kg", "period": "1 mm"},
+        "allowed: a unit of length",
+    ),
+    "braces in a path": (
+        "surfaces.rough",
+        {"kind": "measured", "path": "scans{1}/a.txt"},
+        "surfaces.rough.path: 'scans{1}/a.txt' has braces; allowed: the path of a file without { and } in it",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
+def test_mistakes_are_named(case, refused):
+    refused(*BAD[case])
+
+
+def test_the_slope_that_a_topography_has(load, tmp_path):
+    period, amplitude, size = 1e-3, 2e-6, 32
+    x = np.arange(size) / size * period
+    heights = amplitude * np.sin(2 * np.pi / period * x) * np.ones((size, 1))
+    np.save(tmp_path / "own.npy", heights * 1e6)
+    campaign = load({"surfaces.rough": file_surface("own.npy"), "studies.one.rms_slopes": "measured"}).campaign
+    (case,) = run_cases(campaign)
+    assert case.rms_slope == pytest.approx(2 * np.pi / period * amplitude / np.sqrt(2), rel=1e-5)
+    assert case.path == f"one/rough/seed0/slope{number_label(case.rms_slope)}/soft"
+
+
+def test_few_cells_are_a_warning(load):
+    assert not load().campaign.warnings()
+    (warning,) = load({"surfaces.rough.grid": 30}).campaign.warnings()
+    assert "surfaces.rough.grid: 30 gives 3 grid cells" in warning
+    assert load({"surfaces.rough.grid": 20}).campaign.warnings()
+
+
+@pytest.mark.parametrize(
+    ("heights", "message"),
+    [
+        (np.full((16, 16), np.nan), "256 of 256 heights that are not finite"),
+        (np.where(np.eye(16) > 0, np.inf, 1.0), "16 of 256 heights that are not finite"),
+        (np.ones((16, 15)), r"shape \(16, 15\)"),
+        (np.ones((16, 16, 2)), r"shape \(16, 16, 2\)"),
+        (np.ones((4, 4)), r"shape \(4, 4\)"),
+        (np.ones((16, 16)), "all the same"),
+        (np.full((16, 16), "a"), "not real numbers"),
+    ],
+)
+def test_surface_files_are_read_before_anything_runs(heights, message, load, tmp_path):
+    np.save(tmp_path / "heights.npy", heights)
+    with pytest.raises(ConfigurationError, match=f"surfaces.rough.path: .*{message}"):
+        load({"surfaces.rough": file_surface("heights.npy")})
+
+
+def test_damaged_surface_files(load, tmp_path):
+    for name in ("heights.npy", "heights.nc", "heights.txt"):
+        (tmp_path / name).write_bytes(b"nothing of the kind")
+        with pytest.raises(ConfigurationError, match="cannot be read"):
+            load({"surfaces.rough": file_surface(name)})
+
+
+def test_a_surface_file_is_one_realisation_beside_the_configuration(load, tmp_path):
+    np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
+    campaign = load({"surfaces.rough": file_surface("heights.npy")}).campaign
+    assert surface_cases(campaign) == [("rough", 0)]
+    assert campaign.surfaces["rough"].path == str(tmp_path / "heights.npy")
+    assert surface_settings(campaign, "rough") == {"kind": "file", "period": 1e-3, "metres_per_unit": 1e-6}
