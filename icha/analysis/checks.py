@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -34,6 +34,10 @@ SEPARATION_RISE_LIMIT = 1e-2
 COMPLETED = "completed"
 
 
+# Name, value, limit and description of what is checked.
+Finding = tuple[str, float, float, str]
+
+
 @dataclass(frozen=True)
 class Check:
     """One finding: `passed` says whether `value` keeps to `limit`; `subject` is the run it belongs to."""
@@ -54,32 +58,40 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
     run : a dataset as `icha.simulate` returns it.
     subject : name of the run in the findings.
     """
-    checks: list[Check] = []
+    return tuple(_at_most(*finding, subject) for finding in _findings(run))
 
-    def at_most(name, value, limit, description):
-        checks.append(_at_most(name, value, limit, description, subject))
 
-    numbers = [v.values for v in run.variables.values() if v.dtype.kind in "fiu"]
-    at_most(
-        "finite",
-        sum(int(np.count_nonzero(~np.isfinite(values))) for values in numbers),
-        0,
-        "number of values that are not finite",
-    )
-    at_most("steps", int(run.sizes["step"] == 0), 0, "1 if the run has no step at all")
-    if run.sizes["step"] == 0:
-        return tuple(checks)
+def _findings(run: xr.Dataset) -> Iterator[Finding]:
+    yield "finite", _not_finite(run), 0, "number of values that are not finite"
+    steps = run.sizes["step"]
+    yield "steps", int(steps == 0), 0, "1 if the run has no step at all"
+    if steps == 0:
+        return
+    yield "residual", np.max(run["residual"].values), RESIDUAL_LIMIT, "largest equilibrium error over h_rms"
+    yield "converged", int((run["converged"] != 1).sum()), 0, "number of steps that did not converge"
+    yield "targets", _miss(run), TARGET_LIMIT, "largest relative distance of a step from its target"
+    yield from _loading(run)
+    if run.sizes.get("snapshot", 0):
+        for name, value, description in _identities(run):
+            yield name, value, IDENTITY_LIMIT, description
+    if "work" in run:
+        yield from _cycle(run)
+        if "hysteresis_loss" in run:
+            yield from _loop(run)
 
-    at_most("residual", np.max(run["residual"].values), RESIDUAL_LIMIT, "largest equilibrium error over h_rms")
-    at_most("converged", int((run["converged"] != 1).sum()), 0, "number of steps that did not converge")
-    at_most("targets", _miss(run), TARGET_LIMIT, "largest relative distance of a step from its target")
 
-    # The way back is another curve, and so is loading again.
+def _not_finite(data):
+    """Number of values of a dataset that are not finite."""
+    numbers = [v.values for v in data.variables.values() if v.dtype.kind in "fiu"]
+    return sum(int(np.count_nonzero(~np.isfinite(values))) for values in numbers)
+
+
+def _loading(run) -> Iterator[Finding]:
+    """Findings on the first loading: the way back is another curve, and so is loading again."""
     loading = run.isel(step=run["leg"].values == 0)
-    adhesive = float(run["surface_energy"]) > 0
-    height = float(run["rms_height"])
+    adhesive, height = float(run["surface_energy"]) > 0, float(run["rms_height"])
     # Two targets of different kinds may be one state but for the accuracy to which it is reached.
-    at_most(
+    yield (
         "area rises",
         _fall_in_loading(loading, "contact_area_fraction"),
         TARGET_LIMIT,
@@ -87,7 +99,7 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
     )
     if not adhesive:
         # Adhesion may pull the surfaces together: between stops in separation or area the load is then free to fall.
-        at_most(
+        yield (
             "pressure rises",
             _fall_in_loading(loading, "nominal_pressure"),
             TARGET_LIMIT,
@@ -95,33 +107,25 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
             "over its maximum",
         )
     rise, rise_at_events = _rises_of_separation(loading)
-    at_most(
+    yield (
         "separation falls",
         rise / height,
         TARGET_LIMIT,
         "largest rise of the mean separation within the first loading where nothing jumps in or unites, over h_rms",
     )
     if not adhesive:
-        at_most(
+        yield (
             "separation falls where spots unite",
             rise_at_events / height,
             SEPARATION_RISE_LIMIT,
             "largest rise of the mean separation within the first loading where spots unite, over h_rms",
         )
-    if not adhesive:
-        at_most(
+        yield (
             "stiffness",
             int((run["contact_stiffness"] < 0).sum()),
             0,
             "number of steps with a negative contact stiffness, without adhesion",
         )
-    if run.sizes.get("snapshot", 0):
-        for name, value, description in _identities(run):
-            at_most(name, value, IDENTITY_LIMIT, description)
-    if "work" in run:
-        for name, value, limit, description in _cycle(run):
-            at_most(name, value, limit, description)
-    return tuple(checks)
 
 
 def _fall(values):
@@ -215,11 +219,14 @@ LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
 
 
-def _cycle(run):
-    """Findings on the work of a run that goes on after its first loading: name, value, limit, what it is."""
-    # Energies are differences of works: they are as accurate as the largest of those.
-    scale = float(np.max(np.abs(run["work"].values))) or 1.0
-    last = run.isel(step=-1)
+def _largest_work(run):
+    """The scale of energies of a run: as differences of works they are as accurate as the largest of those."""
+    return float(np.max(np.abs(run["work"].values))) or 1.0
+
+
+def _cycle(run) -> Iterator[Finding]:
+    """Findings on the events and jumps of a run that goes on after its first loading."""
+    scale, last = _largest_work(run), run.isel(step=-1)
     logged = np.bincount(run["event_kind"].values, minlength=len(EVENT_COUNTS))
     counted = np.array([int(last[name]) for name in EVENT_COUNTS])
     yield (
@@ -236,8 +243,11 @@ def _cycle(run):
         IDENTITY_LIMIT,
         "energy gained in jumps into and out of contact together, over the largest work",
     )
-    if "hysteresis_loss" not in run:
-        return
+
+
+def _loop(run) -> Iterator[Finding]:
+    """Findings on a run that ends in separation: its loss, and that nothing is left in contact."""
+    scale, last = _largest_work(run), run.isel(step=-1)
     loss = float(run["hysteresis_loss"])
     parts = sum(float(run[name]) for name in LOSSES if name in run)
     yield (
@@ -322,53 +332,59 @@ def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]
     solution : a dataset as `icha.references.boundary_elements.boundary_elements` returns it.
     subject : name of the solution in the findings.
     """
+    findings = (*_of_solver(solution), *_identities_of_solution(solution))
+    return tuple(_at_most(f"boundary elements: {name}", *rest, subject) for name, *rest in findings)
+
+
+def _of_solver(solution) -> Iterator[Finding]:
+    """Findings on how well a solution was found."""
+    yield "finite", _not_finite(solution), 0, "number of values that are not finite"
+    yield (
+        "converged",
+        float(solution["residual"]) / float(solution["tolerance"]),
+        1,
+        "error of the solver over the one at which it was to stop",
+    )
+    load_error = abs(float(solution["nominal_pressure"]) / _asked(solution) - 1)
+    yield "load", load_error, LOAD_LIMIT, "mean traction against the load asked for"
+    yield (
+        "resolved",
+        float(solution["strength_number"]),
+        MAX_STRENGTH_NUMBER,
+        "sqrt(dgamma dx/E*)/range of the grid, 0 without adhesion",
+    )
+
+
+def _asked(solution):
+    """The nominal pressure asked for, Pa."""
+    unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
+    return float(solution["target_reduced_pressure"]) * unit
+
+
+def _identities_of_solution(solution) -> Iterator[Finding]:
+    """Errors of the identities between a solution's distributions, area and load."""
     gaps = solution["gap_density"].values * np.diff(solution["gap_bin_edges"].values)
     pressures = solution["pressure_density"].values * np.diff(solution["pressure_bin_edges"].values)
     loads = pressures * solution["pressure_bin_mean"].values
     area, nominal = float(solution["contact_area_fraction_raw"]), float(solution["nominal_pressure"])
-    unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
-    asked = float(solution["target_reduced_pressure"]) * unit
-    numbers = [v.values for v in solution.variables.values() if v.dtype.kind in "fiu"]
-    findings = (
-        (
-            "boundary elements: finite",
-            sum(int(np.count_nonzero(~np.isfinite(values))) for values in numbers),
-            0,
-            "number of values that are not finite",
-        ),
-        (
-            "boundary elements: converged",
-            float(solution["residual"]) / float(solution["tolerance"]),
-            1,
-            "error of the solver over the one at which it was to stop",
-        ),
-        ("boundary elements: load", abs(nominal / asked - 1), LOAD_LIMIT, "mean traction against the load asked for"),
-        (
-            "boundary elements: resolved",
-            float(solution["strength_number"]),
-            MAX_STRENGTH_NUMBER,
-            "sqrt(dgamma dx/E*)/range of the grid, 0 without adhesion",
-        ),
-        (
-            "boundary elements: P(u) complete",
-            abs(gaps.sum() + area - 1),
-            IDENTITY_LIMIT,
-            "integral of P(u) over u, plus the nodes in contact, against 1",
-        ),
-        (
-            "boundary elements: area from P(p)",
-            abs(pressures.sum() - area) / max(area, np.finfo(float).tiny),
-            IDENTITY_LIMIT,
-            "integral of P(p) over p against the nodes in contact",
-        ),
-        (
-            "boundary elements: load from P(p)",
-            abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), asked),
-            IDENTITY_LIMIT,
-            "integral of p P(p) over p, plus the traction outside contact, against F/A0, over the sum of both signs",
-        ),
+    yield (
+        "P(u) complete",
+        abs(gaps.sum() + area - 1),
+        IDENTITY_LIMIT,
+        "integral of P(u) over u, plus the nodes in contact, against 1",
     )
-    return tuple(_at_most(name, value, limit, description, subject) for name, value, limit, description in findings)
+    yield (
+        "area from P(p)",
+        abs(pressures.sum() - area) / max(area, np.finfo(float).tiny),
+        IDENTITY_LIMIT,
+        "integral of P(p) over p against the nodes in contact",
+    )
+    yield (
+        "load from P(p)",
+        abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), _asked(solution)),
+        IDENTITY_LIMIT,
+        "integral of p P(p) over p, plus the traction outside contact, against F/A0, over the sum of both signs",
+    )
 
 
 def _at_most(name, value, limit, description, subject):

@@ -10,9 +10,11 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
 from icha.datasets.attributes import DERIVED, collected
+from icha.datasets.build import variable
 from icha.datasets.campaign import loading_stops, reduced_gap
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPLETE
+from icha.datasets.variables.terms import Variable, term
 from icha.support.statistics import Ensemble, ensemble
 
 # Loads at which curves are compared, per decade.
@@ -24,11 +26,8 @@ _SAME_LOAD = 1e-6
 # The round reduced pressures at which tables quote the results.
 ROUND_PRESSURES = (1e-4, 3.16e-4, 1e-3, 3.16e-3, 1e-2, 3.16e-2, 1e-1)
 
-_AXES = {
-    "reduced_pressure": "nominal pressure over contact modulus and rms slope, p/(E* h'rms)",
-    "relative_load": "nominal pressure over contact modulus, F/(E* A0)",
-}
 _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
+_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds whose runs are complete", np.int32)
 _AVERAGED = (
     ("contact_area_fraction", "area", "A/A0"),
     ("reduced_separation", "separation", "the mean separation over the rms height"),
@@ -88,61 +87,18 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     every surface, slope and material. A single one has no deviation and no band: they are missing.
     """
     complete = study["status"].transpose(*LABELS).values == COMPLETE
-    pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
-    slope = study["rms_slope"].values[None, None, :, None, None]
-    # Loads of the first, tensile contacts have no logarithm.
-    shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
-    loads = {"reduced_pressure": pressure, "relative_load": pressure * slope}
-    curves = {
-        "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
-        "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
-    }
-
-    variables, coords = (
-        {"status": study["status"], "seed_count": _seed_count(complete)},
-        {label: study[label] for label in LABELS},
-    )
-    for axis, load in loads.items():
+    seed_count = complete.sum(axis=LABELS.index("seed"))
+    variables = {"status": study["status"], "seed_count": variable(_SEED_COUNT, seed_count)}
+    coords = {label: study[label] for label in LABELS}
+    for axis, load in _loads(study).items():
         suffix = "" if axis == "reduced_pressure" else "_at_load"
-        at = _common_grid([load[index][shown[index]] for index in map(tuple, np.argwhere(complete))])
-        coords[axis] = xr.Variable(axis, at, {"units": "1", "long_name": _AXES[axis]})
-        shape = load.shape[:-1]
-        on_grid = {}
-        for name, values in curves.items():
-            result = np.full((*shape, len(at)), np.nan)
-            for index in map(tuple, np.argwhere(complete) if len(at) else ()):
-                result[index] = interpolated(
-                    load[index][shown[index]],
-                    values[index][shown[index]],
-                    at,
-                    logarithmic=name == "contact_area_fraction",
-                )
-            on_grid[name] = result
-            described = {"units": "1", "long_name": f"{study[name].attrs['long_name']}, at {_AXES[axis]}"}
-            variables[name + suffix] = xr.Variable((*LABELS, axis), result, described)
-        area = on_grid["contact_area_fraction"]
-
-        def derived(reduce, label, long_name, axis=axis, area=area):
-            # A reduction over no complete run at all has no value.
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RuntimeWarning)
-                values = reduce(area, LABELS.index(label))
-            dims = (*(each for each in LABELS if each != label), axis)
-            return xr.Variable(dims, values, {"units": "1", "long_name": f"{long_name}, at {_AXES[axis]}"})
-
-        for name, short, symbol in _AVERAGED:
-            over_seeds = ensemble(on_grid[name], LABELS.index("seed"))
-            for part, words in _STATISTICS.items():
-                attributes = {"units": "1", "long_name": f"{words.format(symbol)}, at {_AXES[axis]}"}
-                if part != "mean":
-                    attributes["missing"] = "where there is a single seed"
-                variables[f"{short}_{part}{suffix}"] = xr.Variable(
-                    (*_WITHOUT_SEED, axis), getattr(over_seeds, part), attributes
-                )
-        for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
-            variables[f"{label.removeprefix('rms_')}_spread{suffix}"] = derived(
-                _spread, label, f"largest over smallest A/A0 of all {many}, less 1"
+        at, on_grid = _on_common_grid(study, load, complete)
+        coords[axis] = variable(term(axis)._replace(dims=(axis,)), at)
+        for name, (description, values) in (_curves(study, on_grid) | _spreads(on_grid)).items():
+            along = description._replace(
+                dims=(*description.dims, axis), long_name=f"{description.long_name}, at {term(axis).long_name}"
             )
+            variables[name + suffix] = variable(along, values)
     described = collected(
         f"Comparison of the runs of study {study.attrs.get('study', '')}".rstrip(),
         "Contact area and mean separation at loads common to all runs, by monotone interpolation.",
@@ -153,9 +109,54 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     return xr.Dataset(variables, coords, described | kept | dict(attrs))
 
 
-def _seed_count(complete):
-    count = complete.sum(axis=LABELS.index("seed")).astype(np.int32)
-    return xr.Variable(_WITHOUT_SEED, count, {"units": "1", "long_name": "number of seeds whose runs are complete"})
+def _loads(study):
+    """Loads of all steps on both axes, NaN but at the stops of the first loading: tensile ones have no logarithm."""
+    pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
+    slope = study["rms_slope"].values[None, None, :, None, None]
+    shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
+    loads = {"reduced_pressure": pressure, "relative_load": pressure * slope}
+    return {axis: np.where(shown, load, np.nan) for axis, load in loads.items()}
+
+
+def _on_common_grid(study, load, complete):
+    """A grid of loads that all complete runs cover, and the curves of all runs on it, by name."""
+    curves = {
+        "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
+        "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
+    }
+    places = [tuple(place) for place in np.argwhere(complete)]
+    shown = ~np.isnan(load)
+    at = _common_grid([load[place][shown[place]] for place in places])
+    on_grid = {name: np.full((*complete.shape, len(at)), np.nan) for name in curves}
+    for name, values in curves.items():
+        for place in places if len(at) else ():
+            own = shown[place]
+            logarithmic = name == "contact_area_fraction"
+            on_grid[name][place] = interpolated(load[place][own], values[place][own], at, logarithmic=logarithmic)
+    return at, on_grid
+
+
+def _curves(study, on_grid):
+    """Descriptions and values of the curves of all runs."""
+    return {name: (Variable(LABELS, "1", study[name].attrs["long_name"]), values) for name, values in on_grid.items()}
+
+
+def _spreads(on_grid):
+    """Descriptions and values of what spreads the curves: seeds, and materials and slopes."""
+    found = {}
+    for name, short, symbol in _AVERAGED:
+        over_seeds = ensemble(on_grid[name], LABELS.index("seed"))
+        for part, words in _STATISTICS.items():
+            further = {} if part == "mean" else {"missing": "where there is a single seed"}
+            description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further=further)
+            found[f"{short}_{part}"] = description, getattr(over_seeds, part)
+    for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
+        description = Variable(
+            tuple(each for each in LABELS if each != label), "1", f"largest over smallest A/A0 of all {many}, less 1"
+        )
+        spread = _spread(on_grid["contact_area_fraction"], LABELS.index(label))
+        found[f"{label.removeprefix('rms_')}_spread"] = description, spread
+    return found
 
 
 def mean_curve(curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: bool) -> tuple[np.ndarray, Ensemble]:
@@ -217,7 +218,10 @@ def mean_way(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, Ensemble
 
 
 def _spread(area, axis):
-    return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
+    """Largest over smallest area, less 1; NaN of no complete run at all."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
 
 
 def _common_grid(loads):
