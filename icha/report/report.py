@@ -8,20 +8,16 @@ it. Long tables show their first rows; what is left out is in the data, to which
 from __future__ import annotations
 
 import base64
-import csv
 import importlib.metadata
 import itertools
-import json
 import os
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import jinja2
 import numpy as np
 import xarray as xr
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from icha.analysis.checks import IDENTITY_LIMIT, Check, worst
 from icha.analysis.common_loads import at_round_pressures
@@ -33,7 +29,7 @@ from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, RAGG
 from icha.figures.scale import Scale
 from icha.figures.style import COLOURS, quantity, unit_for
 from icha.report.inline_svg import Curve, Node, flow_graph, logarithmic_chart
-from icha.support import in_words
+from icha.report.template import scientific, template
 from icha.support.atomic_files import whole_file
 from icha.support.statistics import ensemble
 
@@ -57,15 +53,6 @@ class ReportFigure:
     png: str | os.PathLike
     pdf: str | os.PathLike
     studies: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Benchmark:
-    """What one job took: wall time in s and peak memory in MB (none where it ended before it was measured)."""
-
-    job: str
-    seconds: float
-    megabytes: float | None
 
 
 def write_report(
@@ -123,7 +110,7 @@ def write_report(
     studies = [_study(campaign, name, comparison) for name in campaign.children]
     shown = [_surface(surface) for surface in surfaces[:MOST_ROWS]]
     linked = {name: link(target) for name, target in files.items()}
-    page = _template("report.html").render(
+    page = template("report.html").render(
         title=campaign.attrs.get("title", "Rough contact campaign"),
         summary=campaign.attrs.get("summary", ""),
         attributes=campaign.attrs,
@@ -165,67 +152,10 @@ def _in_order_of_page(figures, studies):
     return sorted(zip(own, figures, strict=True), key=lambda pair: places.index(pair[0]))
 
 
-def write_times_page(path: str | os.PathLike, jobs: Sequence[Benchmark]) -> None:
-    """Write the page of what the jobs took: all of them by kind, and the longest ones.
-
-    The kind of a job is what its name begins with, up to the first slash.
-    """
-    kinds: dict[str, list[Benchmark]] = {}
-    for job in jobs:
-        kinds.setdefault(job.job.split("/")[0], []).append(job)
-    rows = [
-        {
-            "name": name,
-            "count": len(own),
-            "total": sum(job.seconds for job in own),
-            "longest": max(job.seconds for job in own),
-            "memory": max((job.megabytes or 0 for job in own), default=0),
-        }
-        for name, own in kinds.items()
-    ]
-    longest = sorted(jobs, key=lambda job: -job.seconds)
-    page = _template("run_times.html").render(
-        kinds=sorted(rows, key=lambda row: -row["total"]),
-        total=sum(job.seconds for job in jobs),
-        count=len(jobs),
-        longest=longest[:_FOLDED],
-    )
-    with whole_file(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
-
-
 def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
     """Read a surface file without its heights."""
     with xr.open_dataset(path, engine="netcdf4", drop_variables=["height", "x", "y"]) as dataset:
         return dataset.load()
-
-
-def read_benchmarks(files: Mapping[str, str | os.PathLike]) -> list[Benchmark]:
-    """Read Snakemake's benchmark files, `.jsonl` or tab-separated, by name of their job; repeats add up.
-
-    Files that are not there (a job that was not run again after an update, say) are left out.
-    """
-    found = []
-    for job, path in files.items():
-        path = Path(path)
-        if not path.exists():
-            continue
-        text = path.read_text(encoding="utf-8")
-        if path.suffix == ".jsonl":
-            rows = [json.loads(line) for line in text.splitlines() if line.strip()]
-        else:
-            rows = list(csv.DictReader(text.splitlines(), delimiter="\t"))
-        seconds = sum(float(row["s"]) for row in rows)
-        memory = [float(row["max_rss"]) for row in rows if _is_number(row.get("max_rss"))]
-        found.append(Benchmark(job, seconds, max(memory, default=None)))
-    return found
-
-
-def _is_number(text):
-    try:
-        return np.isfinite(float(text))
-    except (TypeError, ValueError):
-        return False
 
 
 def _study(campaign, name, comparison):
@@ -436,10 +366,10 @@ def _with_confidence(values, unit=""):
     over = ensemble(values)
     mean = float(over.mean)
     factor, unit = unit_for(mean, unit) if unit else (1.0, "")
-    text = _scientific(mean * factor) + (f" {unit}" if unit else "")
+    text = scientific(mean * factor) + (f" {unit}" if unit else "")
     # Loads that are met exactly do not scatter.
     if over.confidence > 1e-6 * abs(mean):
-        text += Markup("<br>±&thinsp;") + _scientific(float(over.confidence) * factor)
+        text += Markup("<br>±&thinsp;") + scientific(float(over.confidence) * factor)
     return text.replace("-", "−")
 
 
@@ -634,57 +564,3 @@ def _version(name):
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
         return None
-
-
-# Symbols as they stand in captions and attributes, and how a page sets them.
-_SYMBOLS = (
-    (re.compile(r"h(?:&#39;|')_?rms"), "<i>h</i>′<sub>rms</sub>"),
-    (re.compile(r"\bh_rms"), "<i>h</i><sub>rms</sub>"),
-    (re.compile(r"\bE\*"), "<i>E</i><sup>∗</sup>"),
-    (re.compile(r"\bA0\b"), "<i>A</i><sub>0</sub>"),
-)
-
-
-def _symbols(text: str) -> Markup:
-    """Set the symbols of plain text: E*, A0, h'rms."""
-    result = str(escape(text))
-    for pattern, replacement in _SYMBOLS:
-        result = pattern.sub(replacement, result)
-    return Markup(result)
-
-
-def _scientific(value: float | None) -> Markup:
-    """A number with three digits, in powers of ten where it is small or large."""
-    if value is None:
-        return Markup("–")
-    if value == 0:
-        return Markup("0")
-    # A hundredth less a rounding error is a hundredth.
-    exponent = int(np.floor(np.log10(abs(value)) + 1e-9))
-    if -3 <= exponent < 4:
-        return Markup(escape(f"{value:.{max(0, 2 - exponent)}f}" if exponent < 3 else f"{value:.0f}"))
-    return Markup(f"{value / 10.0**exponent:.2f}&thinsp;×&thinsp;10<sup>{str(exponent).replace('-', '−')}</sup>")
-
-
-def _per_cent(value: float, *, signed: bool = True) -> str:
-    """A part in per cent, to a tenth, with a true minus sign."""
-    text = f"{100 * value:+.1f}" if signed else f"{100 * value:.1f}"
-    return text.replace("+0.0", "0.0").replace("-0.0", "0.0").replace("-", "−")
-
-
-def _template(name: str) -> jinja2.Template:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("icha.report", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {
-        "symbols": _symbols,
-        "scientific": _scientific,
-        "per_cent": _per_cent,
-        "number": "{:g}".format,
-        "duration": in_words.duration,
-    }
-    return environment.get_template(name)

@@ -22,13 +22,11 @@ from icha.figures.select import path_steps
 from icha.figures.style import save
 from icha.report.report import (
     MOST_ROWS,
-    Benchmark,
     ReportFigure,
-    read_benchmarks,
     read_surface_statistics,
     write_report,
-    write_times_page,
 )
+from icha.report.run_times import Benchmark, read_benchmarks, write_times_page
 
 
 class Page(HTMLParser):

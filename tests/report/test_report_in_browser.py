@@ -16,7 +16,8 @@ from icha.datasets.campaign import campaign_tree
 from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr, fig2_area_and_gap
 from icha.figures.style import save
-from icha.report.report import Benchmark, ReportFigure, read_surface_statistics, write_report, write_times_page
+from icha.report.report import ReportFigure, read_surface_statistics, write_report
+from icha.report.run_times import Benchmark, write_times_page
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)

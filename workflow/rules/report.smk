@@ -24,7 +24,7 @@ rule report_page:
         mem_mb=4000,
         runtime=10,
     params:
-        figures=list(CAMPAIGN.figures.drawn()),
+        figures={name: CAMPAIGN.figures.studies_of(name, CAMPAIGN) for name in CAMPAIGN.figures.drawn()},
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         benchmarks=f"{RESULTS}/benchmarks",
         code=code_of("make_report.py", *(f"icha.figures.{name}" for name in CAMPAIGN.figures.drawn())),

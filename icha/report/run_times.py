@@ -1,0 +1,95 @@
+"""What the jobs of a campaign took: measurements, and so on a page of their own."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from icha.report.template import template
+from icha.support.atomic_files import whole_file
+
+# So many of the longest jobs are listed.
+_LONGEST = 30
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """What one job took: wall time in s and peak memory in MB (none where it ended before it was measured)."""
+
+    job: str
+    seconds: float
+    megabytes: float | None
+
+
+def write_times_page(path: str | os.PathLike, jobs: Sequence[Benchmark]) -> None:
+    """Write the page of what the jobs took: all of them by kind, and the longest ones.
+
+    The kind of a job is what its name begins with, up to the first slash.
+    """
+    kinds: dict[str, list[Benchmark]] = {}
+    for job in jobs:
+        kinds.setdefault(job.job.split("/")[0], []).append(job)
+    rows = [
+        {
+            "name": name,
+            "count": len(own),
+            "total": sum(job.seconds for job in own),
+            "longest": max(job.seconds for job in own),
+            "memory": max((job.megabytes or 0 for job in own), default=0),
+        }
+        for name, own in kinds.items()
+    ]
+    longest = sorted(jobs, key=lambda job: -job.seconds)
+    page = template("run_times.html").render(
+        kinds=sorted(rows, key=lambda row: -row["total"]),
+        total=sum(job.seconds for job in jobs),
+        count=len(jobs),
+        longest=longest[:_LONGEST],
+    )
+    with whole_file(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def read_benchmarks(files: Mapping[str, str | os.PathLike]) -> list[Benchmark]:
+    """Read Snakemake's benchmark files, `.jsonl` or tab-separated, by name of their job; repeats add up.
+
+    Files that are not there (a job that was not run again after an update, say) are left out.
+    """
+    found = []
+    for job, path in files.items():
+        path = Path(path)
+        if not path.exists():
+            continue
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".jsonl":
+            rows = [json.loads(line) for line in text.splitlines() if line.strip()]
+        else:
+            rows = list(csv.DictReader(text.splitlines(), delimiter="\t"))
+        seconds = sum(float(row["s"]) for row in rows)
+        memory = [float(row["max_rss"]) for row in rows if _is_number(row.get("max_rss"))]
+        found.append(Benchmark(job, seconds, max(memory, default=None)))
+    return found
+
+
+def _is_number(text):
+    try:
+        return np.isfinite(float(text))
+    except (TypeError, ValueError):
+        return False
+
+
+def write_times(table: str | os.PathLike, page: str | os.PathLike, benchmarks: str | os.PathLike) -> None:
+    """Write wall time and peak memory of every job that left a benchmark file below a folder, as table and page."""
+    folder = Path(benchmarks)
+    files = {str(path.relative_to(folder).with_suffix("")): path for path in sorted(folder.rglob("*.jsonl"))}
+    jobs = read_benchmarks(files)
+    rows = [f"{each.job}\t{each.seconds:.2f}\t{each.megabytes or 0:.0f}" for each in jobs]
+    with whole_file(table) as temporary:
+        temporary.write_text("\n".join(["job\tseconds\tmegabytes", *rows]) + "\n", encoding="utf-8")
+    write_times_page(page, jobs)
