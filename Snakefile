@@ -16,8 +16,7 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/publish.smk"
 
 
-# Jobs end with this process, however it does: see workflow/scripts/job.py.
-os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
+before_jobs.end_jobs_with_this_process()
 
 if workflow.is_main_process:
     here = before_jobs.Campaign(RESULTS, dry_run=workflow.output_settings.dryrun)
@@ -55,16 +54,7 @@ rule all:
     input:
         FILES.configuration,
         list(COPIED),
-        list(FILES.surfaces),
-        list(FILES.runs),
-        FILES.references,
-        FILES.dataset,
-        FILES.comparison,
-        FILES.model_error,
-        FILES.checks,
-        FILES.verdict,
-        FILES.figures,
-        FILES.report,
+        FILES.computed,
 
 
 rule surfaces:

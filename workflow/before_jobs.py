@@ -15,6 +15,11 @@ from icha.support.atomic_files import why_not_writable
 RECORDS = Path(".snakemake/metadata")
 
 
+def end_jobs_with_this_process() -> None:
+    """Tell jobs which process wants them, for they end with it: see workflow/scripts/job.py."""
+    os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
+
+
 class Campaign:
     """A campaign in this working directory that is about to be run: its results looked at, its lock held.
 

@@ -42,6 +42,22 @@ class CampaignFiles:
         """What runs are compared with."""
         return [*self.theories, *self.solutions, *self.loops, *self.error_sources, *self.one_asperity]
 
+    @property
+    def computed(self) -> list[str]:
+        """All results but the configuration as used and the deposit."""
+        return [
+            *self.surfaces,
+            *self.runs,
+            *self.references,
+            self.dataset,
+            self.comparison,
+            *self.model_error,
+            self.checks,
+            self.verdict,
+            *self.figures,
+            self.report,
+        ]
+
 
 def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
     """All files of a campaign, as paths below its folder of results, or with that folder before them."""
