@@ -9,6 +9,8 @@ export PATH := $(CURDIR)/.venv/bin:$(PATH)
 export UV_PYTHON_DOWNLOADS := never
 export UV_PROJECT_ENVIRONMENT := $(CURDIR)/.venv
 export UV_NO_PROGRESS := 1
+# Libraries are compiled once, even where Python is told to write no bytecode.
+export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
@@ -63,7 +65,7 @@ validation hysteresis: environment
 	python docs/write_pages.py $@
 
 test: environment
-	pytest -n $(CORES) --dist loadfile -m "not slow"
+	pytest -n $(CORES) --dist worksteal -m "not slow"
 
 # Tests of random cases are run again, with more of them.
 test-all: test

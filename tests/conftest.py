@@ -25,10 +25,9 @@ settings.register_profile("fast", max_examples=40, deadline=None, derandomize=Tr
 settings.register_profile("thorough", settings.get_profile("fast"), max_examples=1000)
 settings.load_profile("fast")
 
-# Files whose tests take longest, quick or slow ones, the longest first: begun last, they would keep one core waiting.
-# Those of the figures stand between two that look at the campaign: only the first of them has to wait for it.
-LONG = ("every_case_ends", "workflow", "figures", "reruns", "slurm", "boundary_elements", "cli_run", "report")
-LONG += ("deposit", "energy_balance", "simulation", "unloading", "faults", "loops")
+# Files with the longest tests of all, the longest first: begun last, they would keep one core waiting. With "worksteal"
+# one worker begins with them, and so with the campaign, while another has those after the middle.
+LONG = ("every_case_ends", "slurm", "reruns", "faults", "workflow", "boundary_elements", "deposit", "energy_balance")
 
 
 def pytest_collection_modifyitems(items):
