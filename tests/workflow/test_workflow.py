@@ -220,16 +220,22 @@ def test_killed_runs_are_finished_with_the_same_bytes(smoke, tmp_path):
     assert not [file for file in (project / "results").rglob("*.part")]
 
 
-def test_two_calls_at_once_are_refused(smoke, project, monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    from campaign_lock import hold_lock
-
-    monkeypatch.chdir(project)
+def test_two_calls_at_once_are_refused(project):
     (project / "results/smoke/verdict.txt").unlink()
-    assert hold_lock(".snakemake/smoke.lock") is None
-    refused = snakemake(project)
+    holds = "import campaign_lock, sys; print(campaign_lock.hold_lock('.snakemake/smoke.lock')); sys.stdin.read()"
+    with subprocess.Popen(
+        [sys.executable, "-uc", holds],
+        cwd=project,
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY / "workflow")},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as other:
+        assert other.stdout.readline() == "None\n"
+        refused = snakemake(project)
+        other.communicate()
     assert refused.returncode != 0
-    assert f"Process {os.getpid()} is running this campaign" in refused.stdout
+    assert f"Process {other.pid} is running this campaign" in refused.stdout
     assert "Traceback" not in refused.stdout
     assert not (project / "results/smoke/verdict.txt").exists()
 
@@ -292,11 +298,12 @@ def test_a_failing_job_says_why(project):
     surface = project / "results/smoke/surfaces/mcghee/seed1.nc"
     surface.write_bytes(b"damaged")
     (project / "results/smoke/checksums/surfaces/mcghee/seed1.nc.json").unlink()  # or it would be made again
-    failed = snakemake(project, "runs")
+    run = "results/smoke/runs/multi_slope/mcghee/seed1/slope1/pdms_soft.nc"
+    failed = snakemake(project, run)
     assert failed.returncode == 1
     assert "seed1.nc: not a readable netCDF file" in failed.stdout
     assert "Traceback" not in failed.stdout
-    assert not (project / "results/smoke/runs/multi_slope/mcghee/seed1/slope1/pdms_soft.nc").exists()
+    assert not (project / run).exists()
 
 
 def test_surface_files_and_measurements(smoke, tmp_path):
@@ -314,8 +321,8 @@ def test_surface_files_and_measurements(smoke, tmp_path):
     study = content["studies"]["multi_slope"] | {"surfaces": ["own"], "rms_slopes": [0.5]}
     study["targets"] = {"area_fractions": [0.002, 0.01]}
     study["snapshots"] = [{"area_fraction": 0.01}]
-    study["materials"] = ["pdms_soft", "bare"]
-    content["materials"]["bare"] = content["materials"]["pdms_soft"] | {"surface_energy": "0 J/m^2"}
+    study["materials"] = ["bare"]
+    content["materials"] = {"bare": content["materials"]["pdms_soft"] | {"surface_energy": "0 J/m^2"}}
     content["boundary_elements"] = {
         "truth": {"study": "multi_slope", "materials": ["bare"], "reduced_pressures": [3e-3], "refinement": 2}
     }
@@ -330,7 +337,7 @@ def test_surface_files_and_measurements(smoke, tmp_path):
             "study": "multi_slope",
             "load": {"column": "p", "unit": "kPa"},
             "area": {"column": "a", "unit": "percent"},
-            "material": "pdms_soft",
+            "material": "bare",
             "rms_slope": 0.5,
         }
     }
