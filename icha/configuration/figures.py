@@ -6,7 +6,8 @@ from typing import Any
 
 from pydantic import Field, create_model
 
-from icha.figures.declaration import Campaign, FigureOptions, Inputs, ResultFiles
+from icha.datasets.results import ResultFiles
+from icha.figures.declaration import Campaign, FigureOptions, Inputs
 from icha.figures.registry import DECLARATIONS
 from icha.support.values import Section
 

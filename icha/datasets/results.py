@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 from icha.datasets import labels
 
 SURFACE = "surfaces/{surface}/seed{seed}.nc"
@@ -21,6 +24,19 @@ REPORT = "report.html"
 RUN_TIMES = "run_times.tsv"
 CONFIGURATION = "config.used.yaml"
 DEPOSIT = "publish/{campaign}-{version}"
+
+
+@dataclass(frozen=True)
+class ResultFiles:
+    """Paths of the results of a campaign, with its folder of results before them, if one is given."""
+
+    campaign: str
+    folder: str = ""
+
+    def path(self, pattern: str, case: NamedTuple | None = None, **names: object) -> str:
+        """Path of one file: what stands in the braces is the campaign's, of the labels of a case, or given by name."""
+        of_case = {} if case is None else labels.parts(case)
+        return "/".join(filter(None, (self.folder, pattern.format(campaign=self.campaign, **of_case, **names))))
 
 
 def job_file(path: str, kind: str, ending: str) -> str:

@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from icha.datasets import results
-from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, parts
+from icha.datasets.results import DATASET, ResultFiles
 from icha.support.values import Problem, Section
 
 
@@ -34,47 +33,6 @@ class Campaign(Protocol):
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
         """Kind and value of all states that the runs of a study keep; None where they keep their last one."""
-
-
-@dataclass(frozen=True)
-class ResultFiles:
-    """Paths of the results of a campaign from which figures are drawn: its folder of results, and its name."""
-
-    folder: str
-    campaign: str
-
-    def _path(self, pattern, **names) -> str:
-        return f"{self.folder}/{pattern.format(campaign=self.campaign, **names)}"
-
-    @property
-    def dataset(self) -> str:
-        """The campaign dataset."""
-        return self._path(results.DATASET)
-
-    @property
-    def model_error(self) -> str:
-        """The differences between the model and boundary elements."""
-        return self._path(results.MODEL_ERROR)
-
-    def surface(self, run: RunLabels) -> str:
-        """Topography of a run."""
-        return self._path(results.SURFACE, surface=run.surface, seed=run.seed)
-
-    def theories(self, surface: str) -> str:
-        """Theories for a surface."""
-        return self._path(results.THEORIES, surface=surface)
-
-    def solution(self, labels: SolutionLabels) -> str:
-        """A boundary-element solution."""
-        return self._path(results.SOLUTION, **parts(labels))
-
-    def loop(self, labels: ContactLabels) -> str:
-        """Boundary elements both ways."""
-        return self._path(results.LOOP, **parts(labels))
-
-    def error_sources(self, labels: ContactLabels) -> str:
-        """A study of the sources of the model's error."""
-        return self._path(results.ERROR_SOURCES, **parts(labels))
 
 
 # Files by the names of the arguments that are read from them: one, or a list of them.
@@ -99,7 +57,7 @@ class FigureOptions(Section):
 
 def dataset_only(campaign: Campaign, options: FigureOptions, files: ResultFiles) -> Inputs:
     """The inputs of a figure of the campaign dataset alone."""
-    return {"campaign": files.dataset}
+    return {"campaign": files.path(DATASET)}
 
 
 @dataclass(frozen=True)

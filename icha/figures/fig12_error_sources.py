@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import Field
 
+from icha.datasets import results
 from icha.datasets.labels import ContactLabels
 from icha.figures.curves import PRESSURE_LABEL
-from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs
 from icha.figures.style import (
     BLACK,
     BLUE,
@@ -66,11 +67,11 @@ class SourcesFigure(FigureOptions):
                 yield ("entry",), self.entry, reason
 
 
-def inputs(campaign: Campaign, options: SourcesFigure, files: ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: SourcesFigure, files: results.ResultFiles) -> Inputs:
     """The entry's runs without adhesion."""
     labels = [ContactLabels(options.entry, *each) for each in campaign.solved(campaign.error_sources[options.entry])]
     bare = [each for each in labels if campaign.materials[each.material].surface_energy == 0]
-    return {"error_sources": [files.error_sources(each) for each in bare]}
+    return {"error_sources": [files.path(results.ERROR_SOURCES, each) for each in bare]}
 
 
 DECLARATION = Declaration(

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, band_handle, draw_band
-from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.hysteresis import (
     BRANCH_DASHES,
     Lines,
@@ -41,15 +42,15 @@ class LoopsFigure(StudyFigure):
         yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
 
 
-def inputs(campaign: Campaign, options: LoopsFigure, files: ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
     """The runs, and boundary elements both ways beside them, if there are any."""
     loops = [
-        files.loop(ContactLabels(label, *contact))
+        files.path(results.LOOP, ContactLabels(label, *contact))
         for label, entry in campaign.boundary_element_loops.items()
         if entry.study == options.study
         for contact in campaign.solved(entry)
     ]
-    return {"campaign": files.dataset} | ({"loops": loops} if loops else {})
+    return {"campaign": files.path(results.DATASET)} | ({"loops": loops} if loops else {})
 
 
 DECLARATION = Declaration(

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.datasets import results
 from icha.figures.curves import SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.hysteresis import BRANCH_DASHES, legend_below
 from icha.figures.maps import block_means, draw_whole
 from icha.figures.options import RunFigure, not_unloaded
@@ -45,9 +46,9 @@ class SnapMapFigure(RunFigure):
         yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
 
 
-def inputs(campaign: Campaign, options: SnapMapFigure, files: ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:
     """The runs, and the topography of the one that is drawn."""
-    return {"campaign": files.dataset, "surface": files.surface(options.run(campaign))}
+    return {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, options.run(campaign))}
 
 
 DECLARATION = Declaration(

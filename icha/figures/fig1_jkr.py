@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
-from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs, ResultFiles
+from icha.datasets.results import ResultFiles
+from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs
 from icha.figures.style import BLUE, GREY, TWO_COLUMNS, VERMILLION, new_figure, panel_label, styled
 from icha.support.values import Positive
 

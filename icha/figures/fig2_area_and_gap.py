@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.datasets import results
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
@@ -17,7 +18,7 @@ from icha.figures.curves import (
     say_whose_theories,
     study_curves,
 )
-from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.options import StudyFigure, is_compared
 from icha.figures.select import study_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
@@ -28,10 +29,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def inputs(campaign: Campaign, options: StudyFigure, files: ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
     """The runs, theories for their first surface, and boundary elements beside them, if there are any."""
-    found = {"campaign": files.dataset, "references": files.theories(campaign.studies[options.study].surfaces[0])}
-    return found | ({"model_error": files.model_error} if is_compared(campaign, options.study) else {})
+    theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
+    found = {"campaign": files.path(results.DATASET), "references": theories}
+    return found | ({"model_error": files.path(results.MODEL_ERROR)} if is_compared(campaign, options.study) else {})
 
 
 DECLARATION = Declaration(

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.datasets import results
 from icha.figures.curves import band_handle, draw_mean, material_looks
-from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.options import SnapshotFigure, is_compared
 from icha.figures.select import first_line, name_of_place, snapshot_label, study_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
@@ -19,10 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def inputs(campaign: Campaign, options: SnapshotFigure, files: ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: SnapshotFigure, files: results.ResultFiles) -> Inputs:
     """The runs, and boundary elements beside them, if there are any."""
-    compared = {"model_error": files.model_error} if is_compared(campaign, options.study) else {}
-    return {"campaign": files.dataset} | compared
+    compared = {"model_error": files.path(results.MODEL_ERROR)} if is_compared(campaign, options.study) else {}
+    return {"campaign": files.path(results.DATASET)} | compared
 
 
 DECLARATION = Declaration(

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.datasets import results
 from icha.datasets.labels import SolutionLabels
-from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.maps import block_means, draw_whole
 from icha.figures.options import RunFigure, SnapshotFigure
 from icha.figures.select import run_on_topography
@@ -23,11 +24,11 @@ class MapFigure(SnapshotFigure, RunFigure):
     """A figure of one snapshot of one run; what is left out is the study's first."""
 
 
-def inputs(campaign: Campaign, options: MapFigure, files: ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
     """The runs, the topography of the one that is drawn, and boundary elements of its state, if there are any."""
-    found = {"campaign": files.dataset, "surface": files.surface(options.run(campaign))}
+    found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, options.run(campaign))}
     solution = finest_solution(campaign, options)
-    return found | ({"solution": files.solution(solution)} if solution else {})
+    return found | ({"solution": files.path(results.SOLUTION, solution)} if solution else {})
 
 
 def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | None:

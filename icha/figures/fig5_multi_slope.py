@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from icha.datasets import results
 from icha.datasets.measured_table import read_columns
 from icha.figures.curves import (
     AREA_LABEL,
@@ -16,7 +17,7 @@ from icha.figures.curves import (
     draw_ways_back,
     study_curves,
 )
-from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.options import StudyFigure
 from icha.figures.select import name_of_place
 from icha.figures.style import (
@@ -40,10 +41,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def inputs(campaign: Campaign, options: StudyFigure, files: ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
     """The runs, and tables of measurements that belong to the study, if there are any."""
     tables = [measurement.path for measurement in _measurements(campaign, options)]
-    return {"campaign": files.dataset} | ({"tables": tables} if tables else {})
+    return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
 
 
 def arguments(campaign: Campaign, options: StudyFigure) -> dict[str, Any]:

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.datasets import results
 from icha.figures.curves import PRESSURE_LABEL, add_legends, draw_line, say_whose_theories, study_curves
-from icha.figures.declaration import Campaign, Declaration, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.options import StudyFigure
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
@@ -17,9 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def inputs(campaign: Campaign, options: StudyFigure, files: ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
     """The runs, and theories for their first surface."""
-    return {"campaign": files.dataset, "references": files.theories(campaign.studies[options.study].surfaces[0])}
+    theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
+    return {"campaign": files.path(results.DATASET), "references": theories}
 
 
 DECLARATION = Declaration(

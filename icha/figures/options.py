@@ -7,8 +7,9 @@ from typing import Any
 
 from pydantic import Field
 
+from icha.datasets import results
 from icha.datasets.labels import RunLabels
-from icha.figures.declaration import Campaign, FigureOptions, Inputs, ResultFiles
+from icha.figures.declaration import Campaign, FigureOptions, Inputs
 from icha.path.states import Snapshot
 from icha.support.values import Label, Name, Positive, Problem, Seed, unknown
 
@@ -130,6 +131,6 @@ def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iter
         yield from not_unloaded(campaign, (key, index), name, in_part=False)
 
 
-def model_error_only(campaign: Campaign, options: ComparedFigure, files: ResultFiles) -> Inputs:
+def model_error_only(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
     """The inputs of a figure of the error of the model alone."""
-    return {"model_error": files.model_error}
+    return {"model_error": files.path(results.MODEL_ERROR)}

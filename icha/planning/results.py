@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import asperity_cases, loop_cases, run_cases, solution_cases, source_cases, surface_cases
 from icha.datasets import results
-from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, parts
+from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,10 @@ class CampaignFiles:
 
 def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
     """All files of a campaign, as paths below its folder of results, or with that folder before them."""
-
-    def path(pattern, **names):
-        return "/".join(filter(None, (folder, pattern.format(campaign=campaign.name, **names))))
+    path = results.ResultFiles(campaign.name, folder).path
 
     def each(pattern, cases):
-        return {path(pattern, **parts(case)): case for case in cases}
+        return {path(pattern, case): case for case in cases}
 
     surfaces = surface_cases(campaign)
     solutions = each(results.SOLUTION, solution_cases(campaign))

@@ -36,12 +36,12 @@ import icha.figures
 icha.figures.__path__.append(sys.argv[1])
 from icha.configuration.figures import Figures
 from icha.configuration.schema import json_schema, key_tables
-from icha.figures.declaration import ResultFiles
+from icha.datasets.results import ResultFiles
 from icha.figures.drawing import draw_figure
 figures = Figures.model_validate({"fig99_trivial": {"study": "slopes"}})
 assert list(figures.drawn()) == ["fig99_trivial"]
 assert "and nothing else" in json_schema() and "`figures.fig99_trivial`" in key_tables()
-inputs = figures.inputs("fig99_trivial", None, ResultFiles(sys.argv[1], "small"))
+inputs = figures.inputs("fig99_trivial", None, ResultFiles("small", sys.argv[1]))
 arguments = figures.arguments("fig99_trivial", None)
 draw_figure("fig99_trivial", "a.png", "a.pdf", inputs=inputs, arguments=arguments)
 """

@@ -1,11 +1,11 @@
 # figures/<name>.png and .pdf. A figure depends on the data, on its options and on its own code: it says itself what it
 # is drawn from, and with what arguments (icha/figures/fig*.py).
 
-from icha.figures.declaration import ResultFiles
+from icha.datasets.results import ResultFiles
 from icha.figures.registry import DECLARATIONS
 from icha.planning.resources import figure_memory
 
-RESULT_FILES = ResultFiles(RESULTS, CAMPAIGN.name)
+RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)
 
 
 wildcard_constraints:
