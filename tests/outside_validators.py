@@ -13,14 +13,19 @@ REPOSITORY = Path(__file__).parents[1]
 PYTHON = REPOSITORY / ".venv-validators/bin/python"
 
 
-def validated(deposit, *names):
-    """Put a deposit to the validators of these names, or to all; return the finished process."""
+def python_of_validators():
+    """Python of their environment; without it the test that asks is skipped or fails."""
     if not PYTHON.exists():
         reason = "the validators are not installed: make validators-environment"
         (pytest.fail if os.environ.get("ICHA_REQUIRE_VALIDATORS") == "1" else pytest.skip)(reason)
+    return PYTHON
+
+
+def validated(deposit, *names):
+    """Put a deposit to the validators of these names, or to all; return the finished process."""
     only = ["--only", *names] if names else []
     return subprocess.run(
-        [PYTHON, REPOSITORY / "tests/validators/validate.py", deposit, *only],
+        [python_of_validators(), REPOSITORY / "tests/validators/validate.py", deposit, *only],
         capture_output=True,
         text=True,
         timeout=600,

@@ -5,16 +5,14 @@ import re
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import kinds_of_files as kinds
 import netCDF4
 import numpy as np
 import pint
 import pytest
+from outside_validators import REPOSITORY, python_of_validators
 
-HERE = Path(__file__).parent
-VALIDATORS = HERE.parent / ".venv-validators" / "bin" / "python"
 GROUPS = {"run.nc": "/", "campaign.nc": "/slopes"}
 
 
@@ -82,9 +80,8 @@ def by_xarray(path, group, picture):
 def ncdump():
     program = shutil.which("ncdump")
     if program is None:
-        if os.environ.get("ICHA_REQUIRE_NCDUMP") == "1":
-            pytest.fail("ncdump is not installed (Debian's package netcdf-bin)")
-        pytest.skip("ncdump is not installed (Debian's package netcdf-bin)")
+        reason = "ncdump is not installed (Debian's package netcdf-bin)"
+        (pytest.fail if os.environ.get("ICHA_REQUIRE_NCDUMP") == "1" else pytest.skip)(reason)
     return program
 
 
@@ -254,11 +251,7 @@ sys.exit(not validate.validate(pathlib.Path(sys.argv[2]), ["compliance-checker",
 
 
 def test_checkers_accept_every_kind_of_file(folder):
-    if not VALIDATORS.exists():
-        if os.environ.get("ICHA_REQUIRE_VALIDATORS") == "1":
-            pytest.fail("there is no .venv-validators: make validators-environment")
-        pytest.skip("there is no .venv-validators: make validators-environment")
-    command = [VALIDATORS, "-c", _CHECK, HERE / "validators", folder]
+    command = [python_of_validators(), "-c", _CHECK, REPOSITORY / "tests/validators", folder]
     found = subprocess.run(list(map(str, command)), capture_output=True, text=True)
     assert found.returncode == 0, found.stdout + found.stderr
     remarks = [line for line in found.stdout.splitlines() if line.lstrip().startswith("remark")]
