@@ -1,7 +1,5 @@
 """One sweep of one surface and one material, loading and unloading, as a labelled dataset."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

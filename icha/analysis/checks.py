@@ -3,8 +3,6 @@
 They are identities and bounds of the physics, evaluated on the dataset alone.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

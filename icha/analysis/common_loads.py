@@ -1,7 +1,5 @@
 """Runs of a study side by side: areas and separations at common loads, and what spreads them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """How far the model is from boundary elements on the same topography, at the same load and range of attraction."""
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from collections.abc import Iterable, Mapping

@@ -3,8 +3,6 @@
 The height follows from the equilibrium at hand (`icha.equilibrium.events.unions`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

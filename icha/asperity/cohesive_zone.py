@@ -5,8 +5,6 @@ the cohesive zone, and the step by which a single node jumps into contact agains
 M. H. Müser, Lubricants 9 (2021) 17, doi:10.3390/lubricants9020017).
 """
 
-from __future__ import annotations
-
 import math
 
 from icha.asperity.material import Material

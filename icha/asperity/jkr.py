@@ -5,8 +5,6 @@ zero surface energy the law is Hertz's, by the same formulas. Equation numbers a
 "Modeling the adhesive contact of rough soft media with an advanced asperity model".
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

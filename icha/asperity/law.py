@@ -1,7 +1,5 @@
 """The law of one spot: what the equilibrium of many asks of the contact of one asperity with the half-space."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The elastic half-space and the interface: three numbers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

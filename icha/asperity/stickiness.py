@@ -1,7 +1,5 @@
 """Whether rough surfaces stick: attraction over repulsion where they touch."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from icha.asperity.material import Material

@@ -1,7 +1,5 @@
 """Check files against their documented format and the identities of the physics."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Tell what a campaign asks for, what of it is there, and what the rest will cost."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What is known of a running campaign from Snakemake's events: jobs running, done and failed, by rule."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import Counter

@@ -1,7 +1,5 @@
 """The view of a running campaign: a table that is drawn anew in a terminal, a line for every job elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

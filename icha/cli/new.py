@@ -1,7 +1,5 @@
 """Write a campaign to start from."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

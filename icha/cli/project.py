@@ -1,7 +1,5 @@
 """Where the project is, which configuration is meant, and how users are told of their mistakes."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

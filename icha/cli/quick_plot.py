@@ -1,7 +1,5 @@
 """A quick plot of a file, to look at and not to print."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

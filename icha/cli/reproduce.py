@@ -1,7 +1,5 @@
 """Compute a deposit again, from its own source and lock file, and compare."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Run a campaign by Snakemake, and tell how it goes and what has become of it."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

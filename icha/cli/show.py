@@ -1,7 +1,5 @@
 """Look into a file: what it is, its numbers in short, and a quick plot."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """One surface against one material, without the workflow."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

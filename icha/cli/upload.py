@@ -1,7 +1,5 @@
 """Send a deposit to Zenodo, after having said what is sent, and asked."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

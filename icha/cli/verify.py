@@ -1,7 +1,5 @@
 """Tell whether a deposit is what it was."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

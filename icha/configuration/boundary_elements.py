@@ -1,7 +1,5 @@
 """Sections of boundary elements: beside runs, both ways, for the sources of the error, of one asperity."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any
 

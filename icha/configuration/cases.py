@@ -1,7 +1,5 @@
 """Runs and everything else that a campaign asks for, by their labels."""
 
-from __future__ import annotations
-
 import itertools
 
 from icha.configuration.boundary_elements import BesideStudy

@@ -1,7 +1,5 @@
 """Values of a configuration from more than one place: overrides, and the section `defaults`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from copy import deepcopy
 

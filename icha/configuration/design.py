@@ -5,8 +5,6 @@ A study's lists are multiplied with each other, but for those that go along toge
 named after it: `rough-hurst0.6`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import re

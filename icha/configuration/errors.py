@@ -1,7 +1,5 @@
 """Errors of a configuration in words: file, key, value, what is wrong with it and what is allowed."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Mapping
 from types import UnionType

@@ -1,7 +1,5 @@
 """The section of figures: one key for every figure that there is."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pydantic import Field, create_model

@@ -1,7 +1,5 @@
 """From the text of a configuration file to a campaign, or to a list of everything that is wrong with it."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """Section `materials`."""
 
-from __future__ import annotations
-
 from pydantic import (
     ConfigDict,
     Field,

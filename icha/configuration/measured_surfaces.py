@@ -1,7 +1,5 @@
 """Section of the configuration for a measured topography: the file, what its numbers mean, how it is prepared."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator

@@ -1,7 +1,5 @@
 """Section `measurements`: contact areas that others have measured."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any
 

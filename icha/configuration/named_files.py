@@ -4,8 +4,6 @@ A configuration names its files as they lie where it was written, which is nobod
 names them in a folder beside itself, so that it can be used wherever both are.
 """
 
-from __future__ import annotations
-
 from pathlib import Path, PurePosixPath
 
 import yaml

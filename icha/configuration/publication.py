@@ -3,8 +3,6 @@
 Everything here may be left out of a configuration; only a deposit needs it (`icha.configuration.publication.needed`).
 """
 
-from __future__ import annotations
-
 import datetime
 import re
 import unicodedata

@@ -3,8 +3,6 @@
 `python -m icha.configuration.schema` writes both where they belong.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

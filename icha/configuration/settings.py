@@ -1,7 +1,5 @@
 """Everything that determines a file's numbers, in SI units: what jobs are told, and checksums of it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 

@@ -1,7 +1,5 @@
 """Section `studies`: surfaces, materials, and the path along which one is pressed against the other."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args, get_origin
 

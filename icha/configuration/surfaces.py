@@ -1,7 +1,5 @@
 """Section `surfaces`, but for measured ones."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, ClassVar, Literal
 

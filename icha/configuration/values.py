@@ -1,7 +1,5 @@
 """Values that only configurations hold: slopes that may be left as measured, and values to vary."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema

@@ -1,7 +1,5 @@
 """YAML files of configurations, read and written: every key once, in the order in which they stand."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The interface of a model of contact: what a path needs to know of it to follow it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 

@@ -5,8 +5,6 @@ far as they apply. Those of place and time do not; who made a file and when is s
 is not among the conventions that a file claims to follow.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 

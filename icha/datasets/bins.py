@@ -1,7 +1,5 @@
 """Bins of gaps and pressures (`icha.contact.bins`) as variables of a dataset."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from icha.datasets.variables.terms import Table, Variable

@@ -1,7 +1,5 @@
 """The builder of datasets: values by name, and a table of the vocabulary that describes them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The campaign dataset: the runs of every study as full arrays along surface, seed, rms slope and material."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterable, Mapping

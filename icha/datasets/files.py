@@ -4,8 +4,6 @@ A file appears whole or not at all, holds no value that is not finite except whe
 missing or has no more steps, and has the same bytes whenever it is written from the same values.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ Some names of the vocabulary are promised, with their dimensions and units; a fi
 every one has its units and its long name, too.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator

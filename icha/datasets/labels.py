@@ -1,7 +1,5 @@
 """Names of the runs of a campaign, and of what is computed beside them."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 # Where their files stand among others of their kind, without the ending; in braces what differs from one to the next.

@@ -1,7 +1,5 @@
 """Tables of measurements: columns of CSV files."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The paper of the model, which everything that the model computes cites."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

@@ -1,7 +1,5 @@
 """The file of a surface: its heights, statistics and power spectrum, and where it comes from."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 

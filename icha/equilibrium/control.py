@@ -1,7 +1,5 @@
 """Control: the quantities that a solve can hold, of contact spots, and their derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from icha.asperity.law import SpotLaw

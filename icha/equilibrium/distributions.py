@@ -1,7 +1,5 @@
 """What a contact state shows: displacement and gap fields, and the distributions of gap and pressure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stored energy of a state."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from icha.equilibrium.problem import Problem

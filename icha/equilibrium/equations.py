@@ -11,8 +11,6 @@ spot keeps its jump-off radius while the equations are solved (zero for Hertz's 
 everywhere and, without adhesion, smooth.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ its asperities (those that a stable state of the law holds stay in contact), or 
 made of would no longer overlap.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

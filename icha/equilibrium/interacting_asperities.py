@@ -1,7 +1,5 @@
 """Interacting asperities: the model of contact of Violano & Afferrante, which a path is followed with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ It runs over sites: the spots and, without adhesion, the asperities that may com
 approach exerts nothing, and who is in contact comes out of the iteration.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Observables of interacting asperities: what a run's dataset has of their states, by the names of its variables."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The problem: a law of one spot, the summits of one surface, and until when united spots stay united."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """States of the contact: equilibria, the spots in contact, and the events that led there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -5,8 +5,6 @@ far from the square as the square is wide, so that the images' displacement is s
 few Chebyshev nodes hold it (the error falls as 5.8^-n), and the periodic sum less that is the plain sum of 1/r.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -10,8 +10,6 @@ With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot far away displac
 and its Fourier transform is that of a point with sum_k M_k (-q^2)^k in the place of its force.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The target between two states of a path, met exactly, and jumps that pass it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from icha.contact.failures import NotConverged

@@ -5,8 +5,6 @@ point. It stops at the separations of the way in, so that both can be compared; 
 steps become short enough that the work lost in it is known, whatever the longest step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field, replace
 

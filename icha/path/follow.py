@@ -1,7 +1,5 @@
 """A path, followed from first contact: down to given separations, loads or areas, all of them hit exactly, and back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Hysteresis of a path from first contact to separation: its pull-off, its loss and what that consists of."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How far the model reaches: rules for the states and the steps of a path."""
 
-from __future__ import annotations
-
 from icha.support.rules import LENGTH, POSITIVE, Real
 
 # Beyond these the spots have lost their identity: soon after, the computed mean planes of a surface without

@@ -1,7 +1,5 @@
 """Load control: of the states of a path those that are visited when the load is imposed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The first loading alone: from stop to stop, straight to the next one where that is near."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from icha.contact.failures import NotConverged

@@ -1,7 +1,5 @@
 """States of a path as a configuration names them."""
 
-from __future__ import annotations
-
 from pydantic import Field, model_validator
 
 from icha.path.limits import STATES

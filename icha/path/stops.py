@@ -1,7 +1,5 @@
 """A target as a function of the state of the contact, and the equilibrium that meets it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

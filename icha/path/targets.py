@@ -1,7 +1,5 @@
 """What a path is asked to meet: given separations, loads or areas, and the turning points between them."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 

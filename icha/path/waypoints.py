@@ -1,7 +1,5 @@
 """What a path hands out: its equilibria, one after the other."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from icha.contact.model import State

@@ -1,7 +1,5 @@
 """Every file that a campaign computes: what is there, what is to be done, and what that is expected to cost."""
 
-from __future__ import annotations
-
 import json
 import statistics
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Memory, time and cores that jobs are given, generously: what they are expected to take is in `costs`."""
 
-from __future__ import annotations
-
 from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
 from icha.planning.costs import job_threads

@@ -1,7 +1,5 @@
 """All files that a campaign consists of, and what each of them holds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from icha.configuration.campaign import Campaign

@@ -1,7 +1,5 @@
 """Global attributes by which a published dataset names its makers."""
 
-from __future__ import annotations
-
 from icha.configuration.publication import Funding, Publication
 
 

@@ -1,7 +1,5 @@
 """The citation of a deposit, the same for people (CITATION.cff), for Zenodo and for DataCite."""
 
-from __future__ import annotations
-
 import re
 from html import escape
 from typing import Any

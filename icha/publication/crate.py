@@ -7,8 +7,6 @@ A job has no times here, and nobody who ran it: the same data have the same crat
 made.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import Counter

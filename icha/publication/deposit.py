@@ -4,8 +4,6 @@ The same results of the same commit give the same bytes: no times, no names of p
 that the results, the configuration and the source themselves have.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

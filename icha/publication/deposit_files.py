@@ -1,7 +1,5 @@
 """The files of a deposit, folder or zip, by their paths in it; and whether they are what its checksums say."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

@@ -1,7 +1,5 @@
 """The data dictionary of a deposit: every variable of every netCDF file, told by the files themselves."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

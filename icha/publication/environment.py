@@ -1,7 +1,5 @@
 """The environment that a deposit promises: the packages of the lock, and no other versions."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import importlib.util
 import re

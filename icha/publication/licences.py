@@ -1,7 +1,5 @@
 """Licences of data: which there are, by their SPDX identifiers, and the text of those that data usually have."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

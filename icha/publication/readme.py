@@ -1,7 +1,5 @@
 """README.md of a deposit: what it is, what is in it, how far it can be trusted, and how to open and rerun it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace

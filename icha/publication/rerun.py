@@ -1,7 +1,5 @@
 """The folder in which a deposit is computed again: what of the deposit goes there, and which runs are asked for."""
 
-from __future__ import annotations
-
 import contextlib
 import difflib
 import os

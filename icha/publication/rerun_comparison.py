@@ -14,8 +14,6 @@ Figures and the report are drawn from what is compared here, by libraries and wi
 looks different and no number does, that is a remark and no difference.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """The source of the program as it was committed, and whether it is the one that runs."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A client for Zenodo's deposit API (https://developers.zenodo.org), and for others that speak it."""
 
-from __future__ import annotations
-
 import hashlib
 import ipaddress
 import os

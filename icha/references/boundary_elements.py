@@ -14,8 +14,6 @@ surface, here the energetic area. It is larger than the area of zero gap, and bo
 the energetic one much sooner.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Published numbers that figures and tables are compared with; they live in `literature.json`, with citations."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from importlib.resources import files

@@ -7,8 +7,6 @@ the two may differ by what jumps in it dissipate, and by the error of the trapez
 halved, down to a limit; where within the smallest the jump was remains unknown.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -11,8 +11,6 @@ energetic one (see `icha.references.boundary_elements`), and the law's area is c
 such parameter.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence

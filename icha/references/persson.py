@@ -10,8 +10,6 @@ Pressures are reduced, p* = p/(E* h'_rms). Sources:
   doi:10.1103/PhysRevLett.99.125502.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.integrate import simpson
 from scipy.special import erf

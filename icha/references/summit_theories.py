@@ -11,8 +11,6 @@ surface over h_rms: in these theories nothing moves but what a summit flattens, 
   Tribol. Lett. 65 (2017) 159, doi:10.1007/s11249-017-0938-1.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Theory curves and published points as one dataset, for the figures of one surface."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -8,8 +8,6 @@ A sidecar without its result says that the result was there, or was about to be,
 without a sidecar, those of older versions for one, are taken as they are.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Numbers, bytes, times and lengths as people say them."""
 
-from __future__ import annotations
-
 import math
 
 _PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: ""}

@@ -1,7 +1,5 @@
 """Work on the cores that the process may use, with results that do not depend on how many there are."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor

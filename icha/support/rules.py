@@ -4,8 +4,6 @@ Functions and classes hold an argument against its rule by `checked`; the types 
 (`icha.support.values`) are made of the same rules. Those of a path's states stand in `icha.path.limits`.
 """
 
-from __future__ import annotations
-
 import math
 import numbers
 from dataclasses import dataclass

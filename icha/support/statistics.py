@@ -1,7 +1,5 @@
 """Means over an ensemble of surfaces of the same statistics, and how well they are known."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

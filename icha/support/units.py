@@ -1,7 +1,5 @@
 """Quantities as people write them, `25 MPa` or `50 mJ/m^2`, turned into floats in SI units."""
 
-from __future__ import annotations
-
 import math
 import re
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Types of the values of a configuration: read with their units, kept in SI units, refused with what is allowed."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What an array needs to be a height map."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

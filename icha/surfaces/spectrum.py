@@ -5,8 +5,6 @@ convention is that the integral of C over the wave-vector plane is h_rms^2, so o
 carries |h_q|^2 = C(q) (2 pi/L)^2.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The square on which a surface is given: a periodic cell, or a single one on a free half-space."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

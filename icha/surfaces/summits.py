@@ -1,7 +1,5 @@
 """Summits of a surface: positions, heights and radii of curvature, found below the grid."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arrangement of the runs of a study in its group: axes, sizes, the runs in the order of the axes, their status."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The group of a study in the file: its dimensions, variables and attributes, and how they are stored."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Runs as they come: what is needed of all is noted, their values go to a temporary file."""
 
-from __future__ import annotations
-
 import os
 import pickle
 from collections.abc import Iterable

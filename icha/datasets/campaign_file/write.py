@@ -5,8 +5,6 @@ there are, which snapshots, how long the texts) is noted; their values go to a t
 in the order of the dataset, a block of neighbouring runs at a time.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import tempfile

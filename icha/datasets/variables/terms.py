@@ -1,7 +1,5 @@
 """Descriptions of variables, and the terms that several kinds of files have in common."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Without adhesion contact forms at an approach of zero and without a jump: there 
 into contact, and who does comes out of the iteration.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 Of a united spot those asperities stay in contact that a stable state of the law holds: `jump_in` sees to that.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 The equations are singular where one spot's edge runs through another's centre.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Undoing of unions as the surfaces part: united spots whose two spots would no longer overlap become these again."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

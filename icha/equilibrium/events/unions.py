@@ -3,8 +3,6 @@
 The united spot has the height with which it is in equilibrium as it is made.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

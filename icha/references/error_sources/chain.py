@@ -1,7 +1,5 @@
 """The chain of variants from the model to the truth, and what a dataset of them says of each link."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

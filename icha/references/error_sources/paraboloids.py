@@ -1,7 +1,5 @@
 """Surfaces between the model's and the true one: the summits' paraboloids, and how the summits go on beyond them."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.fft
 import scipy.ndimage

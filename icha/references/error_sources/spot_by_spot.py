@@ -1,7 +1,5 @@
 """The model's error spot by spot: its spots beside the contact patches of the boundary elements."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

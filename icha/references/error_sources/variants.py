@@ -1,7 +1,5 @@
 """All variants between the model and boundary elements, solved for one surface."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The model without unions: Hertzian spots that may overlap, interacting or each as if it were alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

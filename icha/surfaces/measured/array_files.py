@@ -1,7 +1,5 @@
 """Readers of arrays with or without their units: npy, netCDF and HDF5."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The square that is cut out of a scan."""
 
-from __future__ import annotations
-
 from icha.support import in_words
 from icha.surfaces.measured.scan import Scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography

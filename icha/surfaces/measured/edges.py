@@ -1,7 +1,5 @@
 """Edges of a scan as its boundary has them (a window, mirror images), and the grid that is asked for."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.fft
 

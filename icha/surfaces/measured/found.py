@@ -1,7 +1,5 @@
 """Heights as a reader finds them in a file, and what readers of several formats need."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Reader of Fourier series: qx qy Re Im in every line of a text."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

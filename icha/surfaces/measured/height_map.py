@@ -1,7 +1,5 @@
 """Height maps from files, for surfaces of `kind: file`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Points of a scan without a height, filled by the solution of Laplace's equation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

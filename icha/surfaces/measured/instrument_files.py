@@ -1,7 +1,5 @@
 """Reader of the formats of instruments: whatever SurfaceTopography reads."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A scan in metres: what a file of any format says, with units and size."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

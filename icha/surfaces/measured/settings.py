@@ -1,7 +1,5 @@
 """Settings of a measured topography: what the numbers of its file mean, and how they become a surface."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Readers of text: a row of heights per line, or x y z."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

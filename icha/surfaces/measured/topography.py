@@ -10,8 +10,6 @@ import, which every look at a configuration with a measured surface would cost, 
 free square nor windows of cells.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """The mean plane or paraboloid of a scan, removed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
