@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.options import Cores, Folder
+from icha.cli.options import Config, Cores, Folder
 from icha.cli.project import DEFAULT, FAILED, Mistake, configuration_path, project, read_configuration, shown
 from icha.support.in_words import counted
 
@@ -27,12 +27,7 @@ _BEFORE_REASONS = r"Using workflow specific profile|Assuming unrestricted|host: 
 
 
 def run(
-    config: Annotated[
-        str | None,
-        typer.Argument(
-            help="Configuration file, or name of a campaign. Left out: config/config.yaml.", show_default=False
-        ),
-    ] = None,
+    config: Config = None,
     targets: Annotated[
         list[str] | None,
         typer.Argument(

@@ -49,6 +49,11 @@ class BesideStudy(Section):
     )
     tolerance: number(TOLERANCE) = Field(default=1e-8, description="Relative error at which the solver may stop.")
 
+    @property
+    def coarsest(self) -> int:
+        """Smallest number of cells per cell of the surface's grid."""
+        return self.refinement
+
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """What of the study is not there, or cannot be solved; of an `icha.configuration.campaign.Campaign`."""
         yield from unknown(("study",), self.study, campaign.studies)
@@ -105,11 +110,6 @@ class BoundaryElements(BesideStudy):
     reduced_pressures: Loads
     refinement: Refinement = 1
 
-    @property
-    def coarsest(self) -> int:
-        """Smallest number of cells per cell of the surface's grid."""
-        return self.refinement
-
 
 class BoundaryElementLoops(BesideStudy):
     """Boundary elements from separation to the largest load of a study's runs and back."""
@@ -118,11 +118,6 @@ class BoundaryElementLoops(BesideStudy):
     separation_step: number(STEP) = Field(
         default=0.05, description="Change of the mean gap from one solution to the next, in units of h_rms."
     )
-
-    @property
-    def coarsest(self) -> int:
-        """Smallest number of cells per cell of the surface's grid."""
-        return self.refinement
 
     def _study_problems(self, campaign, study):
         """What the way back needs of the study, too."""

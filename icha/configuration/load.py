@@ -1,6 +1,5 @@
 """From the text of a configuration file to a campaign, or to a list of everything that is wrong with it."""
 
-import hashlib
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from icha.configuration.errors import ConfigurationError, line, problem_of
 from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.configuration.values import MEASURED
 from icha.configuration.yaml_files import dumped, read_yaml
+from icha.support.checksums import sha256_of
 from icha.support.values import NOTHING, Problem
 from icha.surfaces.measured.height_map import read_height_map
 
@@ -103,10 +103,10 @@ def _topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Probl
             variant = "" if origin == name else f"of variant {name!r}: "
             wrong.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
             continue
-        with open(surface.path, "rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
         # Six digits name the files, and are more than any instrument has.
-        found[name] = Topography(grid, period, boundary, None if slope is None else float(f"{slope:.6g}"), digest)
+        found[name] = Topography(
+            grid, period, boundary, None if slope is None else float(f"{slope:.6g}"), sha256_of(Path(surface.path))
+        )
     return found, wrong
 
 

@@ -13,7 +13,7 @@ from pydantic import (
 
 from icha.configuration.materials import MaterialSection
 from icha.configuration.surfaces import SURFACE_KINDS
-from icha.configuration.values import Slope, Slopes, Values
+from icha.configuration.values import SCALAR_SCHEMA, Slope, Slopes, Values
 from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
 from icha.path.targets import Path
@@ -102,7 +102,7 @@ def _of_scalars(name, kind, doc, fields=None):
 Vary = _of_scalars(
     "Vary", Values, "Parameters of a study's surfaces and materials that it varies: a value each, or a list of them."
 )
-Scalar = Annotated[Any, WithJsonSchema({"type": ["string", "number", "boolean"]})]
+Scalar = Annotated[Any, WithJsonSchema(SCALAR_SCHEMA)]
 Case = _of_scalars(
     "Case",
     Scalar,

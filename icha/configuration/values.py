@@ -23,40 +23,20 @@ def _slope(value: Any) -> float | str:
     return slope
 
 
-Slope = Annotated[
-    Any,
-    BeforeValidator(_slope),
-    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": MEASURED}]}),
-]
+_ONE_SLOPE = {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": MEASURED}]}
+Slope = Annotated[Any, BeforeValidator(_slope), WithJsonSchema(_ONE_SLOPE)]
 Slopes = Annotated[
     list[Slope],
     BeforeValidator(lambda value: [value] if value == MEASURED else value),
     Field(min_length=1),
     AfterValidator(distinct),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"const": MEASURED},
-                {
-                    "type": "array",
-                    "minItems": 1,
-                    "items": {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": MEASURED}]},
-                },
-            ]
-        }
-    ),
+    WithJsonSchema({"anyOf": [{"const": MEASURED}, {"type": "array", "minItems": 1, "items": _ONE_SLOPE}]}),
 ]
+SCALAR_SCHEMA = {"type": ["string", "number", "boolean"]}
 Values = Annotated[
     list[Any],
     BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
     Field(min_length=1),
     AfterValidator(distinct),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": ["string", "number", "boolean"]},
-                {"type": "array", "minItems": 1, "items": {"type": ["string", "number", "boolean"]}},
-            ]
-        }
-    ),
+    WithJsonSchema({"anyOf": [SCALAR_SCHEMA, {"type": "array", "minItems": 1, "items": SCALAR_SCHEMA}]}),
 ]

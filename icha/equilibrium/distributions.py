@@ -1,4 +1,4 @@
-"""What a contact state shows: displacement and gap fields, and the distributions of gap and pressure."""
+"""Distributions of gap and pressure over the nominal area, and the part of every cell that is in contact."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,8 @@ import numpy as np
 from icha.asperity.law import SpotLaw
 from icha.contact.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
 from icha.equilibrium.states import ContactState, Spots
-from icha.half_space.grid_displacement import DisplacementField, displacement_field, row_blocks, windows
+from icha.half_space.grid_displacement import DisplacementField, row_blocks, windows
 from icha.support.parallel import on_cores
-from icha.support.rules import Integer
 from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
 
@@ -36,48 +35,16 @@ class PressureDistribution:
     mean: np.ndarray
 
 
-def displacement(law: SpotLaw, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
-    """Displacement w of the half-space at the surface's nodes, (n, n), m: eq. 9, periodic and of zero mean, or free.
-
-    `every` : only at every so-manieth node of both directions, a divisor of the grid. The values are the same; time
-    and memory fall with the number of nodes.
-    """
-    spots = state.spots
-    grid = _coarse_grid(surface, every)
-    return displacement_field(
-        law,
-        surface.period,
-        grid,
-        spots.position,
-        spots.contact_radius,
-        spots.radius_of_curvature,
-        free=surface.free,
-    )
-
-
-def gap(law: SpotLaw, surface: Surface, state: ContactState, every: int = 1) -> np.ndarray:
-    """Gap u = mean separation + w - h at the nodes, (n, n), m; meaningful outside the spots, where the model's
-    inexactness can make it negative. `every` as for `displacement`."""
-    return displacement(law, surface, state, every) + (state.separation - surface.heights[::every, ::every])
-
-
-def contact_cover(surface: Surface, spots: Spots, every: int = 1) -> np.ndarray:
+def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
     """Fraction of every node's cell that lies in contact, (n, n), exact for discs.
 
     Its mean is the contact area fraction to rounding, spots being disjoint; of a free square without what lies beyond
-    its edges. `every` : of cells so many times wider,
-    around every so-manieth node.
+    its edges.
     """
-    grid = _coarse_grid(surface, every)
-    centres, radii = spots.position, spots.contact_radius
+    grid, centres, radii = surface.grid, spots.position, spots.contact_radius
     period, free = surface.period, surface.free
     parts = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free)[0], row_blocks(grid))
     return np.concatenate(parts)
-
-
-def covered_nodes(surface: Surface, spots: Spots) -> np.ndarray:
-    """Whether each node lies inside a spot, (n, n) of bool."""
-    return nodes_in_discs(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)
 
 
 def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndarray, free: bool = False) -> np.ndarray:
@@ -169,12 +136,6 @@ def pressure_distribution(law: SpotLaw, surface: Surface, spots: Spots) -> Press
     content, load = np.diff(area), np.diff(force)
     mean = np.divide(load, content, out=np.zeros(len(content)), where=content > 0)
     return PressureDistribution(edges, content / (surface.period**2 * np.diff(edges)), mean)
-
-
-def _coarse_grid(surface, every):
-    if surface.grid % Integer(1).checked("every", every):
-        raise ValueError(f"every: {every} does not divide the {surface.grid} nodes along a side")
-    return surface.grid // every
 
 
 def _cover(period, grid, centres, radii, rows, free=False):

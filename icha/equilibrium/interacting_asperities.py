@@ -31,21 +31,7 @@ class InteractingAsperities(Problem):
     def equilibrium(
         self, state: ContactState, separation: float, control: Control | None = None, *, let_go: int = 0
     ) -> ContactState:
-        """Bring the contact from one state to another mean separation (m), or to a given load or area.
-
-        Parameters
-        ----------
-        separation : a first guess if there is a `control`.
-        control : a load or an area to hold instead of the separation.
-        let_go : so many spots break contact at once, those that would reach jump-off first.
-
-        Raises
-        ------
-        NotConverged
-            If the equilibrium is not found.
-        FullContact
-            If the contact spreads over the whole surface.
-        """
+        """The contact brought to another mean separation (m), or to a given load or area; as of `ContactModel`."""
         return equilibrium(self, state, separation, control, spots_let_go=let_go)
 
     def pressure(self, state: ContactState) -> float:

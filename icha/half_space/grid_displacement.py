@@ -41,17 +41,6 @@ _SERIES_BELOW = 0.25
 _SERIES_LENGTH = 15
 
 
-def displacement_field(law: SpotLaw, period: float, grid: int, centres, a, R, *, free: bool = False) -> np.ndarray:
-    """Displacement w (grid, grid) in m at the nodes of a regular grid, eq. (9)'s sum.
-
-    It is periodic and of zero mean; or, for a single square on a free half-space, the plain sum over the spots.
-
-    centres: (m, 2), a and R: (m,), all m. Inside a spot its own part is the displacement under its contact. The grid
-    need not be the surface's: a coarser one gives the values at every so-manieth node and costs accordingly less.
-    """
-    return np.concatenate(DisplacementField(law, period, grid, centres, a, R, free).in_blocks(lambda _, w: w))
-
-
 def row_blocks(grid: int) -> list[slice]:
     """The rows of a grid in blocks whose size depends on nothing but the grid."""
     return blocks(grid, max(_BLOCK // grid, 1))
@@ -59,7 +48,14 @@ def row_blocks(grid: int) -> list[slice]:
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Displacement w of the half-space at the nodes of a regular grid, by rows; arguments as `displacement_field`."""
+    """Displacement w of the half-space at the nodes of a regular grid, m, by rows: eq. (9)'s sum.
+
+    It is periodic and of zero mean; or, for a single square on a free half-space, the plain sum over the spots.
+
+    centres: (m, 2), contact_radius and radius_of_curvature: (m,), all m. Inside a spot its own part is the displacement
+    under its contact. The grid need not be the surface's: a coarser one gives the values at every so-manieth node and
+    costs accordingly less.
+    """
 
     law: SpotLaw
     period: float

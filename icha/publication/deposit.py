@@ -4,7 +4,6 @@ The same results of the same commit give the same bytes: no times, no names of p
 that the results, the configuration and the source themselves have.
 """
 
-import hashlib
 import json
 import os
 import shutil
@@ -27,7 +26,7 @@ from icha.publication.licences import known_licence, licence_page
 from icha.publication.readme import readme
 from icha.publication.source import Source
 from icha.support.atomic_files import whole_file
-from icha.support.checksums import is_whole
+from icha.support.checksums import is_whole, sha256_of
 
 SOURCE = "source"
 _BLOCK = 2**20
@@ -78,10 +77,10 @@ def make_deposit(
             _copy(results / file, part / file)
         source.export(part / SOURCE)
         _describe(part, files, publication, campaign, source.commit, cost)
-        checksums = {path: _sha256(part / path) for path in files_of(part)}
+        checksums = {path: sha256_of(part / path) for path in files_of(part)}
         write_crate(part, publication, jobs, campaign=campaign.name, commit=source.commit, checksums=checksums)
         (part / METADATA).chmod(0o644)
-        checksums[METADATA] = _sha256(part / METADATA)
+        checksums[METADATA] = sha256_of(part / METADATA)
         _write(part / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
         with whole_file(archive) as temporary:
             _write_zip(temporary, part, folder.name)
@@ -163,11 +162,6 @@ def _remove(folder: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
         folder.rename(old)
         shutil.rmtree(old)
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:

@@ -6,11 +6,14 @@ import re
 import zipfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
-from typing import BinaryIO
 
 CHECKSUMS = "SHA256SUMS"
+# What is computed, and made again by a rerun; all the rest of a deposit says what it is and how.
+COMPUTED = (
+    *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
+    *("report.html", "checks.json", "verdict.txt"),
+)
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
-_BLOCK = 2**20
 
 
 def contents(path: str | os.PathLike) -> dict[str, int]:
@@ -109,7 +112,7 @@ def _problems(there: Iterable[str], opened, others: Iterable[str] = ()) -> Itera
             continue
         try:
             with opened(name) as file:
-                same = _digest(file) == digest
+                same = hashlib.file_digest(file, "sha256").hexdigest() == digest
         except Exception as error:
             yield f"{name}: cannot be read: {error}"
         else:
@@ -122,10 +125,3 @@ def _problems(there: Iterable[str], opened, others: Iterable[str] = ()) -> Itera
 def _is_inside(name: str) -> bool:
     path = PurePosixPath(name)
     return not path.is_absolute() and ".." not in path.parts and str(path) == name
-
-
-def _digest(file: BinaryIO) -> str:
-    digest = hashlib.sha256()
-    while block := file.read(_BLOCK):
-        digest.update(block)
-    return digest.hexdigest()

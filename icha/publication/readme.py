@@ -21,6 +21,7 @@ from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN
 from icha.planning.costs import Cost
 from icha.publication.attributes import acknowledgement
 from icha.publication.citation import paragraphs, web_address
+from icha.publication.deposit_files import COMPUTED
 from icha.publication.dictionary import Entry
 from icha.publication.licences import Licence
 from icha.support import in_words
@@ -45,11 +46,6 @@ _PARTS = {
 # A longer list is cut.
 _MOST_NAMES = 12
 _METADATA = "citation, licence and provenance for people and machines"
-# What is computed; all the rest of a deposit says what it is and how.
-_COMPUTED = (
-    *("dataset", "aggregated", "runs", "surfaces", "references", "figures"),
-    *("report.html", "checks.json", "verdict.txt"),
-)
 # An address within a text, without what may follow it.
 _ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
 # What Markdown takes for more than itself: anywhere, or as the beginning of an entity; and at the beginning of a line.
@@ -211,7 +207,7 @@ def _content(sizes: Mapping[str, int]) -> dict:
         "parts": _parts(sizes),
         "files": len(sizes),
         "size": sum(sizes.values()),
-        "computed": sum(size for path, size in sizes.items() if path.split("/")[0] in _COMPUTED),
+        "computed": sum(size for path, size in sizes.items() if path.split("/")[0] in COMPUTED),
     }
 
 

@@ -24,6 +24,7 @@ import netCDF4
 import numpy as np
 
 from icha.analysis.checks import RESIDUAL_LIMIT
+from icha.publication.deposit_files import COMPUTED
 from icha.support.atomic_files import whole_file
 
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (
@@ -37,18 +38,6 @@ TOLERANCE = 1e-6
 FLOOR = 1e-6
 # Differences that are allowed of variables of these names, whatever their values.
 NOISE = {"residual": RESIDUAL_LIMIT}
-# What of a deposit is made by a rerun.
-RESULTS = (
-    "dataset",
-    "runs",
-    "surfaces",
-    "references",
-    "aggregated",
-    "figures",
-    "report.html",
-    "checks.json",
-    "verdict.txt",
-)
 _DRAWN = (".png", ".pdf", ".html")
 _BLOCK = 1 << 20
 
@@ -111,7 +100,7 @@ def compare_folders(
     Parameters
     ----------
     deposit, rerun : folders with `dataset/`, `runs/`, … in them.
-    paths : the files that are compared, relative to both; all of `RESULTS` that are in either if left out.
+    paths : the files that are compared, relative to both; all of `COMPUTED` that are in either if left out.
     """
     deposit, rerun = Path(deposit), Path(rerun)
     paths = sorted({*_results(deposit), *_results(rerun)} if paths is None else {*paths})
@@ -119,7 +108,7 @@ def compare_folders(
 
 
 def _results(folder: Path) -> Iterator[str]:
-    for name in RESULTS:
+    for name in COMPUTED:
         top = folder / name
         files = [top] if top.is_file() else top.rglob("*") if top.is_dir() else ()
         yield from (file.relative_to(folder).as_posix() for file in files if file.is_file())
@@ -379,7 +368,7 @@ def table(comparison: Comparison, most: int = 20) -> str:
     Of the latter, at most `most` of those that differ and as many of those within tolerance.
     """
     kinds = list(dict.fromkeys(file.kind for file in comparison.files))
-    kinds.sort(key=lambda kind: RESULTS.index(kind) if kind in RESULTS else len(RESULTS))
+    kinds.sort(key=lambda kind: COMPUTED.index(kind) if kind in COMPUTED else len(COMPUTED))
     width = max(map(len, kinds), default=0)
     shown = [each for each in VERDICTS if any(file.verdict == each for file in comparison.files)]
     text = [" ".join([" " * width, "  files", *(f" {each}" for each in shown)])]

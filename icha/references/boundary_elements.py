@@ -160,7 +160,7 @@ def contact_state(
 ) -> NodalState:
     """The state of which `boundary_elements` makes a dataset, node by node; arguments and errors are the same."""
     target = POSITIVE.checked("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
-    say = progress or _silent
+    say = progress or silent
     fine = resolved(surface, material, refinement, say)
     state = _without_adhesion(fine, material, target, TOLERANCE.checked("tolerance", tolerance))
     if material.surface_energy == 0:
@@ -193,14 +193,14 @@ def states_at_mean_separations(
     """
     if material.surface_energy == 0:
         raise ValueError("surface_energy: 0; without adhesion the load is given, not the mean gap")
-    fine = resolved(surface, material, refinement, progress or _silent)
+    fine = resolved(surface, material, refinement, progress or silent)
     separations = [LENGTH.checked("mean_separations", separation) for separation in mean_separations]
     contact = GapContact(fine, material, TOLERANCE.checked("tolerance", tolerance))
     return (contact.at(separation) for separation in separations)
 
 
-def _silent(line):
-    pass
+def silent(line: str) -> None:
+    """Progress that nobody asked for."""
 
 
 def resolved(surface, material, refinement, say):

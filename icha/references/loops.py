@@ -27,6 +27,7 @@ from icha.references.boundary_elements import (
     NotSolved,
     perimeter_correction,
     resolved,
+    silent,
 )
 from icha.support.rules import POSITIVE, TOLERANCE
 from icha.surfaces.surface import Surface
@@ -83,15 +84,11 @@ def boundary_element_loop(
     """
     target = POSITIVE.checked("largest_reduced_pressure", largest_reduced_pressure)
     step = POSITIVE.checked("separation_step", separation_step) * surface.rms_height
-    say = progress or _silent
+    say = progress or silent
     fine = resolved(surface, material, refinement, say)
     way = _Way(fine, material, TOLERANCE.checked("tolerance", tolerance), say)
     legs = _down_and_up(way, step, target * surface.rms_slope * material.contact_modulus)
     return _dataset(surface, way, legs, separation_step, seed)
-
-
-def _silent(line):
-    pass
 
 
 @dataclass(frozen=True)

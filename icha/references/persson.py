@@ -14,9 +14,6 @@ import numpy as np
 from scipy.integrate import simpson
 from scipy.special import erf
 
-# Slope of A/A0 against p* as p* -> 0.
-PERSSON_SLOPE = np.sqrt(8 / np.pi)
-
 # Share of the full-contact elastic energy that a small contact stores (Yang & Persson, gamma).
 YANG_PERSSON_GAMMA = 0.45
 

@@ -94,17 +94,6 @@ def greenwood_williamson_pressure(reduced_separation, moments: SpectralMoments):
     return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1.5)
 
 
-def greenwood_williamson_separation(reduced_pressure, moments: SpectralMoments):
-    """Separation over h_rms at reduced pressures of any shape; `greenwood_williamson_area` of it is the area there.
-
-    Raises
-    ------
-    ValueError
-        If a pressure is not positive, or so small that the theory has no summit of that height.
-    """
-    return separation_at(greenwood_williamson_pressure, reduced_pressure, moments)
-
-
 def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Material, *, pulled: bool = False):
     """A/A0 of Greenwood & Williamson's summits under the law of Johnson, Kendall & Roberts (Fuller & Tabor 1975).
 

@@ -7,6 +7,7 @@ import xarray as xr
 
 from icha.asperity.material import Material
 from icha.datasets.attributes import THEORY, discovery
+from icha.datasets.variables.terms import term
 from icha.references import persson, summit_theories
 from icha.references.literature import literature
 from icha.surfaces.moments import SpectralMoments
@@ -55,9 +56,10 @@ def reference_dataset(
     return xr.Dataset(variables, attrs=described | dict(attrs))
 
 
-_PRESSURE = "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"
-_AREA = "real over nominal contact area, A/A0"
-_SEPARATION = "mean separation over rms height"
+_PRESSURE, _AREA, _SEPARATION, _NAYAK = (
+    term(name).long_name
+    for name in ("reduced_pressure", "contact_area_fraction", "reduced_separation", "nayak_parameter")
+)
 
 _PERSSON = "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, doi:10.1063/1.1388626"
 _YANG = "C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214, gamma = 0.45"
@@ -103,9 +105,8 @@ def _separate_summits(moments, adhesive):
     dim, by = "summit_point", "Greenwood and Williamson"
     separation = summit_theories.separation_at(summit_theories.greenwood_williamson_area, SUMMIT_AREAS, moments)
     pressure = summit_theories.greenwood_williamson_pressure(separation, moments)
-    alpha = moments.nayak_parameter
     variables = {
-        "nayak_parameter": _variable((), alpha, "Nayak's parameter m0 m4/m2^2: breadth of the spectrum"),
+        "nayak_parameter": _variable((), moments.nayak_parameter, _NAYAK),
         "summit_area_fraction": _variable(dim, SUMMIT_AREAS, f"{_AREA}, at which separate summits are evaluated"),
         "greenwood_williamson_reduced_pressure": _variable(dim, pressure, f"{_PRESSURE}, {by}", _GREENWOOD),
         "greenwood_williamson_reduced_separation": _variable(dim, separation, f"{_SEPARATION}, {by}", _GREENWOOD),

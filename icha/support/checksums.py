@@ -39,7 +39,7 @@ def write_checksum(results: str | os.PathLike, path: str) -> None:
     """
     file = Path(results, path)
     size, mtime_ns = _size_and_time(file)
-    _write(results, path, Checksum(_sha256(file), size, mtime_ns))
+    _write(results, path, Checksum(sha256_of(file), size, mtime_ns))
 
 
 def begin(results: str | os.PathLike, path: str) -> None:
@@ -77,7 +77,7 @@ def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -
         return False
     if mtime_ns == written.mtime_ns and not thorough:
         return True
-    if _sha256(file) != written.sha256:
+    if sha256_of(file) != written.sha256:
         return False
     if mtime_ns != written.mtime_ns:
         with contextlib.suppress(OSError):
@@ -156,13 +156,14 @@ def _size_and_time(file) -> tuple[int, int]:
     return sum(status.st_size for status in found), max((status.st_mtime_ns for status in found), default=0)
 
 
-def _sha256(file: Path) -> str:
+def sha256_of(file: Path) -> str:
+    """SHA-256 of a file, hexadecimal; of a folder that of its files with their paths."""
     if not file.is_dir():
         with file.open("rb") as content:
             return hashlib.file_digest(content, "sha256").hexdigest()
     digest = hashlib.sha256()
     for each in _files_in(file):
-        digest.update(f"{_sha256(each)}  {each.relative_to(file).as_posix()}\n".encode())
+        digest.update(f"{sha256_of(each)}  {each.relative_to(file).as_posix()}\n".encode())
     return digest.hexdigest()
 
 

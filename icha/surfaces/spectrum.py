@@ -116,22 +116,6 @@ class SelfAffineSpectrum:
         q = 2 * np.pi / self.period
         return math.sqrt(2 * self.plateau * float(np.sum(self._shape(k))) * q**2)
 
-    def continuum_rms_height(self) -> float:
-        """h_rms in m from integrals over the plane of wave vectors, as if the cell were infinite.
-
-        h_rms^2 = 2 pi C0 [(q0^2-qL^2)/2 + q0^2 (1-(q1/q0)^(-2H))/(2H)], and for the slope q^3 under the integral.
-        The lattice of a finite cell differs from it by the sampling of its few longest waves.
-        """
-        q_l = 2 * np.pi / self.period
-        q_0 = 2 * np.pi / self.rolloff_wavelength
-        ratio = self.rolloff_wavelength / self.short_wavelength
-        hurst = self.hurst
-        height2 = (q_0**2 - q_l**2) / 2 + q_0**2 * (1 - ratio ** (-2 * hurst)) / (2 * hurst)
-        # (ratio^(2-2H) - 1)/(2-2H) tends to ln(ratio) as H -> 1.
-        growth = math.log(ratio) if hurst == 1 else math.expm1((2 - 2 * hurst) * math.log(ratio)) / (2 - 2 * hurst)
-        slope2 = (q_0**4 - q_l**4) / 4 + q_0**4 * growth
-        return self.rms_slope * math.sqrt(height2 / slope2)
-
     def cells_per_short_wave(self, grid: int) -> float:
         """Grid cells per shortest wavelength on a grid of `grid` nodes a side."""
         return grid * self.short_wavelength / self.period

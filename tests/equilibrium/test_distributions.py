@@ -5,23 +5,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scipy.optimize
+from fields import covered_nodes, displacement, displacement_field, gap
 from half_space import periodic_displacement
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
-from icha.equilibrium.distributions import (
-    _gap_bin,
-    contact_cover,
-    covered_nodes,
-    displacement,
-    gap,
-    gap_distribution,
-    pressure_distribution,
-)
+from icha.equilibrium.distributions import _gap_bin, contact_cover, gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import Spots
-from icha.half_space.grid_displacement import displacement_field, row_blocks
+from icha.half_space.grid_displacement import row_blocks
 from icha.surfaces.summits import find_summits
 
 PERIOD, MODULUS = 100e-6, 25e6
@@ -165,19 +158,6 @@ def test_gaps_on_the_edges_of_bins_are_counted_in_the_bin_above():
     index = _gap_bin(u.reshape(n, n) * 0.7, GAP_BINS * 0.7).ravel()
     expected = np.minimum(np.searchsorted(GAP_BINS * 0.7, u * 0.7, side="right") - 1, len(GAP_BINS) - 2)
     np.testing.assert_array_equal(index, expected)
-
-
-def test_every_fourth_node_and_wider_cells(rough):
-    surface, law, state = rough
-    fine, coarse = gap(law, surface, state), gap(law, surface, state, every=4)
-    np.testing.assert_allclose(coarse, fine[::4, ::4], rtol=0, atol=1e-7 * surface.rms_height)
-    cover, wide = contact_cover(surface, state.spots), contact_cover(surface, state.spots, every=5)
-    # A wide cell around every fifth node holds five by five of the narrow ones.
-    shifted = np.roll(cover, 2, axis=(0, 1)).reshape(160, 5, 160, 5)
-    np.testing.assert_allclose(wide, shifted.mean(axis=(1, 3)), atol=1e-11)
-    for every in (3, 0, 2.0):
-        with pytest.raises(ValueError, match="every"):
-            gap(law, surface, state, every=every)
 
 
 def test_distributions_have_the_same_bits_on_any_number_of_cores(rough, monkeypatch):

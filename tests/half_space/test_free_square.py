@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 import scipy.integrate
 import scipy.optimize
+from fields import covered_nodes, displacement, displacement_field, gap
 from half_space import displacement_by_quadrature, jkr_approach, jkr_force
 
 import icha
 from icha.asperity.jkr import JKR
 from icha.contact.model import Control
-from icha.equilibrium.distributions import contact_cover, covered_nodes, displacement, gap, gap_distribution
+from icha.equilibrium.distributions import contact_cover, gap_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.ewald import HalfSpace
 from icha.half_space.free_square import image_potential, mean_displacement
-from icha.half_space.grid_displacement import DisplacementField, displacement_field
+from icha.half_space.grid_displacement import DisplacementField
 from icha.half_space.interaction import Interaction, displacement_at
 from icha.references.boundary_elements import boundary_elements
 from icha.references.error_sources.variants import error_sources

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 import scipy.special
+from fields import displacement_field
 from half_space import periodic_displacement, spectral_displacement
 
 from icha import Material
 from icha.asperity.jkr import JKR
-from icha.half_space.grid_displacement import DisplacementField, displacement_field, row_blocks, smooth_half, windows
+from icha.half_space.grid_displacement import DisplacementField, row_blocks, smooth_half, windows
 
 MODULUS, RANGE = 2.0, 1e-3
 CENTRES = np.array([[0.2, 0.3], [0.6, 0.55], [0.9, 0.85]])

@@ -113,9 +113,13 @@ def test_high_planes_see_an_exponential_of_heights():
     assert float(area / p) == pytest.approx(expected, rel=0.02)
 
 
+def separation_at_pressure(p):
+    return theories.separation_at(theories.greenwood_williamson_pressure, p, MOMENTS)
+
+
 def test_area_over_load_varies_slowly_and_lies_below_bush_gibson_and_thomas():
     p = np.geomspace(1e-5, 1e-2, 4)
-    ratio = theories.greenwood_williamson_area(theories.greenwood_williamson_separation(p, MOMENTS), MOMENTS) / p
+    ratio = theories.greenwood_williamson_area(separation_at_pressure(p), MOMENTS) / p
     assert np.all(np.diff(ratio) < 0) and np.all(np.diff(ratio) > -0.25)
     assert np.all(ratio < theories.BUSH_GIBSON_THOMAS_SLOPE) and np.all(ratio > 1.5)
 
@@ -130,13 +134,13 @@ def test_without_adhesion_neither_slope_nor_length_matters():
 
 def test_separation_at_pressure_is_the_inverse():
     p = np.array([[1e-6, 1e-4], [1e-2, 0.1]])
-    u = theories.greenwood_williamson_separation(p, MOMENTS)
+    u = separation_at_pressure(p)
     assert u.shape == p.shape
     np.testing.assert_allclose(theories.greenwood_williamson_pressure(u, MOMENTS), p, rtol=1e-9)
     with pytest.raises(ValueError, match="greater than 0"):
-        theories.greenwood_williamson_separation(0.0, MOMENTS)
+        separation_at_pressure(0.0)
     with pytest.raises(ValueError, match="outside what summits reach"):
-        theories.greenwood_williamson_separation(1e-40, MOMENTS)
+        separation_at_pressure(1e-40)
 
 
 # --- Fuller & Tabor -------------------------------------------------------------------------------------------

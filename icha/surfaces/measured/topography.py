@@ -10,7 +10,6 @@ import, which every look at a configuration with a measured surface would cost, 
 free square nor windows of cells.
 """
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
+from icha.support.checksums import sha256_of
 from icha.surfaces.measured.crop import cropped
 from icha.surfaces.measured.edges import bounded
 from icha.surfaces.measured.holes import filled
@@ -69,9 +69,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         steps += said
     refuse_flat(left, part, how)
     surface, said = bounded(left, how)
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return PreparedTopography(surface, path.name, digest, "; ".join([*steps, *said]))
+    return PreparedTopography(surface, path.name, sha256_of(path), "; ".join([*steps, *said]))
 
 
 @dataclass(frozen=True)
