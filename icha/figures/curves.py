@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.datasets.labels import RunLabels
 from icha.figures.scale import MOST_COLOURS, Scale, materials_scale, places_scale
-from icha.figures.select import path_steps, study_runs, ways_back
+from icha.figures.select import Snapshots, name_of_place, path_steps, snapshot_label, study_runs, ways_back
 from icha.figures.style import (
     BLACK,
     COLOURS,
@@ -19,9 +19,10 @@ from icha.figures.style import (
     line_artist,
     line_look,
     material_label,
+    panel_label,
     slope_label,
 )
-from icha.support.statistics import Ensemble
+from icha.support.statistics import Ensemble, ensemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -134,6 +135,21 @@ def material_looks(dataset: xr.Dataset, materials: Sequence[str]) -> tuple[list[
     ], None
 
 
+def say_which_snapshots(
+    figure: Figure, panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[Snapshots], scale: Scale | None
+) -> None:
+    """Letters and titles of the two panels of a figure of one snapshot, its scale, and what several seeds mean."""
+    if scale:
+        scale.draw(figure, list(panels))
+    if any(len(line.members) > 1 for line in lines):
+        panels[-1].add_line(band_handle(len(line.members) for line in lines))
+    shown = lines[0].labels
+    titles = (snapshot_label(*lines[-1].members[0]), name_of_place(dataset, shown.surface, shown.rms_slope))
+    for axes, letter, title in zip(panels, "ab", titles, strict=True):
+        axes.set_title(title, loc="right")
+        panel_label(axes, letter)
+
+
 def say_whose_theories(panels: Iterable[Axes], dataset: xr.Dataset) -> None:
     """Name in the legends the first surface of a study, which theories are drawn for, where it has several."""
     names = dataset["surface"].values.tolist()
@@ -185,6 +201,14 @@ def draw_mean(axes: Axes, x: np.ndarray, over: Ensemble, look: dict, lines: int 
     every = max(1, -(-len(x) // _MEAN_MARKERS))
     axes.plot(x, over.mean, **look | {"ls": "-", "lw": 0.9, "markevery": every})
     draw_band(axes, x, over, look["color"], lines)
+
+
+def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, lines: int, **alone: object) -> None:
+    """Draw the values (members, k) of an ensemble: their mean with its band, or, with `alone` in its look, the one."""
+    if len(members) == 1:
+        axes.plot(x, members[0], **alone, **look)
+    else:
+        draw_mean(axes, x, ensemble(members), look, lines)
 
 
 def draw_band(axes: Axes, x: np.ndarray, over: Ensemble, colour: str, lines: int = 1) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.figures.curves import PRESSURE_LABEL, bars_handle
-from icha.figures.scale import MOST_COLOURS, places_scale
+from icha.figures.scale import MOST_COLOURS, Scale, places_scale
 from icha.figures.select import NothingToDraw, study_errors
 from icha.figures.style import (
     COLOURS,
@@ -22,6 +22,7 @@ from icha.figures.style import (
     new_figure,
     panel_label,
     slope_label,
+    styled,
 )
 from icha.support.statistics import ensemble
 
@@ -50,80 +51,81 @@ class Quantity(NamedTuple):
     other: str = ""
 
 
-def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity, ...]) -> Figure:
+class _Curves(NamedTuple):
+    """Curves (entry, surface, slope and material of each), and what tells them apart.
+
+    Of more surfaces and slopes than a few every material has a row of panels of its own, of many they have colours of
+    a scale.
+    """
+
+    entries: dict[str, xr.Dataset]
+    keys: list[tuple]
+    places: list[tuple]
+    materials: list[str]
+    interfaces: xr.Dataset
+    own_rows: bool
+    scale: Scale | None
+
+    def look(self, key: tuple) -> tuple[str, dict]:
+        """Name of a curve in the legend, and arguments of `Axes.errorbar`."""
+        entry, surface, slope, material = key
+        # Solutions of the same state on another grid, say.
+        again = [each[0] for each in self.keys if each[1:] == key[1:]].index(entry)
+        place, kind = self.places.index((surface, slope)), self.materials.index(material)
+        colour = COLOURS[(place if self.own_rows else kind + 1) % len(COLOURS)]
+        colour = self.scale.colours[place] if self.scale else colour
+        name = [] if self.own_rows else [material_label(self.interfaces, material)]
+        if not self.scale:
+            name += [surface] if len({each for each, _ in self.places}) > 1 else []
+            name += [slope_label(slope)] if len({each for _, each in self.places}) > 1 else []
+        name += [entry] if again else []
+        return ", ".join(name), {
+            "color": colour,
+            "marker": MARKERS[(0 if self.own_rows else place) % len(MARKERS)],
+            "ls": DASHES[again % len(DASHES)],
+            "mfc": colour if float(self.entries[entry]["surface_energy"].sel(material=material)) > 0 else "white",
+            "ms": 4,
+            "lw": 0.9,
+            "elinewidth": 0.7,
+            "capsize": 1.5,
+        }
+
+
+@styled
+def draw_errors(model_error: xr.DataTree, *, study: str, quantities: tuple[Quantity, ...]) -> Figure:
     """A panel for every quantity, with a curve for every surface, slope and material: means over the seeds.
 
-    Bars are the 95 % confidence of the means. Many surfaces and slopes have colours of a scale.
+    Bars are the 95 % confidence of the means.
+
+    Parameters
+    ----------
+    model_error : `icha.analysis.model_error.model_error` of the campaign.
+    study : name of the study; all entries that compare its runs are drawn.
+    quantities : what is drawn of them.
 
     Raises
     ------
     NothingToDraw
         If no run of the study that was compared is complete.
     ValueError
-        If the model error has nothing of the study.
+        If the study has no boundary elements beside it.
     """
-    entries = study_errors(model_error, study)
-    if not entries:
-        there = sorted({str(node.attrs["study"]) for node in model_error.children.values()})
-        raise ValueError(f"no boundary elements beside study {study!r}; there are some for {', '.join(there)}")
-    if not any(np.isfinite(errors[each.name].values).any() for errors in entries.values() for each in quantities):
-        raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
-    places = [
-        (entry, surface, slope, material)
-        for entry, errors in entries.items()
-        for material, surface, slope in itertools.product(
-            *(errors[label].values.tolist() for label in ("material", "surface", "rms_slope"))
-        )
-    ]
-    lines = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in places))
-    materials = list(dict.fromkeys(material for *_, material in places))
-    interfaces = interfaces_of(entries, materials)
-    own_rows = len(lines) > _MOST_LINES
-    rows = [[material] for material in materials] if own_rows else [materials]
-
-    fig = new_figure(TWO_COLUMNS, 0.55 + 2.35 * len(rows) + 0.085 * _count(lines, materials, places, own_rows))
+    curves = _curves(model_error, study, quantities)
+    rows = [[material] for material in curves.materials] if curves.own_rows else [curves.materials]
+    fig = new_figure(TWO_COLUMNS, 0.55 + 2.35 * len(rows) + 0.085 * _legend_rows(curves))
     panels = fig.subplots(len(rows), len(quantities), sharex=True, sharey="col", squeeze=False)
     letters = iter("abcdefghijklmnopqrstuvwxyz")
     named: dict[str, object] = {}
-    against_other = False
-    scale = places_scale(lines) if len(lines) > MOST_COLOURS else None
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
-        mine = [place for place in places if place[-1] in shown]
-        for k, (entry, surface, slope, material) in enumerate(mine):
-            errors = entries[entry].sel(surface=surface, rms_slope=slope, material=material)
-            # Solutions of the same state on another grid, say.
-            again = [place[0] for place in places if place[1:] == (surface, slope, material)].index(entry)
-            line, kind = lines.index((surface, slope)), materials.index(material)
-            colour = scale.colours[line] if scale else COLOURS[(line if own_rows else kind + 1) % len(COLOURS)]
-            adhesive = float(errors["surface_energy"]) > 0
-            name = [] if own_rows else [material_label(interfaces, material)]
-            name += [surface] if not scale and len({surface for surface, _ in lines}) > 1 else []
-            name += [slope_label(slope)] if not scale and len({slope for _, slope in lines}) > 1 else []
-            name += [entry] if again else []
-            look = {
-                "color": colour,
-                "marker": MARKERS[(0 if own_rows else line) % len(MARKERS)],
-                "ls": DASHES[again % len(DASHES)],
-                "mfc": colour if adhesive else "white",
-                "ms": 4,
-                "lw": 0.9,
-                "elinewidth": 0.7,
-                "capsize": 1.5,
-            }
-            p = errors["reduced_pressure"].values * _APART ** (k - (len(mine) - 1) / 2)
-            for ax, quantity in zip(row, quantities, strict=True):
-                over = ensemble(errors[quantity.name].transpose("seed", ...).values)
-                bars = quantity.factor * over.confidence if over.count.max() > 1 else None
-                handle = ax.errorbar(p, quantity.factor * over.mean, bars, **look)
-                counts.update(over.count.tolist())
-                if quantity.other and adhesive:
-                    others = quantity.factor * errors[f"{quantity.other}_mean"].values
-                    ax.plot(p, others, color=colour, **_OTHER)
-                    against_other = True
-            named.setdefault(", ".join(name), handle)
-        if own_rows:
-            row[-1].set_title(material_label(interfaces, shown[0]), loc="right")
+        own = [key for key in curves.keys if key[-1] in shown]
+        for k, (entry, surface, slope, material) in enumerate(own):
+            errors = curves.entries[entry].sel(surface=surface, rms_slope=slope, material=material)
+            name, look = curves.look(own[k])
+            handle = _draw_curve(row, errors, quantities, look, _APART ** (k - (len(own) - 1) / 2), counts)
+            named.setdefault(name, handle)
+        if curves.own_rows:
+            row[-1].set_title(material_label(curves.interfaces, shown[0]), loc="right")
         for ax, quantity in zip(row, quantities, strict=True):
             logarithmic_axes(ax, "x")
             ax.axhline(0, color="0.6", lw=0.7, zorder=0)
@@ -132,25 +134,59 @@ def draw_errors(model_error: xr.DataTree, study: str, quantities: tuple[Quantity
     for ax, quantity in zip(panels[-1], quantities, strict=True):
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylim(*quantity.limits)
-    if against_other:
+    if any(each.other for each in quantities) and (curves.interfaces["surface_energy"] > 0).any():
         named["against the energetic area"] = legend_handle(color=GREY, **_OTHER)
     named |= bars_handle(counts)
-    if scale:
-        scale.draw(fig, panels.ravel().tolist())
+    if curves.scale:
+        curves.scale.draw(fig, panels.ravel().tolist())
         named.pop("", None)
     if named and (len(named) > 1 or "" not in named):
-        fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=_columns(named))
+        columns = 2 if max(map(len, named)) > 24 else 4
+        fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=columns)
     return fig
 
 
-def _columns(names):
-    return 2 if max(map(len, names)) > 24 else 4
+def _curves(model_error, study, quantities):
+    """What there is to be drawn of a study; raises what `draw_errors` does."""
+    entries = study_errors(model_error, study)
+    if not entries:
+        there = sorted({str(node.attrs["study"]) for node in model_error.children.values()})
+        raise ValueError(f"no boundary elements beside study {study!r}; there are some for {', '.join(there)}")
+    if not any(np.isfinite(errors[each.name].values).any() for errors in entries.values() for each in quantities):
+        raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
+    keys = [
+        (entry, surface, slope, material)
+        for entry, errors in entries.items()
+        for material, surface, slope in itertools.product(
+            *(errors[label].values.tolist() for label in ("material", "surface", "rms_slope"))
+        )
+    ]
+    places = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in keys))
+    materials = list(dict.fromkeys(material for *_, material in keys))
+    scale = places_scale(places) if len(places) > MOST_COLOURS else None
+    return _Curves(
+        entries, keys, places, materials, interfaces_of(entries, materials), len(places) > _MOST_LINES, scale
+    )
 
 
-def _count(lines, materials, places, own_rows):
+def _draw_curve(row, errors, quantities, look, apart, counts):
+    """Draw a curve in all panels of a row; returns its handle, and adds to `counts` numbers of seeds of its points."""
+    p = errors["reduced_pressure"].values * apart
+    for ax, quantity in zip(row, quantities, strict=True):
+        over = ensemble(errors[quantity.name].transpose("seed", ...).values)
+        bars = quantity.factor * over.confidence if over.count.max() > 1 else None
+        handle = ax.errorbar(p, quantity.factor * over.mean, bars, **look)
+        counts.update(over.count.tolist())
+        if quantity.other and float(errors["surface_energy"]) > 0:
+            ax.plot(p, quantity.factor * errors[f"{quantity.other}_mean"].values, color=look["color"], **_OTHER)
+    return handle
+
+
+def _legend_rows(curves):
     """About how many rows the legend has, in units of half a line."""
-    names = len(lines) + len(places) - len({place[1:] for place in places}) if own_rows else len(places)
-    return 2 * np.ceil(names / (4 if own_rows else 2))
+    keys, places = curves.keys, curves.places
+    names = len(places) + len(keys) - len({key[1:] for key in keys}) if curves.own_rows else len(keys)
+    return 2 * np.ceil(names / (4 if curves.own_rows else 2))
 
 
 def interfaces_of(entries, materials):

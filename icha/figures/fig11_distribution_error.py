@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
 
 from icha.figures.declaration import Declaration
 from icha.figures.errors import Quantity, draw_errors
 from icha.figures.options import ComparedFigure, model_error_only
-from icha.figures.style import styled
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
-
 
 DECLARATION = Declaration(
     description=(
@@ -39,19 +33,4 @@ QUANTITIES = (
     Quantity("jaccard", "overlap of the contact maps", limits=(0, 1)),
 )
 
-
-@styled
-def figure(model_error: xr.DataTree, *, study: str) -> Figure:
-    """Draw all entries that compare the runs of a study.
-
-    Parameters
-    ----------
-    model_error : `icha.analysis.model_error.model_error` of the campaign.
-    study : name of the study.
-
-    Raises
-    ------
-    ValueError
-        If the study has no boundary elements beside it.
-    """
-    return draw_errors(model_error, study, QUANTITIES)
+figure = partial(draw_errors, quantities=QUANTITIES)

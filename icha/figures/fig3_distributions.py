@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import band_handle, draw_mean, material_looks
+from icha.figures.curves import draw_members, material_looks, say_which_snapshots
 from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.options import SnapshotFigure, is_compared
-from icha.figures.select import first_line, name_of_place, snapshot_label, study_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
-from icha.support.statistics import ensemble
+from icha.figures.select import first_line, study_errors
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,29 +78,24 @@ def figure(
     from icha.references.persson import persson_pressure_density
 
     lines = first_line(campaign, study, kind, target)
-    looks, scale = material_looks(campaign[study].to_dataset(), [line.labels.material for line in lines])
+    dataset = campaign[study].to_dataset()
+    looks, scale = material_looks(dataset, [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2)
     lowest, highest, top, named, floor = -0.3, 0.3, 0.0, False, []
     for line, look in zip(lines, looks, strict=True):
         u, densities = gap_densities(line.members)
-        if len(densities) == 1:
-            left.plot(u, densities[0], markevery=1 + len(u) // _MOST_MARKERS, **look)
-        else:
-            draw_mean(left, u, ensemble(densities), look, len(lines))
+        draw_members(left, u, densities, look, len(lines), markevery=1 + len(u) // _MOST_MARKERS)
         floor.append(densities.mean(axis=0).min())
         p, densities = pressure_densities(line.members)
+        draw_members(right, p, densities, look, len(lines), markevery=3)
         density = densities.mean(axis=0)
-        if len(densities) == 1:
-            right.plot(p, density, markevery=3, **look)
-        else:
-            draw_mean(right, p, ensemble(densities), look, len(lines))
         if len(density):  # before first contact there is no pressure
             shown = density > 1e-3 * density.max()
             lowest, highest = min(lowest, p[shown].min()), max(highest, p[shown].max())
             top = max(top, density.max())
         loads = [float(state_of(run, at)["reduced_pressure"]) for run, at in line.members]
-        load, (run, at) = float(np.mean(loads)), line.members[0]
+        load = float(np.mean(loads))
         truths = _solutions(study_errors(model_error, study), line, loads)
         if truths:
             broad = _BROAD | {"color": look["color"]}
@@ -111,10 +105,7 @@ def figure(
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
-    if scale:
-        scale.draw(fig, [left, right])
-    if any(len(line.members) > 1 for line in lines):
-        right.add_line(band_handle(len(line.members) for line in lines))
+    say_which_snapshots(fig, [left, right], dataset, lines, scale)
     if named:
         for ax in (left, right):
             ax.plot([], [], **_BROAD | {"color": GREY}, label="boundary elements")
@@ -130,15 +121,10 @@ def figure(
     if top > 0:
         right.set_ylim(top * 5e-5, top * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
-    left.set_title(snapshot_label(run, at), loc="right")
-    shown = lines[0].labels
-    right.set_title(name_of_place(campaign[study].to_dataset(), shown.surface, shown.rms_slope), loc="right")
     if left.get_legend_handles_labels()[0]:
         left.legend(loc="lower left")
     if right.get_legend_handles_labels()[0]:
         right.legend(loc="lower center", frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)
-    for ax, letter in ((left, "a"), (right, "b")):
-        panel_label(ax, letter)
     return fig
 
 

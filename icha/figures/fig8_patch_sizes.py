@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.curves import band_handle, draw_mean, material_looks
+from icha.figures.curves import draw_members, material_looks, say_which_snapshots
 from icha.figures.declaration import Declaration
 from icha.figures.options import SnapshotFigure
-from icha.figures.select import first_line, name_of_place, snapshot_label
-from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
-from icha.support.statistics import ensemble
+from icha.figures.select import first_line
+from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, styled, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,40 +59,28 @@ def figure(
         If there is no such study or snapshot.
     """
     lines = first_line(campaign, study, kind, target)
-    looks, scale = material_looks(campaign[study].to_dataset(), [line.labels.material for line in lines])
+    dataset = campaign[study].to_dataset()
+    looks, scale = material_looks(dataset, [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2, sharex=True)
     for line, look in zip(lines, looks, strict=True):
-        run, at = line.members[0]
-        factor, unit = unit_for(float(run["period"]), "m")
-        cell = (float(run["period"]) * factor) ** 2
+        period = float(line.members[0][0]["period"])
+        factor, unit = unit_for(period, "m")
+        cell = (period * factor) ** 2
         areas = [patch_areas(run, at) * factor**2 for run, at in line.members]
         smooth = look | {"marker": "none", "lw": 1.2}
         for ax, points, own in ((left, patch_density, look), (right, patches_above, smooth)):
             area, values = points(areas, cell)
-            if len(areas) == 1:
-                ax.plot(area, values[0], **own)
-            else:
-                draw_mean(ax, area, ensemble(values), own, len(lines))
-        state = snapshot_label(run, at)
+            draw_members(ax, area, values, own, len(lines))
     for ax in (left, right):
         logarithmic_axes(ax)
-    if scale:
-        scale.draw(fig, [left, right])
-    if any(len(line.members) > 1 for line in lines):
-        right.add_line(band_handle(len(line.members) for line in lines))
-    left.set_xlabel(f"patch area  $A$ ({unit}²)")
-    right.set_xlabel(f"patch area  $A$ ({unit}²)")
+        ax.set_xlabel(f"patch area  $A$ ({unit}²)")
+    say_which_snapshots(fig, [left, right], dataset, lines, scale)
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    left.set_title(state, loc="right")
-    shown = lines[0].labels
-    right.set_title(name_of_place(campaign[study].to_dataset(), shown.surface, shown.rms_slope), loc="right")
     for ax, corner in ((left, "best"), (right, "lower left")):
         if ax.get_legend_handles_labels()[0]:
             ax.legend(loc=corner)
-    for ax, letter in ((left, "a"), (right, "b")):
-        panel_label(ax, letter)
     return fig
 
 
