@@ -50,6 +50,8 @@ WRONG = """
 import os, signal, sys
 if snakemake.wildcards.how == "3":
     sys.exit(3)
+if snakemake.wildcards.how == "1":
+    sys.exit("a message")
 os.kill(os.getpid(), signal.SIGKILL)
 """
 # Only the first one takes long.
@@ -117,9 +119,10 @@ def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow):
 
 
 def test_jobs_that_fail_are_told_with_how_they_ended(workflow):
-    process = workflow("wrong3", "wrong9")
+    process = workflow("wrong3", "wrong1", "wrong9")
     said = process.communicate(timeout=120)[0]
     assert process.returncode == 1
+    assert "wrong.py ended with status 1." in said and "a message" in said
     assert "wrong.py ended with status 3." in said and "wrong.py was killed by signal 9." in said
     assert "Traceback" not in said
 
