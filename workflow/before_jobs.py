@@ -39,8 +39,14 @@ class Campaign:
             self._set_aside(path, "damaged", dry_run)
         for path in unknown:
             self._set_aside(path, "Snakemake's record of it is damaged", dry_run)
-        if not dry_run and not RECORDS.is_dir():
-            self.refuse_unwritable()  # nothing was computed yet, so there is something to do
+        if dry_run:
+            return
+        if not RECORDS.is_dir() or not os.access(".snakemake", os.W_OK):
+            self.refuse_unwritable()  # nothing was computed yet, or Snakemake could not keep its records
+        elif os.path.isdir(results) and not os.access(results, os.W_OK):
+            # Of what is missing there Snakemake says only that it is protected.
+            text = f"{results} cannot be written to: what is not there cannot be computed"
+            logger.warning(text, extra={"remark": text})
 
     def _set_aside(self, path: str, why: str, dry_run: bool) -> None:
         """Rename a result that cannot be trusted, so that it is made again, and say so."""
