@@ -1,6 +1,7 @@
 """Drawings that are part of an HTML page: a graph of boxes and arrows, and curves on logarithmic axes.
 
-Text and lines have the colour of the page's text, so that they show on light and on dark pages.
+Text and lines have the colour of the page's text, so that they show on light and on dark pages, and boxes are links:
+matplotlib's SVG has fixed colours, no links, and more than twice the size.
 """
 
 from __future__ import annotations

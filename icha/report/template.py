@@ -10,6 +10,9 @@ from markupsafe import Markup, escape
 
 from icha.support import in_words
 
+# A table has so many rows at most.
+MOST_ROWS = 300
+
 # Symbols as they stand in captions and attributes, and how a page sets them.
 _SYMBOLS = (
     (re.compile(r"h(?:&#39;|')_?rms"), "<i>h</i>′<sub>rms</sub>"),

@@ -20,13 +20,10 @@ from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr
 from icha.figures.select import path_steps
 from icha.figures.style import save
-from icha.report.report import (
-    MOST_ROWS,
-    ReportFigure,
-    read_surface_statistics,
-    write_report,
-)
+from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, read_benchmarks, write_times_page
+from icha.report.surfaces import read_surface_statistics
+from icha.report.template import MOST_ROWS
 
 
 class Page(HTMLParser):

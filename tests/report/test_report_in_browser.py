@@ -17,8 +17,9 @@ from icha.datasets.campaign import campaign_tree
 from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr, fig2_area_and_gap
 from icha.figures.style import save
-from icha.report.report import ReportFigure, read_surface_statistics, write_report
+from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, write_times_page
+from icha.report.surfaces import read_surface_statistics
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)

@@ -7,8 +7,9 @@ from job import guarded
 from icha.analysis.checks import read_checks
 from icha.datasets.files import read_campaign
 from icha.figures.registry import DECLARATIONS
-from icha.report.report import ReportFigure, read_surface_statistics, write_report
+from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import write_times
+from icha.report.surfaces import read_surface_statistics
 
 if "snakemake" in globals():
     with guarded(snakemake):

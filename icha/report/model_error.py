@@ -1,0 +1,56 @@
+"""The section on how far the model is from boundary elements."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from icha.analysis.model_error import SUMMARISED
+from icha.support.statistics import ensemble
+
+
+def entry_section(errors):
+    """What the page says about one entry of the model error: a row for every surface, material and load."""
+    several = errors.sizes["seed"] > 1
+
+    def scatter(state, name):
+        over = ensemble(state[name].values)
+        return float(over.mean), float(over.confidence) if several else None
+
+    rows = []
+    for surface, slope, material in itertools.product(
+        *(errors[label].values.tolist() for label in ("surface", "rms_slope", "material"))
+    ):
+        for p in errors["reduced_pressure"].values.tolist():
+            state = errors.sel(surface=surface, rms_slope=slope, material=material, reduced_pressure=p)
+            rows.append(
+                {
+                    "surface": surface,
+                    "rms_slope": slope,
+                    "material": material,
+                    "reduced_pressure": p,
+                    "area": float(state["contact_area_fraction"].mean()),
+                    "true_area": float(state["contact_area_fraction_boundary_elements"].mean()),
+                    **{name: scatter(state, name) for name in SUMMARISED},
+                }
+            )
+
+    def spread(name):
+        values = errors[name].values
+        return {"median": float(np.median(values)), "least": float(values.min()), "most": float(values.max())}
+
+    tabor = errors["tabor_parameter"].values
+    return {
+        "name": errors.attrs["entry"],
+        "study": errors.attrs["study"],
+        "axes": {label: errors[label].values.tolist() for label in ("rms_slope", "material", "seed")},
+        "states": int(errors["area_error"].size),
+        "grids": sorted(set(errors["solution_grid"].values.ravel().tolist())),
+        "adhesive": bool((errors["surface_energy"] > 0).any()),
+        "tabor": list(dict.fromkeys(f"{mu:.2g}" for mu in (tabor.min(), tabor.max()))),
+        "load_error": float(np.abs(errors["load_error"]).max()),
+        "residual": float(errors["residual"].max()),
+        "rows": rows,
+        **{name: spread(name) for name in (*SUMMARISED, "perimeter_correction")},
+    }
