@@ -1,6 +1,7 @@
 """The report is one page without outside parts, shows failures, and changes with the data only."""
 
 import re
+import shutil
 from html.parser import HTMLParser
 
 import compared_campaign as compared
@@ -50,19 +51,28 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    """A folder with a figure and a surface, and what is found of the small campaign."""
+    folder = tmp_path_factory.mktemp("parts")
+    save(fig1_jkr.figure(), *(folder / "figures" / f"fig1_jkr.{ending}" for ending in ("png", "pdf")))
+    write_surface(folder / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    return folder, check_campaign(small.tree()), compare_campaign(small.tree())
+
+
 @pytest.fixture
-def write(tmp_path):
+def write(tmp_path, parts):
+    folder, checks, comparison = parts
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
     files = [tmp_path / "figures" / f"fig1_jkr.{ending}" for ending in ("png", "pdf")]
-    save(fig1_jkr.figure(), *files)
-    write_surface(tmp_path / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
     picture = ReportFigure("fig1_jkr", fig1_jkr.DECLARATION.caption, *files)
 
     def written(name="report.html", **changes):
         arguments = {
             "campaign": small.tree(),
             "figures": [picture],
-            "checks": check_campaign(small.tree()),
-            "comparison": compare_campaign(small.tree()),
+            "checks": checks,
+            "comparison": comparison,
             "surfaces": [read_dataset(tmp_path / "s.nc")],
             "configuration": "name: small\ntext: <script>alert('no')</script>\n",
             "dataset_path": tmp_path / "dataset" / "small.nc",
