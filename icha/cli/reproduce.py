@@ -176,7 +176,7 @@ def _program(project: Path, folder: Path, environment: str) -> tuple[list[str], 
 
 def _run(program, project: Path, targets: list[str], cores: str | None) -> int:
     """Run the campaign, which says itself how it goes; return its exit status."""
-    from icha.publication.rerun import CONFIGURATION
+    from icha.datasets.results import CONFIGURATION
 
     command, variables = program
     typer.echo(f"computing in {shown(project)}, which paths are relative to")

@@ -22,12 +22,12 @@ from rocrate.rocrate import ROCrate
 
 from icha.configuration.publication import Author, Publication
 from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.results import CONFIGURATION
 from icha.publication.citation import web_address
 from icha.publication.licences import known_licence
 from icha.support.atomic_files import whole_file
 
 METADATA = "ro-crate-metadata.json"
-CONFIGURATION = "config.used.yaml"
 README = "README.md"
 SOURCE = "source/"
 WORKFLOW = f"{SOURCE}Snakefile"

@@ -10,17 +10,15 @@ from typing import NamedTuple
 import netCDF4
 import numpy as np
 
-# How files of the same kind are called, by the beginning of their path; any other file is a kind of its own.
+from icha.datasets.results import ERROR_SOURCES, LOOP, ONE_ASPERITY, RUN, SOLUTION, SURFACE, THEORIES
+
+# What stands for what differs among files of the same kind, and how these are called, by the beginning of their path;
+# any other file is a kind of its own.
+_DIFFERENT = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
+_DIFFERENT |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "asperity": "<name>"}
 _KINDS = {
-    "surfaces": "surfaces/<surface>/seed<k>.nc",
-    "runs": "runs/<study>/<surface>/seed<k>/slope<g>/<material>.nc",
-    "references/boundary_elements": (
-        "references/boundary_elements/<entry>/<surface>/seed<k>/slope<g>/<material>/p<load>.nc"
-    ),
-    "references/loops": "references/loops/<entry>/<surface>/seed<k>/slope<g>/<material>.nc",
-    "references/error_sources": "references/error_sources/<entry>/<surface>/seed<k>/slope<g>/<material>.nc",
-    "references/one_asperity": "references/one_asperity/<name>.nc",
-    "references": "references/<surface>.nc",
+    pattern.partition("/{")[0]: pattern.format(**_DIFFERENT)
+    for pattern in (SURFACE, RUN, SOLUTION, LOOP, ERROR_SOURCES, ONE_ASPERITY, THEORIES)
 }
 # Numbers that are read at once.
 _BLOCK = 2**22

@@ -13,10 +13,10 @@ from pathlib import Path
 import netCDF4
 import yaml
 
+from icha.datasets.results import CONFIGURATION
 from icha.publication.deposit_files import CHECKSUMS, read_file
 from icha.support.in_words import counted
 
-CONFIGURATION = "config.used.yaml"
 SMALLEST = "smallest"
 # In the folder of a rerun: what it is of, the deposit's files if it is a zip, the project.
 _BEGUN, _UNPACKED, _PROJECT = CHECKSUMS, "deposit", "source"
