@@ -16,6 +16,8 @@ from scipy.special import erf
 
 # Share of the full-contact elastic energy that a small contact stores (Yang & Persson, gamma).
 YANG_PERSSON_GAMMA = 0.45
+# Wave numbers of the quadrature on either side of the roll-off; odd, for Simpson's rule.
+_POINTS = 401
 
 
 def persson_area(reduced_pressure):
@@ -34,7 +36,7 @@ def persson_pressure_density(pressure, reduced_pressure):
     return np.where(pressure > 0, np.sqrt(2 / np.pi) * gauss, 0.0)
 
 
-def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, points=401):
+def persson_mean_separation(reduced_pressure, spectrum):
     r"""Mean separation over h_rms at reduced pressures of any shape, from the spectrum of the surface.
 
     Yang & Persson (2008): with w(q) = (pi int_{q_L}^q k^3 C(k) dk)^(-1/2) and P = erf(w p/E*),
@@ -48,13 +50,11 @@ def persson_mean_separation(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GA
     ----------
     reduced_pressure : p*, positive.
     spectrum : `icha.surfaces.spectrum.SelfAffineSpectrum`; its isotropic continuum is meant, not its lattice.
-    gamma : their parameter; 0.45 unless told.
-    points : wave numbers of the quadrature on either side of the roll-off; odd, for Simpson's rule.
     """
-    return _over_wave_numbers(lambda t: _stored_share(t, gamma), reduced_pressure, spectrum, points)
+    return _over_wave_numbers(_stored_share, reduced_pressure, spectrum)
 
 
-def persson_stiffness(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, points=401):
+def persson_stiffness(reduced_pressure, spectrum):
     r"""Contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures, in the theory of Yang & Persson (2008).
 
     The derivative of `persson_mean_separation`, in closed form but for the integral over the wave numbers:
@@ -64,11 +64,11 @@ def persson_stiffness(reduced_pressure, spectrum, *, gamma=YANG_PERSSON_GAMMA, p
     For small pressures this is a length u0, so that p falls as exp(-u/u0) and the stiffness is p/u0 (Persson 2007).
     Parameters as those of `persson_mean_separation`.
     """
-    decay_length = _over_wave_numbers(lambda t: _share_density(t, gamma), reduced_pressure, spectrum, points)
+    decay_length = _over_wave_numbers(_share_density, reduced_pressure, spectrum)
     return np.asarray(reduced_pressure, float) / decay_length
 
 
-def _over_wave_numbers(share, reduced_pressure, spectrum, points):
+def _over_wave_numbers(share, reduced_pressure, spectrum):
     """sqrt(pi) int dq q^2 C(q) w(q) share(w p/E*), over h_rms."""
     pressure = np.asarray(reduced_pressure, float)
     if np.any(pressure <= 0):
@@ -78,10 +78,10 @@ def _over_wave_numbers(share, reduced_pressure, spectrum, points):
     rolloff = max(spectrum.period / spectrum.rolloff_wavelength, 1.0)
     cutoff = spectrum.period / spectrum.short_wavelength
     falling = -2 * (1 + spectrum.hurst)
-    above = np.geomspace(1e-14, cutoff - 1, points)
+    above = np.geomspace(1e-14, cutoff - 1, _POINTS)
     if rolloff - 1 > 1e-9:
         above = np.concatenate(
-            [np.geomspace(1e-14, rolloff - 1, points), np.geomspace(rolloff - 1, cutoff - 1, points)[1:]]
+            [np.geomspace(1e-14, rolloff - 1, _POINTS), np.geomspace(rolloff - 1, cutoff - 1, _POINTS)[1:]]
         )
     q = 1 + above
     shape = np.maximum(q / rolloff, 1.0) ** falling
@@ -103,15 +103,15 @@ def _over_wave_numbers(share, reduced_pressure, spectrum, points):
     return separation / np.sqrt(moment(1, q[-1]))
 
 
-def _share_density(t, gamma):
+def _share_density(t):
     """[gamma + 3 (1 - gamma) erf(t)^2] exp(-t^2)."""
-    return (gamma + 3 * (1 - gamma) * erf(t) ** 2) * np.exp(-(t**2))
+    return (YANG_PERSSON_GAMMA + 3 * (1 - YANG_PERSSON_GAMMA) * erf(t) ** 2) * np.exp(-(t**2))
 
 
-def _stored_share(t, gamma):
+def _stored_share(t):
     """Integral of `_share_density`(s)/s over s from t to infinity."""
     s = np.geomspace(1e-12, 12, 6001)
-    integrand = _share_density(s, gamma)
+    integrand = _share_density(s)
     log_s = np.log(s)
     panels = 0.5 * (integrand[1:] + integrand[:-1]) * np.diff(log_s)
     tail = np.concatenate([np.cumsum(panels[::-1])[::-1], [0.0]])
