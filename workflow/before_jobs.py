@@ -32,13 +32,16 @@ class Campaign:
         self.results = results
         self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
         not_whole = checksums.damaged(results)
-        unknown = [path for path in _of_unknown_origin(results) if path not in not_whole]
+        unknown = dict(_of_unknown_origin(results))
         if self._other and (not_whole or unknown):
             self.refuse_second()
         for path in not_whole:
             self._set_aside(path, "damaged", dry_run)
-        for path in unknown:
-            self._set_aside(path, "Snakemake's record of it is damaged", dry_run)
+        for path, record in unknown.items():
+            if path not in not_whole:
+                self._set_aside(path, "Snakemake's record of it is damaged", dry_run)
+            if not dry_run:
+                record.unlink()  # Snakemake breaks off at some of them
         if dry_run:
             return
         if not RECORDS.is_dir() or not os.access(".snakemake", os.W_OK):
@@ -93,8 +96,8 @@ def _unwritable(folder, reason):
     )
 
 
-def _of_unknown_origin(results: str) -> Iterator[str]:
-    """Results of which Snakemake's record is none, as it may be after a full disk: not known to be up to date.
+def _of_unknown_origin(results: str) -> Iterator[tuple[str, Path]]:
+    """Results with a record of Snakemake that is none, as it may be after a full disk: not known to be up to date.
 
     Snakemake takes such a result for up to date, or breaks off; it has no public reader that would say which those are.
     """
@@ -108,7 +111,7 @@ def _of_unknown_origin(results: str) -> Iterator[str]:
             except ValueError:
                 continue  # not of ours
             if file.startswith(f"{results}/") and os.path.exists(file) and not _is_record(record):
-                yield os.path.relpath(file, results)
+                yield os.path.relpath(file, results), record
 
 
 def _is_record(file: Path) -> bool:
