@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from base64 import urlsafe_b64encode
 from pathlib import Path
 
 import pytest
@@ -130,3 +131,19 @@ def test_what_cannot_be_removed_does_not_hide_the_reason(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="Read-only file system") as raised, whole_file(tmp_path / "a.txt"):
         raise RuntimeError("a library's own words")
     assert raised.value.filename == str(tmp_path)
+
+
+def test_a_damaged_record_of_snakemake_goes_with_its_result(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import before_jobs
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
+    result = Path(RESULTS, "b.nc")
+    record = Path(".snakemake/metadata", urlsafe_b64encode(str(result).encode()).decode())
+    for file, content in ((result, b"a result"), (record, b'{"rule": "run"\xfd')):
+        file.parent.mkdir(parents=True)
+        file.write_bytes(content)
+    before_jobs.Campaign(RESULTS, dry_run=False)
+    assert not record.exists() and not result.exists()
+    assert result.with_name("b.nc.damaged").read_bytes() == b"a result"
