@@ -108,7 +108,7 @@ _HIGHEST_RATIO = 3.0
 
 @styled
 def figure(error_sources: Sequence[xr.Dataset]) -> Figure:
-    """Draw the datasets of `icha.references.error_sources.error_sources`, of surfaces that differ in their seeds only.
+    """Draw the datasets of `icha.references.error_sources.variants`, of surfaces that differ in their seeds only.
 
     Raises
     ------

@@ -52,6 +52,7 @@ def project(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
     script = project / "workflow/scripts/run_sweep.py"
     whole = script.read_text()
@@ -87,6 +88,7 @@ def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project
     assert again.returncode == 0 and "Nothing to do" in again.stdout
 
 
+@pytest.mark.slow
 def test_damaged_files_are_made_again(project):
     results = project / "results/tiny"
     paths = [
@@ -139,6 +141,7 @@ def test_it_goes_on_after_it_was_stopped(project):
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
 def test_a_campaign_that_another_process_runs_is_refused_with_the_reason(project):
     lock = project / ".snakemake/tiny.lock"
     lock.parent.mkdir(exist_ok=True)

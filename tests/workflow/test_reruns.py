@@ -160,6 +160,7 @@ def test_another_licence_runs_all_that_names_it(project):
     assert jobs["run"] == 12 and jobs["surface"] == 3 and set(jobs) >= BESIDE_RUNS | {"campaign_dataset", "comparison"}
 
 
+@pytest.mark.slow
 def test_a_figure_runs_itself_and_the_report(project):
     add_statement(project / "icha/figures/fig3_distributions.py")
     jobs, messages = planned(project)

@@ -306,6 +306,7 @@ def test_a_failing_job_says_why(project):
     assert not (project / run).exists()
 
 
+@pytest.mark.slow
 def test_surface_files_and_measurements(smoke, tmp_path):
     rng = np.random.default_rng(3)
     x = np.linspace(0, 2 * np.pi, 32, endpoint=False)
