@@ -74,10 +74,44 @@ def figure(
     ValueError
         If there is no such study or snapshot, or no run with adhesion.
     """
-    from icha.asperity.jkr import WU_RANGE
+    curves, bare, shown = _points(campaign, study, kind, target)
+    fig = new_figure(TWO_COLUMNS, 3.1)
+    panels = fig.subplots(1, 2)
+    places = list(dict.fromkeys([*(place for place, _ in curves), *bare]))
+    interfaces = list(dict.fromkeys(interface for _, interface in curves))
+    scale = places_scale(places) if len(places) > MOST_COLOURS else None
+    drawn = []
+    for (place, interface), points in curves.items():
+        kind_of, place_of = interfaces.index(interface), places.index(place)
+        look = {
+            "color": scale.colours[place_of] if scale else COLOURS[(kind_of + 1) % len(COLOURS)],
+            "marker": MARKERS[(kind_of if scale else place_of) % len(MARKERS)],
+            "label": _name(interface, place, [] if scale else places),
+        }
+        drawn += _draw_curve(panels, points, look)
+    for place, members in bare.items():
+        colour = scale.colours[places.index(place)] if scale else GREY
+        name = "no adhesion" if place == next(iter(bare)) else None
+        for ax, mean in zip(panels, ensemble(members).mean, strict=True):
+            ax.axhline(mean, color=colour, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
+    if scale:
+        scale.draw(fig, list(panels))
+    for ax, letter, label in zip(panels, "ab", (AREA_LABEL, SEPARATION_LABEL), strict=True):
+        _finish(ax, min(drawn), max(drawn))
+        ax.set_ylabel(label)
+        panel_label(ax, letter)
+    panels[0].set_title(shown, loc="right")
+    counts = [len(members) for points in curves.values() for members in points.values()]
+    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True)) | bars_handle(counts)
+    panels[0].legend(handles.values(), handles.keys(), loc="best")
+    return fig
+
+
+def _points(campaign, study, kind, target):
+    """Of every curve its points by range of attraction, a (Tabor parameter, area, separation) for each seed; those
+    without adhesion by place, (area, separation) for each seed; and what snapshot it is."""
     from icha.datasets.campaign import find_snapshot
 
-    # Of every line the points of every range of attraction, by seed: Tabor parameter, area and separation.
     curves: dict[tuple, dict[float, list]] = {}
     bare: dict[tuple, list] = {}
     for labels, run in study_runs(campaign, study, ragged=False):
@@ -94,60 +128,37 @@ def figure(
         shown = snapshot_label(run, at)
     if not curves:
         raise NothingToDraw(f"study {study}: no complete run with adhesion, so none with a Tabor parameter")
+    return curves, bare, shown
 
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    panels = fig.subplots(1, 2)
-    places = list(dict.fromkeys([*(place for place, _ in curves), *bare]))
-    interfaces = list(dict.fromkeys(interface for _, interface in curves))
-    scale = places_scale(places) if len(places) > MOST_COLOURS else None
-    drawn = []
-    for (place, interface), points in curves.items():
-        kind_of, place_of = interfaces.index(interface), places.index(place)
-        look = {
-            "color": scale.colours[place_of] if scale else COLOURS[(kind_of + 1) % len(COLOURS)],
-            "marker": MARKERS[(kind_of if scale else place_of) % len(MARKERS)],
-            "label": _name(interface, place, [] if scale else places),
-            "lw": 0.8,
-            "ms": 4,
-            "elinewidth": 0.6,
-            "capsize": 1.5,
-        }
-        over = [ensemble(members) for members in points.values()]
-        mu = np.array([each.mean[0] for each in over])
-        order = np.argsort(mu)
-        for k, ax in enumerate(panels, 1):
-            mean, confidence = (np.array([getattr(each, name)[k] for each in over])[order] for name in _DRAWN)
-            ax.errorbar(mu[order], mean, confidence if np.isfinite(confidence).any() else None, **look)
-        drawn += mu.tolist()
-    for place, members in bare.items():
-        over = ensemble(members)
-        colour = scale.colours[places.index(place)] if scale else GREY
-        for k, ax in enumerate(panels):
-            name = "no adhesion" if place == next(iter(bare)) else None
-            ax.axhline(over.mean[k], color=colour, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
-    counts = [len(members) for points in curves.values() for members in points.values()]
-    if scale:
-        scale.draw(fig, list(panels))
-    smallest, largest = min(drawn), max(drawn)
-    for ax, letter, label in zip(panels, "ab", (AREA_LABEL, SEPARATION_LABEL), strict=True):
-        low, high = ax.get_xlim()
-        # A range of attraction that was rounded does not leave what was verified.
-        if smallest < WU_RANGE[0] / 1.01:
-            ax.axvspan(low, WU_RANGE[0], color="0.93", lw=0, zorder=0)
-        if largest > WU_RANGE[1] * 1.01:
-            ax.axvspan(WU_RANGE[1], high, color="0.93", lw=0, zorder=0)
-        ax.set_xlim(low, high)
-        ax.set_xlabel(r"Tabor parameter  $\mu$")
-        ax.set_ylabel(label)
-        bottom, top = ax.get_ylim()
-        # Differences of a few per mille are not blown up to fill the panel.
-        reach = max(0.65 * (top - bottom), _LEAST_REACH * 0.5 * (top + bottom))
-        ax.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)
-        panel_label(ax, letter)
-    panels[0].set_title(shown, loc="right")
-    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True)) | bars_handle(counts)
-    panels[0].legend(handles.values(), handles.keys(), loc="best")
-    return fig
+
+def _draw_curve(panels, points, look):
+    """Draw the means over the seeds in both panels; their Tabor parameters."""
+    over = [ensemble(members) for members in points.values()]
+    mu = np.array([each.mean[0] for each in over])
+    order = np.argsort(mu)
+    for k, ax in enumerate(panels, 1):
+        mean, confidence = (np.array([getattr(each, name)[k] for each in over])[order] for name in _DRAWN)
+        bars = confidence if np.isfinite(confidence).any() else None
+        ax.errorbar(mu[order], mean, bars, **look, lw=0.8, ms=4, elinewidth=0.6, capsize=1.5)
+    return mu.tolist()
+
+
+def _finish(ax, smallest, largest):
+    """Shade where the jump-in was not verified, and choose the limits of the axes."""
+    from icha.asperity.jkr import WU_RANGE
+
+    low, high = ax.get_xlim()
+    # A range of attraction that was rounded does not leave what was verified.
+    if smallest < WU_RANGE[0] / 1.01:
+        ax.axvspan(low, WU_RANGE[0], color="0.93", lw=0, zorder=0)
+    if largest > WU_RANGE[1] * 1.01:
+        ax.axvspan(WU_RANGE[1], high, color="0.93", lw=0, zorder=0)
+    ax.set_xlim(low, high)
+    ax.set_xlabel(r"Tabor parameter  $\mu$")
+    bottom, top = ax.get_ylim()
+    # Differences of a few per mille are not blown up to fill the panel.
+    reach = max(0.65 * (top - bottom), _LEAST_REACH * 0.5 * (top + bottom))
+    ax.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)
 
 
 _DRAWN = ("mean", "confidence")
