@@ -38,7 +38,7 @@ class Campaign:
         for path in not_whole:
             self._set_aside(path, "damaged", dry_run)
         for path, record in unknown.items():
-            if path not in not_whole:
+            if path not in not_whole and os.path.exists(f"{results}/{path}"):
                 self._set_aside(path, "Snakemake's record of it is damaged", dry_run)
             if not dry_run:
                 record.unlink()  # Snakemake breaks off at some of them
@@ -110,7 +110,7 @@ def _of_unknown_origin(results: str) -> Iterator[tuple[str, Path]]:
                 file = urlsafe_b64decode("".join(part.removeprefix("@") for part in parts)).decode()
             except ValueError:
                 continue  # not of ours
-            if file.startswith(f"{results}/") and os.path.exists(file) and not _is_record(record):
+            if file.startswith(f"{results}/") and not _is_record(record):
                 yield os.path.relpath(file, results), record
 
 

@@ -147,3 +147,18 @@ def test_a_damaged_record_of_snakemake_goes_with_its_result(tmp_path, monkeypatc
     before_jobs.Campaign(RESULTS, dry_run=False)
     assert not record.exists() and not result.exists()
     assert result.with_name("b.nc.damaged").read_bytes() == b"a result"
+
+
+def test_a_damaged_record_of_snakemake_goes_also_without_its_result(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import before_jobs
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
+    record = Path(".snakemake/metadata", urlsafe_b64encode(f"{RESULTS}/b.nc".encode()).decode())
+    record.parent.mkdir(parents=True)
+    record.write_bytes(b'{"rule": "run"\xfd')
+    before_jobs.Campaign(RESULTS, dry_run=True)
+    assert record.exists()
+    before_jobs.Campaign(RESULTS, dry_run=False)
+    assert not record.exists() and not Path(RESULTS, "b.nc.damaged").exists()
