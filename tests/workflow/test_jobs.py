@@ -133,32 +133,23 @@ def test_what_cannot_be_removed_does_not_hide_the_reason(tmp_path, monkeypatch):
     assert raised.value.filename == str(tmp_path)
 
 
-def test_a_damaged_record_of_snakemake_goes_with_its_result(tmp_path, monkeypatch):
+@pytest.mark.parametrize("there", [True, False], ids=["with_its_result", "alone"])
+def test_a_damaged_record_of_snakemake_goes(there, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
     import before_jobs
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
     result = Path(RESULTS, "b.nc")
+    aside = result.with_name("b.nc.damaged")
     record = Path(".snakemake/metadata", urlsafe_b64encode(str(result).encode()).decode())
     for file, content in ((result, b"a result"), (record, b'{"rule": "run"\xfd')):
         file.parent.mkdir(parents=True)
         file.write_bytes(content)
+    if not there:
+        result.unlink()
+    before_jobs.Campaign(RESULTS, dry_run=True)
+    assert record.exists() and result.exists() == there
     before_jobs.Campaign(RESULTS, dry_run=False)
     assert not record.exists() and not result.exists()
-    assert result.with_name("b.nc.damaged").read_bytes() == b"a result"
-
-
-def test_a_damaged_record_of_snakemake_goes_also_without_its_result(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    import before_jobs
-
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
-    record = Path(".snakemake/metadata", urlsafe_b64encode(f"{RESULTS}/b.nc".encode()).decode())
-    record.parent.mkdir(parents=True)
-    record.write_bytes(b'{"rule": "run"\xfd')
-    before_jobs.Campaign(RESULTS, dry_run=True)
-    assert record.exists()
-    before_jobs.Campaign(RESULTS, dry_run=False)
-    assert not record.exists() and not Path(RESULTS, "b.nc.damaged").exists()
+    assert (aside.read_bytes() == b"a result") if there else not aside.exists()
