@@ -90,6 +90,7 @@ def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project
 
 @pytest.mark.slow
 def test_damaged_files_are_made_again(project):
+    run(project, "dataset")  # so that they are there, whatever tests ran before
     results = project / "results/tiny"
     paths = [
         "surfaces/rough/seed1.nc",
