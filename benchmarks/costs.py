@@ -30,9 +30,9 @@ from icha.asperity.cohesive_zone import shortest_range
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning import costs
-from icha.references.boundary_elements import boundary_elements
 from icha.references.error_sources.variants import error_sources
-from icha.references.loops import boundary_element_loop
+from icha.references.finite_range import finite_range_solution
+from icha.references.finite_range_loops import finite_range_loop
 from icha.simulation import simulate
 
 RESULT = Path(__file__).parent / "results/costs.json"
@@ -75,7 +75,7 @@ def solution(grid, refinement, pressure, adhesive, hurst=0.8):
 
     def work(file):
         rough = spectrum(grid, hurst=hurst).realise(grid, 1)
-        write_dataset(boundary_elements(rough, icha.Material(*material), pressure, refinement=refinement), file)
+        write_dataset(finite_range_solution(rough, icha.Material(*material), pressure, refinement=refinement), file)
 
     title = f"boundary elements {nodes}², {'adhesive' if adhesive else 'bare'}, p* = {pressure:g}"
     return title, costs.solution_cost(nodes, pressure, adhesive=adhesive), work
@@ -88,7 +88,7 @@ def loop(grid, refinement, step, adhesive=True):
     def work(file):
         rough = spectrum(grid, rolloff=PERIOD).realise(grid, 1).scaled_to_rms_slope(0.3)
         settings = {"largest_reduced_pressure": 0.01, "separation_step": step, "refinement": refinement}
-        write_dataset(boundary_element_loop(rough, icha.Material(*material), tolerance=1e-6, **settings), file)
+        write_dataset(finite_range_loop(rough, icha.Material(*material), tolerance=1e-6, **settings), file)
 
     return f"boundary elements both ways {nodes}², steps {step}", costs.loop_cost(nodes, step, adhesive=adhesive), work
 

@@ -3,7 +3,7 @@
 import hashlib
 
 import icha
-from icha.references.boundary_elements import boundary_elements
+from icha.references.finite_range import finite_range_solution
 
 ROUGH = icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=40e-6, short_wavelength=100e-6 / 7, hurst=0.8)
 MATERIALS = {"hertz": icha.Material(25e6, 0.0, 1e-9), "adhesive": icha.Material(25e6, 0.05, 0.2e-6)}
@@ -20,4 +20,4 @@ def digest(solution):
 
 
 if __name__ == "__main__":
-    print(digest(boundary_elements(surface(), MATERIALS["adhesive"], PRESSURE)))
+    print(digest(finite_range_solution(surface(), MATERIALS["adhesive"], PRESSURE)))

@@ -327,7 +327,7 @@ def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]
 
     Parameters
     ----------
-    solution : a dataset as `icha.references.boundary_elements.boundary_elements` returns it.
+    solution : a dataset as `icha.references.finite_range.boundary_elements` returns it.
     subject : name of the solution in the findings.
     """
     findings = (*_of_solver(solution), *_identities_of_solution(solution))

@@ -60,7 +60,7 @@ def model_error(
     ----------
     campaign : the campaign dataset; its runs have a snapshot of kind `reduced_pressure` at every solution's load.
     solutions : pairs of labels (entry, study, surface, seed, rms_slope, material, reduced_pressure) and the solution's
-        dataset (`icha.references.boundary_elements`), in any order.
+        dataset (`icha.references.finite_range`), in any order.
     attrs : further global attributes.
 
     Returns

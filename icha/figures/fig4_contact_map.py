@@ -108,7 +108,7 @@ def figure(
     ----------
     campaign : the campaign dataset.
     surface : the surface file's dataset; it must be the topography of the run that is drawn.
-    solution : boundary elements (`icha.references.boundary_elements`) of the state that is drawn, if there are any.
+    solution : boundary elements (`icha.references.finite_range`) of the state that is drawn, if there are any.
     study : name of the study.
     surface_name, seed, rms_slope, material : which run; what is left out is the study's first. For the material that
         is the first one with adhesion, if there is any.

@@ -7,7 +7,7 @@ Approaches are those of the summit to the mean plane of the cell.
 The law of Johnson, Kendall and Roberts (K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971)
 301, doi:10.1098/rspa.1971.0141) is the limit of a vanishing range, that is of a large Tabor parameter (D. Tabor, J.
 Colloid Interface Sci. 58 (1977) 2). At a finite one boundary elements have two areas, that of zero gap and the
-energetic one (see `icha.references.boundary_elements`), and the law's area is compared with both. Hertz's law has no
+energetic one (see `icha.references.finite_range`), and the law's area is compared with both. Hertz's law has no
 such parameter.
 """
 
@@ -29,7 +29,7 @@ from icha.datasets.variables.one_asperity import ONE_ASPERITY
 from icha.datasets.variables.terms import MATERIAL
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.interaction import displacement_at
-from icha.references.boundary_elements import (
+from icha.references.finite_range import (
     REFERENCES,
     NodalState,
     contact_state,
@@ -105,7 +105,7 @@ def one_asperity(
     ------
     ValueError
         If an argument is out of range, or the grid does not resolve the attraction.
-    icha.references.boundary_elements.NotSolved, icha.contact.failures.NotConverged
+    icha.references.failures.NotSolved, icha.contact.failures.NotConverged
         If one of the two does not find a state.
     RuntimeError
         If the model is not in contact.

@@ -18,7 +18,7 @@ from icha.analysis.checks import (
 )
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
-from icha.references.boundary_elements import boundary_elements
+from icha.references.finite_range import finite_range_solution
 
 
 def failed(run):
@@ -179,7 +179,7 @@ def solution():
     rough = icha.SelfAffineSpectrum(
         period=100e-6, rolloff_wavelength=50e-6, short_wavelength=12.5e-6, hurst=0.8, rms_slope=1.0
     )
-    return boundary_elements(rough.realise(grid=64, seed=1), icha.Material(25e6, 0.05, 150e-9), 0.01)
+    return finite_range_solution(rough.realise(grid=64, seed=1), icha.Material(25e6, 0.05, 150e-9), 0.01)
 
 
 def test_boundary_elements_pass(solution):

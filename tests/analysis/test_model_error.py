@@ -22,7 +22,7 @@ from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.campaign import campaign_tree, find_snapshot
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels, SolutionLabels
-from icha.references.boundary_elements import boundary_elements
+from icha.references.finite_range import finite_range_solution
 
 
 def test_a_state_is_no_distance_from_itself():
@@ -121,7 +121,7 @@ def test_overlap_of_maps():
 def test_spots_lie_where_boundary_elements_find_contact():
     """A map that is mirrored, transposed or shifted by a few cells shares next to nothing with the solution."""
     run = runs()["one", "rough", 1, 1.0, "hertz"]
-    solution = boundary_elements(small.surface(), small.MATERIALS["hertz"], 3e-3, refinement=2, seed=1)
+    solution = finite_range_solution(small.surface(), small.MATERIALS["hertz"], 3e-3, refinement=2, seed=1)
     compared = compare_state(run, 0, solution)
     assert compared["jaccard"] > 0.5
     spots = contact_of_spots(run, 0, solution.sizes["x"])

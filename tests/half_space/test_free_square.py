@@ -18,8 +18,8 @@ from icha.half_space.ewald import HalfSpace
 from icha.half_space.free_square import image_potential, mean_displacement
 from icha.half_space.grid_displacement import DisplacementField
 from icha.half_space.interaction import Interaction, displacement_at
-from icha.references.boundary_elements import boundary_elements
 from icha.references.error_sources.variants import error_sources
+from icha.references.finite_range import finite_range_solution
 from icha.surfaces.summits import Asperities, find_summits
 
 MODULUS, RANGE = 1.0, 1e-3
@@ -342,7 +342,7 @@ def test_moments_of_a_free_square_are_means_over_it():
     assert surface.spectral_moments[1:] == pytest.approx((slope, 0.36), rel=1e-10)
     scaled = surface.scaled_to_rms_slope(0.7)
     assert scaled.free and scaled.rms_slope == pytest.approx(0.7, rel=1e-12)
-    for periodic_only in (lambda: surface.refined(2), lambda: boundary_elements(surface, law(0.0).material, 1e-3)):
+    for periodic_only in (lambda: surface.refined(2), lambda: finite_range_solution(surface, law(0.0).material, 1e-3)):
         with pytest.raises(ValueError, match="boundary: 'free'"):
             periodic_only()
     with pytest.raises(ValueError, match="boundary: 'free'"):

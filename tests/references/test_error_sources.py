@@ -9,7 +9,6 @@ from icha.asperity.jkr import JKR
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.figures import fig12_error_sources
 from icha.path.follow import follow
-from icha.references.boundary_elements import NodalState, contact_state, perimeter_correction
 from icha.references.error_sources.chain import (
     CATEGORIES,
     chain,
@@ -21,6 +20,7 @@ from icha.references.error_sources.paraboloids import fourth_order_terms, parabo
 from icha.references.error_sources.spot_by_spot import contact_patches, match
 from icha.references.error_sources.variants import error_sources
 from icha.references.error_sources.without_unions import Discs, discs_apart, independent_discs, union_area_fraction
+from icha.references.finite_range import NodalState, contact_state, perimeter_correction
 from icha.surfaces.summits import Asperities, find_summits
 
 HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)

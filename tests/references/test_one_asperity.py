@@ -1,6 +1,6 @@
 """One asperity by the model and by boundary elements: what the dataset holds.
 
-That the two agree is tested in test_boundary_elements.py, at a Tabor parameter large enough for it.
+That the two agree is tested in test_finite_range.py, at a Tabor parameter large enough for it.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ import icha
 from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.asperity.material import Material
 from icha.datasets.files import read_dataset, write_dataset
-from icha.references.boundary_elements import contact_state, perimeter_correction, states_at_mean_separations
+from icha.references.finite_range import contact_state, perimeter_correction, states_at_mean_separations
 from icha.references.one_asperity import hertz_asperity, one_asperity, paraboloid, resolving_grid
 
 PERIOD = 10.0

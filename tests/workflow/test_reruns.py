@@ -177,7 +177,7 @@ def test_the_style_runs_all_figures(project):
 
 @pytest.mark.slow
 def test_boundary_elements_run_without_the_sweeps(project):
-    add_statement(project / "icha/references/boundary_elements.py")
+    add_statement(project / "icha/references/finite_range.py")
     jobs, _ = planned(project)
     assert jobs["boundary_elements"] == 6
     what_follows = {"model_error", "checks", "verdict", "figure", "report_page"}

@@ -5,13 +5,13 @@ from job import attributes, guarded
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
-from icha.references.loops import boundary_element_loop
+from icha.references.finite_range_loops import finite_range_loop
 
 
 def follow_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
     """Solve for the surface of the file `surface`, scaled to `rms_slope`, both ways, and write it to `output`."""
     scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
-    write_dataset(boundary_element_loop(scaled, Material(**material), **settings).assign_attrs(attributes), output)
+    write_dataset(finite_range_loop(scaled, Material(**material), **settings).assign_attrs(attributes), output)
 
 
 if "snakemake" in globals():

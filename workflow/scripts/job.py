@@ -20,7 +20,7 @@ def _failures_of_solvers():
     names = {
         "icha.simulation": "ConvergenceError",
         "icha.contact.failures": "NotConverged",
-        "icha.references.boundary_elements": "NotSolved",
+        "icha.references.failures": "NotSolved",
     }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
 

@@ -5,13 +5,13 @@ from job import attributes, guarded
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
-from icha.references.boundary_elements import boundary_elements
+from icha.references.finite_range import finite_range_solution
 
 
 def solve_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
     """Solve for the surface of the file `surface`, scaled to `rms_slope`, and write the solution to `output`."""
     scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
-    solution = boundary_elements(scaled, Material(**material), **settings)
+    solution = finite_range_solution(scaled, Material(**material), **settings)
     write_dataset(solution.assign_attrs(attributes), output)
 
 

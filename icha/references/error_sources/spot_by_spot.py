@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import ContactState
-from icha.references.boundary_elements import NodalState, perimeter_correction
 from icha.references.error_sources.chain import CATEGORIES
+from icha.references.finite_range import NodalState, perimeter_correction
 
 
 class Patches(NamedTuple):

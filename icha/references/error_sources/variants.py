@@ -17,13 +17,6 @@ from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import ContactState
 from icha.path.follow import follow
 from icha.path.targets import Path
-from icha.references.boundary_elements import (
-    DEFAULT_TOLERANCE,
-    REFERENCES,
-    NodalState,
-    contact_state,
-    perimeter_correction,
-)
 from icha.references.error_sources.chain import BESIDE, CATEGORIES, CHAIN
 from icha.references.error_sources.paraboloids import (
     circular_curvatures,
@@ -33,6 +26,13 @@ from icha.references.error_sources.paraboloids import (
 )
 from icha.references.error_sources.spot_by_spot import split
 from icha.references.error_sources.without_unions import Discs, discs_apart, independent_discs, union_area_fraction
+from icha.references.finite_range import (
+    DEFAULT_TOLERANCE,
+    REFERENCES,
+    NodalState,
+    contact_state,
+    perimeter_correction,
+)
 from icha.support.rules import REFINEMENT, Integer
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
@@ -76,7 +76,7 @@ def error_sources(
     ------
     ValueError
         If an argument is out of range.
-    icha.references.boundary_elements.NotSolved, icha.contact.failures.NotConverged
+    icha.references.failures.NotSolved, icha.contact.failures.NotConverged
         If a variant was not solved.
     """
     surface.require_periodic("the comparison with boundary elements")

@@ -11,7 +11,7 @@ from icha.asperity.jkr import JKR
 from icha.equilibrium.distributions import contact_cover
 from icha.half_space.ewald import HalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
-from icha.references.boundary_elements import NotSolved
+from icha.references.failures import NotSolved
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import Surface
 

@@ -1,4 +1,6 @@
-"""The same contact by boundary elements: a solution that owes nothing to asperities.
+"""Contact at a finite range of attraction, by boundary elements: Tamaas, which owes nothing to any code of ICHA's.
+
+It comes with the package's extra `tamaas`; nothing outside `icha.references` needs it.
 
 Tamaas (L. Frérot et al., J. Open Source Softw. 5 (2020) 2121, doi:10.21105/joss.02121) minimises the energy of an
 elastic half-space against the nodes of the topography: without adhesion in the pressures, at given load (I. A.
@@ -17,6 +19,7 @@ the energetic one much sooner.
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.fft
@@ -32,6 +35,7 @@ from icha.datasets.bins import bin_values
 from icha.datasets.build import build, of
 from icha.datasets.variables.boundary_elements import SOLUTION
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
+from icha.references.failures import NotSolved
 from icha.support.rules import LENGTH, POSITIVE, REFINEMENT, TOLERANCE
 from icha.surfaces.surface import Surface
 
@@ -54,10 +58,6 @@ REFERENCES = (
     "V. A. Yastrebov, G. Anciaux and J.-F. Molinari, Tribol. Int. 114 (2017) 161-171, "
     "doi:10.1016/j.triboint.2017.04.023"
 )
-
-
-class NotSolved(RuntimeError):
-    """Boundary elements, or a variant between them and the model, did not converge; the message says which."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ class NodalState:
         return elastic - material.surface_energy * self.energetic_area_fraction(material)
 
 
-def boundary_elements(
+def finite_range_solution(
     surface: Surface,
     material: Material,
     reduced_pressure: float,
@@ -392,7 +392,6 @@ def _dataset(surface, material, state, target, tolerance, seed):
     height, unit = surface.rms_height, material.contact_modulus * surface.rms_slope
     area, edges = perimeter_correction(contact)
     nodes = contact.size
-    adhesive = material.surface_energy > 0
     gaps, _ = np.histogram(np.maximum(gap[~contact], 0.0) / height, GAP_BINS)
     inside = state.traction[contact] / unit
     count, _ = np.histogram(inside, PRESSURE_BINS)
@@ -416,29 +415,46 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "contact_perimeter": edges * fine.spacing,
         "outside_pressure": state.outside_pressure,
         "residual": state.residual,
-        "tolerance": tolerance,
         "solve_count": state.solves,
-        "refinement": fine.grid // surface.grid,
-        **of(fine, "grid", "spacing"),
-        "longest_spacing": longest_spacing(material) if adhesive else 0.0,
-        "strength_number": strength_number(material, fine.spacing),
         "gap_density": gaps / nodes / np.diff(GAP_BINS * height),
         **bin_values("gap", GAP_BINS * height),
         "pressure_density": count / nodes / np.diff(PRESSURE_BINS * unit),
         "pressure_bin_mean": np.divide(load, count, out=np.zeros(len(load)), where=count > 0) * unit,
         **bin_values("pressure", PRESSURE_BINS * unit),
         "contact": contact,
+        **asked_for(surface, fine, material, tolerance, seed),
+    }
+    attrs = attributes(
+        material,
+        "Rough contact {} adhesion, boundary elements at finite range",
+        "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
+    )
+    return build(SOLUTION, values, attrs)
+
+
+def asked_for(surface: Surface, fine: Surface, material: Material, tolerance: float, seed: int) -> dict[str, Any]:
+    """Variables of a dataset that say what was solved: surface, its grid of the solution, material and settings."""
+    adhesive = material.surface_energy > 0
+    return {
+        "tolerance": tolerance,
+        "refinement": fine.grid // surface.grid,
+        **of(fine, "grid", "spacing"),
+        "longest_spacing": longest_spacing(material) if adhesive else 0.0,
+        "strength_number": strength_number(material, fine.spacing),
         **of(material, *MATERIAL),
         **of(surface, *ROUGHNESS, "period"),
         "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
         "seed": seed,
     }
-    attrs = discovery(
-        f"Rough contact {'with' if adhesive else 'without'} adhesion, boundary elements",
-        "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
+
+
+def attributes(material: Material, title: str, summary: str) -> dict[str, str]:
+    """Attributes of a dataset by Tamaas; in the title, braces become `with` or `without`."""
+    return discovery(
+        title.format("with" if material.surface_energy > 0 else "without"),
+        summary,
         COMPUTED,
         programs=("tamaas",),
         references=REFERENCES,
         keywords=[BOUNDARY_ELEMENTS],
     )
-    return build(SOLUTION, values, attrs)

@@ -5,8 +5,9 @@ import pytest
 
 import icha
 from icha.asperity.material import Material
-from icha.references.boundary_elements import GapContact, NotSolved
-from icha.references.loops import boundary_element_loop
+from icha.references.failures import NotSolved
+from icha.references.finite_range import GapContact
+from icha.references.finite_range_loops import finite_range_loop
 from icha.references.one_asperity import paraboloid
 
 ROUGH = icha.SelfAffineSpectrum(period=1.0, rolloff_wavelength=0.5, short_wavelength=0.25, hurst=0.8, rms_slope=0.1)
@@ -16,7 +17,7 @@ PERIOD = 8.0
 def loop(surface, material, load, step, **given):
     """A loop to a load in units of E* h'rms."""
     settings = {"tolerance": 1e-8} | given
-    return boundary_element_loop(surface, material, largest_reduced_pressure=load, separation_step=step, **settings)
+    return finite_range_loop(surface, material, largest_reduced_pressure=load, separation_step=step, **settings)
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +133,7 @@ def test_a_gap_open_everywhere_is_solved_to_the_law_of_the_interface():
 def test_wrong_values_are_refused_by_name(name, value):
     given = {"largest_reduced_pressure": 0.01, "separation_step": 0.1} | {name: value}
     with pytest.raises(ValueError, match=name):
-        boundary_element_loop(paraboloid(32, PERIOD), Material(1.0, 1.0, 2.5), **given)
+        finite_range_loop(paraboloid(32, PERIOD), Material(1.0, 1.0, 2.5), **given)
 
 
 def test_a_range_that_the_grid_does_not_resolve_is_refused():

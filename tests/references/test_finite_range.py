@@ -11,11 +11,11 @@ from small_rough_solution import MATERIALS, PRESSURE
 
 from icha.asperity.cohesive_zone import longest_spacing, strength_number
 from icha.asperity.material import Material
-from icha.references.boundary_elements import (
+from icha.references.failures import NotSolved
+from icha.references.finite_range import (
     LOAD_TOLERANCE,
-    NotSolved,
-    boundary_elements,
     contact_state,
+    finite_range_solution,
     perimeter_correction,
     states_at_mean_separations,
 )
@@ -140,7 +140,7 @@ def test_full_contact_is_johnsons():
     surface = wavy(64, 2)
     flattening = HERTZ.contact_modulus / 2 * surface.heights
     pressure = 1.1 * np.abs(flattening).max()
-    solution = boundary_elements(surface, HERTZ, pressure / (HERTZ.contact_modulus * surface.rms_slope))
+    solution = finite_range_solution(surface, HERTZ, pressure / (HERTZ.contact_modulus * surface.rms_slope))
     state = contact_state(surface, HERTZ, pressure / (HERTZ.contact_modulus * surface.rms_slope))
     assert solution.contact_area_fraction == solution.contact_area_fraction_raw == 1
     np.testing.assert_allclose(state.traction, pressure + flattening, rtol=0, atol=1e-6 * pressure)
@@ -152,7 +152,7 @@ def test_perimeter_correction_takes_the_excess_of_hertzian_areas_away():
     raw, corrected = [], []
     for radius in np.linspace(0.7, 0.8, 9):
         reduced = 4 / 3 * radius**3 / surface.period**2 / surface.rms_slope
-        solution = boundary_elements(surface, hertz, reduced)
+        solution = finite_range_solution(surface, hertz, reduced)
         exact = np.pi * radius**2 / surface.period**2
         raw.append(float(solution.contact_area_fraction_raw) / exact - 1)
         corrected.append(float(solution.contact_area_fraction) / exact - 1)
@@ -176,7 +176,7 @@ def rough(request):
     """A small rough surface with and without adhesion, one of its states, and the dataset of the same."""
     surface, material = small_rough_solution.surface(), MATERIALS[request.param]
     state = contact_state(surface, material, PRESSURE, refinement=2)
-    return surface, material, state, boundary_elements(surface, material, PRESSURE, refinement=2, seed=3)
+    return surface, material, state, finite_range_solution(surface, material, PRESSURE, refinement=2, seed=3)
 
 
 def test_state_is_in_equilibrium(rough):
@@ -266,7 +266,7 @@ def test_range_that_the_grid_does_not_resolve_is_refused_with_the_numbers():
     short = Material(25e6, 0.05, 2.071e-9)
     lines = []
     with pytest.raises(ValueError, match=r"^interaction_range: a range of 2\.071e-09 m is not resolved") as refused:
-        boundary_elements(surface, short, PRESSURE, progress=lines.append)
+        finite_range_solution(surface, short, PRESSURE, progress=lines.append)
     numbers = (
         f"{longest_spacing(short):.3g}",
         f"{strength_number(short, surface.spacing):.3g}",
@@ -290,7 +290,7 @@ def test_range_that_the_grid_does_not_resolve_is_refused_with_the_numbers():
 def test_wrong_arguments_are_named(wrong, name):
     arguments = {"reduced_pressure": PRESSURE} | wrong
     with pytest.raises(ValueError, match=f"^{name}: "):
-        boundary_elements(small_rough_solution.surface(), MATERIALS["hertz"], **arguments)
+        finite_range_solution(small_rough_solution.surface(), MATERIALS["hertz"], **arguments)
 
 
 def test_mean_separations_need_adhesion_and_are_positive():
@@ -302,19 +302,19 @@ def test_mean_separations_need_adhesion_and_are_positive():
 
 
 def test_solver_that_does_not_converge_is_an_error(monkeypatch):
-    monkeypatch.setattr("icha.references.boundary_elements._MAX_ITERATIONS", 3)
+    monkeypatch.setattr("icha.references.finite_range._MAX_ITERATIONS", 3)
     with pytest.raises(NotSolved, match=r"did not converge: error .*, tolerance 1e-08"):
-        boundary_elements(small_rough_solution.surface(), MATERIALS["hertz"], PRESSURE)
+        finite_range_solution(small_rough_solution.surface(), MATERIALS["hertz"], PRESSURE)
 
 
 def test_load_that_no_mean_gap_carries_is_an_error(monkeypatch):
-    monkeypatch.setattr("icha.references.boundary_elements._MAX_SOLVES", 1)
+    monkeypatch.setattr("icha.references.finite_range._MAX_SOLVES", 1)
     with pytest.raises(NotSolved, match=r"no mean gap was found that carries the load: 1 tries"):
-        boundary_elements(small_rough_solution.surface(), MATERIALS["adhesive"], PRESSURE)
+        finite_range_solution(small_rough_solution.surface(), MATERIALS["adhesive"], PRESSURE)
 
 
 def test_same_bytes_in_another_process_with_more_threads():
-    here = boundary_elements(small_rough_solution.surface(), MATERIALS["adhesive"], PRESSURE)
+    here = finite_range_solution(small_rough_solution.surface(), MATERIALS["adhesive"], PRESSURE)
     other = subprocess.run(
         [sys.executable, small_rough_solution.__file__],
         env=os.environ | {"OMP_NUM_THREADS": "2"},
@@ -328,7 +328,7 @@ def test_same_bytes_in_another_process_with_more_threads():
 def test_area_without_adhesion_does_not_depend_on_the_slope():
     """One topography, scaled: the same area and reduced separation at the same reduced pressure."""
     steep, flat = (
-        boundary_elements(small_rough_solution.surface().scaled_to_rms_slope(slope), HERTZ, PRESSURE)
+        finite_range_solution(small_rough_solution.surface().scaled_to_rms_slope(slope), HERTZ, PRESSURE)
         for slope in (1.0, 0.2)
     )
     assert flat.contact_area_fraction == pytest.approx(float(steep.contact_area_fraction), rel=1e-6)

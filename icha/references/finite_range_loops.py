@@ -1,4 +1,4 @@
-"""Boundary elements with adhesion both ways: from apart down to a load and up again until apart.
+"""Boundary elements at a finite range of attraction both ways: from apart to a load and back until apart.
 
 The mean gap is what is given, as in a stiff machine. Every solution starts from the one before and so stays on its
 branch until that ends; there the surfaces jump, and what the jump frees is lost. Between jumps the work done on the
@@ -14,17 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from icha.asperity.cohesive_zone import longest_spacing, strength_number
 from icha.asperity.material import Material
-from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
-from icha.datasets.build import build, of
+from icha.datasets.build import build
 from icha.datasets.variables.boundary_elements import LOOP
-from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
-from icha.references.boundary_elements import (
+from icha.references.failures import NotSolved
+from icha.references.finite_range import (
     DEFAULT_TOLERANCE,
-    REFERENCES,
     GapContact,
-    NotSolved,
+    asked_for,
+    attributes,
     perimeter_correction,
     resolved,
     silent,
@@ -47,7 +45,7 @@ _MAX_MEETING = 12
 _MAX_SOLVES = 5000
 
 
-def boundary_element_loop(
+def finite_range_loop(
     surface: Surface,
     material: Material,
     *,
@@ -62,13 +60,10 @@ def boundary_element_loop(
 
     Parameters
     ----------
-    surface, material : as for `icha.simulate`; with adhesion, traction decays over `material.interaction_range`.
+    surface, material, refinement, tolerance, seed, progress : as for
+        `icha.references.finite_range.finite_range_solution`.
     largest_reduced_pressure : p/(E* h'_rms) at which the way turns, positive. A jump may carry the load beyond it.
     separation_step : largest step of the mean gap, in h_rms; steps with jumps are taken in up to 32 smaller ones.
-    refinement : nodes per node of the surface's grid, along a side.
-    tolerance : relative error at which the solver may stop.
-    seed : recorded in the dataset.
-    progress : called with lines of text.
 
     Returns
     -------
@@ -262,14 +257,13 @@ def _unknown_place(records):
 
 
 def _dataset(surface, way, legs, separation_step, seed):
-    material, fine = way.material, way.fine
+    material = way.material
     records = [*legs[0], *legs[1]]
     along = {name: _column(records, name) for name in _Record.__annotations__}
     leg = np.repeat([0, 1], [len(one) for one in legs])
     work = np.concatenate([[0.0], np.cumsum(_work(records))])
     pressure, separation, unit = along["pressure"], along["separation"], material.contact_modulus * surface.rms_slope
     last = len(legs[0]) + int(np.argmin(pressure[leg == 1]))
-    adhesive = material.surface_energy > 0
     values = {
         "step": np.arange(len(records)),
         "mean_separation": separation,
@@ -292,23 +286,12 @@ def _dataset(surface, way, legs, separation_step, seed):
         "largest_contact_area_fraction": along["area"].max(),
         "separation_step": separation_step,
         "solve_count": way.contact.solves,
-        "tolerance": way.tolerance,
-        "refinement": fine.grid // surface.grid,
-        **of(fine, "grid", "spacing"),
-        "longest_spacing": longest_spacing(material) if adhesive else 0.0,
-        "strength_number": strength_number(material, fine.spacing),
-        **of(material, *MATERIAL),
-        **of(surface, *ROUGHNESS, "period"),
-        "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
-        "seed": seed,
+        **asked_for(surface, way.fine, material, way.tolerance, seed),
         "branch": np.array(["loading", "unloading"], dtype=object)[leg],
     }
-    attrs = discovery(
-        f"Rough contact {'with' if adhesive else 'without'} adhesion both ways, boundary elements",
+    attrs = attributes(
+        material,
+        "Rough contact {} adhesion both ways, boundary elements at finite range",
         "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
-        COMPUTED,
-        programs=("tamaas",),
-        references=REFERENCES,
-        keywords=[BOUNDARY_ELEMENTS],
     )
     return build(LOOP, values, attrs)
