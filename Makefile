@@ -14,13 +14,14 @@ export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment slurm-environment run validation hysteresis test test-all lint format schema docs linkcheck benchmarks benchmarks-page faults validators-environment validate clean
+.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all lint format schema docs linkcheck benchmarks benchmarks-page faults validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
 	@echo "make publish make the deposit of that campaign, and before it what is missing; docs/howto/publish.md"
 	@echo "make validation  run campaign validation (an hour) and write docs/validation.md and docs/error_sources.md from it"
 	@echo "make hysteresis  run campaign hysteresis (twenty minutes) and write docs/hysteresis.md from it"
+	@echo "make tamaas  install Tamaas as well, for boundary elements at finite ranges (campaign validation, tests)"
 	@echo "make test    run the tests that one waits for (four minutes): physics, every rule, wrong input"
 	@echo "make test-all  run them and all others: thousands of random cases, kills, resumption, Slurm, browser, deposits"
 	@echo "make lint    check style of Python code and workflow"
@@ -43,12 +44,19 @@ environment: .venv/.installed
 	.venv-tools/bin/python -m pip install --quiet uv==$(UV_VERSION)
 
 .venv/.installed: .venv-tools/bin/uv pyproject.toml uv.lock
+	.venv-tools/bin/uv sync --quiet --locked $(if $(wildcard .venv/.tamaas),,--no-group tamaas) --python $(PYTHON)
+	@touch $@
+
+# What is there once stays there.
+.venv/.tamaas: .venv/.installed
 	.venv-tools/bin/uv sync --quiet --locked --python $(PYTHON)
 	@touch $@
 
+tamaas: .venv/.tamaas
+
 # An environment of its own, for what Snakemake needs to talk to Slurm slows every start. See docs/howto/cluster.md.
 .venv-slurm/.installed: .venv-tools/bin/uv pyproject.toml uv.lock profiles/slurm/executor/pyproject.toml
-	UV_PROJECT_ENVIRONMENT=$(CURDIR)/.venv-slurm .venv-tools/bin/uv sync --quiet --locked --no-default-groups --extra slurm --python $(PYTHON)
+	UV_PROJECT_ENVIRONMENT=$(CURDIR)/.venv-slurm .venv-tools/bin/uv sync --quiet --locked --no-default-groups --extra slurm --extra tamaas --python $(PYTHON)
 	.venv-tools/bin/uv pip install --quiet --no-deps --python .venv-slurm/bin/python --editable profiles/slurm/executor
 	@touch $@
 
@@ -60,18 +68,18 @@ run: environment
 publish: environment
 	@icha run $(CONFIG) publish --cores $(CORES)
 
-validation hysteresis: environment
+validation hysteresis: tamaas
 	$(MAKE) run CONFIG=config/campaigns/$@.yaml
 	python docs/write_pages.py $@
 
-test: environment
+test: tamaas
 	pytest -n $(CORES) --dist worksteal -m "not slow"
 
 # Tests of random cases are run again, with more of them.
 test-all: test
 	pytest -n $(CORES) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough
 
-lint: environment
+lint: tamaas
 	ruff check .
 	ruff format --check .
 	lint-imports
@@ -100,14 +108,14 @@ linkcheck: environment
 	-.venv-tools/bin/uv pip install --quiet --python .venv-benchmarks/bin/python -r benchmarks/requirements-aspher.txt
 	@touch $@
 
-benchmarks: environment .venv-benchmarks/.installed
+benchmarks: tamaas .venv-benchmarks/.installed
 	python benchmarks/run.py $(OPTIONS)
 	python benchmarks/page.py
 
 benchmarks-page: environment
 	python benchmarks/page.py
 
-faults: environment
+faults: tamaas
 	python benchmarks/faults.py $(OPTIONS)
 	python benchmarks/faults_page.py
 

@@ -1,7 +1,10 @@
 # ICHA: adhesive rough contact by interacting and coalescing asperities.
 # One configuration file is one campaign: config/config.yaml, or that of --configfile. See config/README.md.
 
+from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import min_version
+
+from icha.planning.software import missing_software
 
 min_version("9.14")
 
@@ -25,6 +28,8 @@ if workflow.is_main_process:
 onstart:
     here.refuse_second()
     here.refuse_unwritable()
+    if DeploymentMethod.CONDA not in workflow.deployment_settings.deployment_method:
+        here.refuse_without(missing_software(CAMPAIGN))
 
 
 # On a cluster these are run where Snakemake runs, and not submitted: targets, and what is soon done.

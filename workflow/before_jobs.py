@@ -74,6 +74,12 @@ class Campaign:
                 f"first."
             )
 
+    @staticmethod
+    def refuse_without(missing: str | None) -> None:
+        """End the program with a message if software is missing that the campaign needs."""
+        if missing:
+            raise SystemExit(f"{missing} Nothing was computed.")
+
     def refuse_unwritable(self) -> None:
         """End the program with a message if jobs could not write their results."""
         for folder in (self.results, ".snakemake"):

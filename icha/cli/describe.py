@@ -27,6 +27,7 @@ def describe(
     from rich.console import Console
 
     from icha.planning.plan import plan
+    from icha.planning.software import missing_software
     from icha.support.checksums import damaged
 
     path = configuration_path(config)
@@ -41,6 +42,8 @@ def describe(
     if runs:
         _list(console, items)
     _summary(console, items, spoilt, count)
+    if missing := missing_software(campaign):
+        console.print(f"[red]missing:[/] {missing}", highlight=False, soft_wrap=True)
 
 
 def _count(cores: str | None) -> int:

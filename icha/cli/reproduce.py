@@ -137,7 +137,7 @@ def _targets(runs: list[str], campaign: str) -> list[str]:
 
 def _program(project: Path, folder: Path, environment: str) -> tuple[list[str], dict[str, str]]:
     """The command `icha` of the deposit's source in the environment that is asked for, and its variables."""
-    from icha.publication.rerun import surroundings
+    from icha.publication.rerun import environment_target, surroundings
 
     if environment == "here":
         from icha.publication.environment import differences
@@ -155,7 +155,7 @@ def _program(project: Path, folder: Path, environment: str) -> tuple[list[str], 
     with log.open("w", encoding="utf-8") as said:
         try:
             status = _call(
-                ["make", "environment", f"PYTHON={python}"],
+                ["make", environment_target(project), f"PYTHON={python}"],
                 cwd=project,
                 env=surroundings(),
                 stdin=subprocess.DEVNULL,

@@ -19,6 +19,7 @@ from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.planning.costs import Cost
+from icha.planning.software import further_software
 from icha.publication.attributes import acknowledgement
 from icha.publication.citation import paragraphs, web_address
 from icha.publication.deposit_files import COMPUTED
@@ -176,6 +177,7 @@ def _asked(campaign: Campaign) -> dict:
         "grids": _known_of(surfaces, campaign.grid, str),
         "adhesive": any(material.surface_energy > 0 for material in campaign.materials.values()),
         "both_ways": any(study.unload or study.turning_points for study in campaign.studies.values()),
+        "installed": (*further_software(campaign), "environment")[0],
         "free": any(campaign.boundary(name) == "free" for name in campaign.surfaces),
     }
 

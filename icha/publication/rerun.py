@@ -3,6 +3,7 @@
 import contextlib
 import difflib
 import os
+import re
 import shutil
 import sys
 import textwrap
@@ -14,6 +15,7 @@ import netCDF4
 import yaml
 
 from icha.datasets.results import CONFIGURATION
+from icha.planning.software import BY_TAMAAS, TAMAAS
 from icha.publication.deposit_files import CHECKSUMS, read_file
 from icha.support.in_words import counted
 
@@ -157,6 +159,13 @@ def _copy_files(source: Path, target: Path) -> None:
         if file.is_file():
             (target / file.relative_to(source)).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(file, target / file.relative_to(source))
+
+
+def environment_target(project: Path) -> str:
+    """The target of the project's Makefile that installs all that its campaign needs; older ones have one for all."""
+    asked = yaml.safe_load((project / CONFIGURATION).read_text(encoding="utf-8"))
+    has_it = re.search(rf"^{TAMAAS}:", (project / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    return TAMAAS if has_it and any(asked.get(section) for section in BY_TAMAAS) else "environment"
 
 
 def surroundings() -> dict[str, str]:

@@ -25,7 +25,7 @@ from icha.report.surfaces import sources, spectra, surface_row
 from icha.report.template import MOST_ROWS, template
 from icha.support.atomic_files import whole_file
 
-SOFTWARE = ("icha", "numpy", "scipy", "finufft", "tamaas", "xarray", "netCDF4", "matplotlib", "snakemake")
+SOFTWARE = ("icha", "numpy", "scipy", "finufft", "xarray", "netCDF4", "matplotlib", "snakemake")
 
 # Tables with more rows are folded up.
 _FOLDED = 30
@@ -57,6 +57,7 @@ def write_report(
     files: Mapping[str, str | os.PathLike] = {},
     results: str | os.PathLike | None = None,
     citations: Sequence[str] = (),
+    further_software: Sequence[str] = (),
 ) -> None:
     """Write the report.
 
@@ -76,6 +77,7 @@ def write_report(
     files : further files to be linked, by what they are called.
     results : the folder of the campaign's results, in which the runs and surfaces lie, to be linked.
     citations : further sources to cite, such as those of measurements.
+    further_software : packages that the campaign needs besides those that every campaign needs.
     """
     folder = Path(path).parent
     checks, surfaces = list(checks), list(surfaces)
@@ -114,7 +116,7 @@ def write_report(
         paper=MODEL_PAPER.line,
         citations=citations,
         references=_references(campaign, model_error),
-        software={name: _version(name) for name in SOFTWARE},
+        software={name: _version(name) for name in (*SOFTWARE, *further_software)},
     )
     with whole_file(path) as temporary:
         temporary.write_text(page, encoding="utf-8")

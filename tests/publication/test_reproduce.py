@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 from icha.cli import app
 from icha.publication.deposit_files import verify_deposit
+from icha.publication.rerun import environment_target
 
 NAME = "mine-1.0.0"
 SOFT, HARD = "load/rough/seed1/slope1/soft", "load/rough/seed2/slope1/hard"
@@ -140,6 +141,21 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, made, r
     assert "identical: 6 files, every value" in said and "made dataset/mine.nc" in said
     assert list(reproduce.temporary.iterdir()) == []
     assert verify_deposit(deposit) == [] and {path: path.stat().st_mtime_ns for path in made.rglob("*")} == before
+
+
+@pytest.mark.parametrize(
+    ("asked", "targets", "target"),
+    [
+        ("name: mine\nboundary_elements: {truth: {study: load}}\n", "environment tamaas", "tamaas"),
+        ("name: mine\n", "environment tamaas", "environment"),
+        # Of a program that installed all for everybody.
+        ("name: mine\nboundary_elements: {truth: {study: load}}\n", "environment", "environment"),
+    ],
+)
+def test_the_environment_is_the_one_that_the_campaign_needs(asked, targets, target, tmp_path):
+    (tmp_path / "config.used.yaml").write_text(asked)
+    (tmp_path / "Makefile").write_text("".join(f"{each}:\n\t@true\n" for each in targets.split()))
+    assert environment_target(tmp_path) == target
 
 
 def test_nothing_of_the_caller_s_environment_gets_in(made, reproduce, tmp_path, monkeypatch):

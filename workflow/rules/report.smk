@@ -1,6 +1,8 @@
 # report.html: figures, tables, parameters and checks on one page. Times differ from one execution to the next, so
 # they stand in a table of their own, run_times.tsv, and the page has the same bytes for the same data.
 
+from icha.planning.software import further_software
+
 
 rule report_page:
     input:
@@ -27,6 +29,7 @@ rule report_page:
         figures={name: CAMPAIGN.figures.studies_of(name, CAMPAIGN) for name in CAMPAIGN.figures.drawn()},
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         benchmarks=f"{RESULTS}/benchmarks",
+        further_software=further_software(CAMPAIGN),
         code=code_of("make_report.py", *(f"icha.figures.{name}" for name in CAMPAIGN.figures.drawn())),
     message:
         "Report"

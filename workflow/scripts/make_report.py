@@ -35,6 +35,7 @@ if "snakemake" in globals():
             files=linked | ({"Error of the model": model_error} if model_error else {}),
             results=Path(page).parent,
             citations=params.citations,
+            further_software=params.further_software,
             times_path=times_page,
         )
         write_times(snakemake.output.times, times_page, params.benchmarks)
