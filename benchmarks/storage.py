@@ -176,7 +176,7 @@ def seeds(run):
             if name not in ("snapshot_target", "step_target")
         }
         changed["seed"] = ((), seed, run["seed"].attrs)
-        yield RunLabels("study", "rough", seed, 1.0, "soft"), run.assign(changed)
+        yield RunLabels("study", "asperities", "rough", seed, 1.0, "soft"), run.assign(changed)
 
 
 def main() -> None:

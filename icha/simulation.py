@@ -1,5 +1,6 @@
 """One sweep of one surface and one material, loading and unloading, as a labelled dataset."""
 
+import importlib
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -7,21 +8,19 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.contact.events import Events
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel
+from icha.contact.models import ASPERITIES, MODELS
 from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.bins import bin_values
 from icha.datasets.build import build, described, joined, of, stacked
-from icha.datasets.model_paper import MODEL_PAPER
-from icha.datasets.variables.run import CYCLE, LOOP, RUN
-from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
-from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.equilibrium.observables import AsperityObservables
+from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
+from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
+from icha.models.model import Model
 from icha.path.follow import follow
 from icha.path.hysteresis import hysteresis
 from icha.path.limits import MAX_REDUCED_PRESSURE
@@ -29,7 +28,6 @@ from icha.path.targets import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
 from icha.path.waypoints import Waypoint
 from icha.support.rules import Integer
 from icha.surfaces.moments import spectral_moments
-from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
 
 # Snapshots farther up, in h_rms, would not fit the bins of the gap.
@@ -38,12 +36,7 @@ _HIGHEST_SNAPSHOT = 20.0
 # The snapshot of the largest tension on the way back.
 PULL_OFF = "pull_off"
 
-REFERENCES = (
-    f"{MODEL_PAPER.line}; "
-    "L. Afferrante, G. Carbone and G. Demelio, Wear 278-279 (2012) 28-33, doi:10.1016/j.wear.2011.12.013; "
-    "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303; "
-    "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
-)
+_OF_STICKINESS = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
 
 
 class ConvergenceError(RuntimeError):
@@ -67,6 +60,7 @@ def simulate(
     material: Material,
     path: Path,
     *,
+    model: str = ASPERITIES,
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
@@ -75,38 +69,43 @@ def simulate(
     Parameters
     ----------
     surface, material, path : what is pressed against what, and how far.
+    model : "asperities", or "boundary_elements" in the limit of a short range of attraction, which is slower and needs
+        a periodic surface.
     seed : recorded in the dataset; -1 for a surface without one.
     progress : called with a line of text at every stop.
 
     Returns
     -------
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable carries units and
-    a long name. A path that goes on after the first loading has all its equilibria as steps, and a dimension event.
+    a long name. A path that goes on after the first loading has all its equilibria as steps, and a dimension event. The
+    attribute `contact_model` names the model; boundary elements have dimensions row and column, besides.
 
     Raises
     ------
     ValueError
-        If an argument is of the wrong type, a target lies beyond what the model covers on this surface, or the
-        surface has no summits.
+        If an argument is of the wrong type, there is no such model, a target lies beyond what the model covers on this
+        surface, or the surface has no summits or cannot be computed by the model.
     ConvergenceError
         If an equilibrium is not found or a target cannot be reached; its `dataset` holds the stops before.
     """
     _check_arguments(surface, material, path)
+    chosen = _model(model)
+    table = RUN | FURTHER[model]
     seed = Integer(-1).checked("seed", seed)
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
-        contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, path.united_until)
-        observables = AsperityObservables(contact, surface)
+        observables = chosen.observables(surface, material, path)
         pressure_unit = material.contact_modulus * surface.rms_slope
-        met = _followed(contact, observables, path, pressure_unit, progress)
+        met = _followed(observables, path, pressure_unit, progress)
         values = {
-            **_of_path(path, met),
+            **_of_path(table, path, met, surface.grid),
+            "united_until": path.united_until if chosen.united_by_rule else "",
             **_of_surface(surface, material, seed),
             **observables.of_contact(),
             **bin_values("gap", GAP_BINS * surface.rms_height),
             **bin_values("pressure", PRESSURE_BINS * pressure_unit),
         }
-        dataset = build(RUN | CYCLE, values, _attributes(surface, material, path))
+        dataset = build(table | CYCLE, values, _attributes(surface, material, path, model, chosen))
     if met.failure:
         raise ConvergenceError(met.failure, dataset.assign_attrs(incomplete=met.failure)) from None
     if path.unload:
@@ -114,6 +113,13 @@ def simulate(
         loop = hysteresis(met.steps, pull_off, material, observables.largest_tension)
         dataset = dataset.assign(described(LOOP, loop))
     return dataset
+
+
+def _model(name: str) -> Model:
+    """The model of a name. Only its own module is imported: what another is made of does not concern a run."""
+    if name not in MODELS:
+        raise ValueError(f"model: {name!r} must be one of {', '.join(MODELS)}")
+    return importlib.import_module(f"icha.models.{name}").MODEL
 
 
 def _check_arguments(surface, material, path):
@@ -146,7 +152,8 @@ class _Met(NamedTuple):
     failure: str
 
 
-def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
+def _followed(observables, path, pressure_unit, progress) -> _Met:
+    contact = observables.contact
     steps, snapshots, events, failure = [], [], [], ""
     before = pulled = None
 
@@ -204,12 +211,12 @@ def _step(contact: ContactModel, waypoint: Waypoint, pressure_unit: float) -> di
     }
 
 
-def _of_path(path: Path, met: _Met) -> dict:
+def _of_path(table: Table, path: Path, met: _Met, grid: int) -> dict:
     """The path, and what was met on it: rows as arrays, spots and events one after the other."""
-    sizes = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
-    values = {"control": path.control, "united_until": path.united_until}
-    values |= stacked(RUN, met.steps, "step") | stacked(RUN, met.snapshots, "snapshot", sizes)
-    values |= joined(RUN, met.snapshots, "spot", "snapshot")
+    sizes = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1, "row": grid, "column": grid}
+    values = {"control": path.control}
+    values |= stacked(table, met.steps, "step") | stacked(table, met.snapshots, "snapshot", sizes)
+    values |= joined(table, met.snapshots, "spot", "snapshot")
     if not path.cyclic:
         return values
     counts, events = [len(each) for each in met.events], Events.joined(met.events)
@@ -240,14 +247,14 @@ def _of_surface(surface: Surface, material: Material, seed: int) -> dict:
     }
 
 
-def _attributes(surface, material, path):
+def _attributes(surface, material, path, name, model):
     attributes = discovery(
-        f"Rough contact {'with' if material.surface_energy > 0 else 'without'} adhesion, ICHA model",
+        f"Rough contact {'with' if material.surface_energy > 0 else 'without'} adhesion, {model.title}",
         f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "
         f"{'periodic rough surface' if not surface.free else 'single rough square'} against an "
-        "elastic half-space by interacting and coalescing asperities with JKR adhesion and jump into contact.",
+        f"elastic half-space by {model.method}.",
         COMPUTED,
-        references=REFERENCES,
+        references=f"{model.references}; {_OF_STICKINESS}",
     )
     # Those of a run of a campaign are filled in by the campaign.
-    return attributes | dict.fromkeys(("campaign", "study", "config_sha256", "license"), "")
+    return attributes | {"contact_model": name} | dict.fromkeys(("campaign", "study", "config_sha256", "license"), "")

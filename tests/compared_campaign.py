@@ -19,7 +19,7 @@ GRID = 96
 def runs():
     path = icha.Path(reduced_pressures=PRESSURES, snapshots=[("reduced_pressure", p) for p in PRESSURES], max_step=0.2)
     return {
-        RunLabels("one", "rough", seed, 1.0, material): icha.simulate(
+        RunLabels("one", "asperities", "rough", seed, 1.0, material): icha.simulate(
             small.surface(seed), small.MATERIALS[material], path, seed=seed
         )
         for seed, material in itertools.product((1, 2, 3), ("soft", "hertz"))
@@ -53,7 +53,10 @@ def own_solution(run, pressure, *, area=1.0, separation=1.0):
 def solutions(entry="truth", keep=lambda labels: True, *, area=lambda labels: 1.0, separation=1.0):
     """Solutions of all runs that `keep` names, at all loads; `area` is a function of the run's labels."""
     return [
-        (SolutionLabels(entry, *labels, p), own_solution(run, p, area=area(labels), separation=separation))
+        (
+            SolutionLabels(entry, labels.study, *labels[2:], p),
+            own_solution(run, p, area=area(labels), separation=separation),
+        )
         for labels, run in runs().items()
         if keep(labels)
         for p in PRESSURES

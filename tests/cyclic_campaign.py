@@ -127,7 +127,7 @@ def runs():
     """Of a study with ways back of different lengths, and of one that only loads."""
     between = {(1, "soft"): 1, (1, "hertz"): 0, (2, "soft"): 4, (2, "hertz"): 3}
     loops = {
-        RunLabels("loops", "rough", seed, 1.0, material): run(seed, material, count)
+        RunLabels("loops", "asperities", "rough", seed, 1.0, material): run(seed, material, count)
         for (seed, material), count in between.items()
     }
     return loops | {labels: run for labels, run in small.runs() if labels.study == "single"}

@@ -30,7 +30,7 @@ PUBLISHED = {
     "creator_type": "person; person",
     "product_version": "1.0.0",
 }
-LOOP = RunLabels("loops", "rough", 1, 1.0, "soft")
+LOOP = RunLabels("loops", "asperities", "rough", 1, 1.0, "soft")
 
 
 def cycle():

@@ -176,7 +176,7 @@ def run(material="sticky", rms_slope=1.0, seed=1, depth=0.5):
 def study(name, materials=("sticky", "hertz"), slopes=(1.0, 0.5), seeds=(1, 2), depth=0.5):
     """Labels and runs of a study."""
     return [
-        (RunLabels(name, "rough", seed, slope, material), run(material, slope, seed, depth))
+        (RunLabels(name, "asperities", "rough", seed, slope, material), run(material, slope, seed, depth))
         for seed in seeds
         for slope in slopes
         for material in materials

@@ -27,8 +27,10 @@ def run(seed=1, rms_slope=1.0, material="soft"):
 
 @cache
 def runs():
-    labels = [RunLabels("slopes", "rough", 1, slope, name) for slope in (1.0, 0.2) for name in ("soft", "hertz")]
-    labels += [RunLabels("single", "rough", seed, 1.0, "soft") for seed in (2, 1)]
+    labels = [
+        RunLabels("slopes", "asperities", "rough", 1, slope, name) for slope in (1.0, 0.2) for name in ("soft", "hertz")
+    ]
+    labels += [RunLabels("single", "asperities", "rough", seed, 1.0, "soft") for seed in (2, 1)]
     return tuple((each, run(each.seed, each.rms_slope, each.material)) for each in labels)
 
 

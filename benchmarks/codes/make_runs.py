@@ -18,7 +18,10 @@ SLOPES = (0.5, 1.0)
 
 def labels(count: int) -> list[RunLabels]:
     """Of every seed four runs: two slopes, two materials."""
-    return [RunLabels("many", "rough", 1 + k // 4, SLOPES[k // 2 % 2], list(MATERIALS)[k % 2]) for k in range(count)]
+    return [
+        RunLabels("many", "asperities", "rough", 1 + k // 4, SLOPES[k // 2 % 2], list(MATERIALS)[k % 2])
+        for k in range(count)
+    ]
 
 
 def main() -> None:

@@ -56,10 +56,11 @@ def _command(name, command):
 
 def run_variables() -> str:
     """The variables of a run's file: of every run, of one that turns back, of one that ends in separation."""
-    from icha.datasets.variables.run import CYCLE, LOOP, RUN
+    from icha.datasets.variables.run import CYCLE, LOOP, PATCHES, RUN
 
     sections = {
         "Of every run": RUN,
+        "Of a run by boundary elements": PATCHES,
         "Of a run that turns back": CYCLE,
         "Of a run that ends in separation": LOOP,
     }
@@ -68,6 +69,7 @@ def run_variables() -> str:
 
 def campaign_variables() -> str:
     """The variables that a campaign dataset has beside those of its runs, and what each depends on."""
+    from icha.datasets.labels import LABELS
     from icha.datasets.variables.run import CYCLE, LOOP, RUN
 
     study = _small_campaign()["study"].to_dataset()
@@ -78,13 +80,13 @@ def campaign_variables() -> str:
         for name in of_runs
         if name in study and name not in study.dims and not {"spot", "event"} & set(study[name].dims)
     }
-    everything = {"surface, seed, rms_slope, material"}
+    everything = {", ".join(LABELS)}
     fewer = {}
     for name, along in shared.items():
         if along not in everything:
             fewer.setdefault(along, []).append(f"`{name}`")
     lines = [f"- along {along}: {', '.join(names)}" for along, names in fewer.items()]
-    return _table(_rows_of(own)) + "\nAlong fewer than the four labels:\n\n" + "\n".join(lines) + "\n"
+    return _table(_rows_of(own)) + "\nAlong fewer than the five labels:\n\n" + "\n".join(lines) + "\n"
 
 
 def comparison_variables() -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from icha.analysis.model_error import run_of_same_contact
+from icha.contact.models import ASPERITIES
 from icha.datasets.campaign import run_labels, select_run
 from pages.tables import Table, means
 
@@ -25,7 +26,12 @@ def _cells(study):
     """Rms slope, material, and the study's part that they name."""
     for slope in study["rms_slope"].values:
         for material in study["material"].values:
-            yield float(slope), str(material), study.sel(rms_slope=slope, material=material).isel(surface=0)
+            yield float(slope), str(material), _shown(study, slope).sel(material=material)
+
+
+def _shown(study, slope):
+    """The part of a study by asperities, on its first surface at a slope."""
+    return study.sel(model=ASPERITIES, rms_slope=slope).isel(surface=0)
 
 
 def _adhesive(study):
@@ -98,7 +104,7 @@ def common_slope(studies: Sequence[xr.Dataset]) -> float:
 def largest_loads(studies: Sequence[xr.Dataset]) -> Table:
     """Pull-off and loss against the largest load, for the first slope that all studies have."""
     slope = common_slope(studies)
-    studies = [study.sel(rms_slope=slope).isel(surface=0) for study in studies]
+    studies = [_shown(study, slope) for study in studies]
     studies.sort(key=lambda study: float(study["largest_reduced_pressure"].mean()))
     head = ["Δγ, mJ/m²", "", *(f"p\\* = {float(s['largest_reduced_pressure'].mean()):.2g}" for s in studies), ""]
     rows = []
@@ -147,7 +153,7 @@ def controls(separation: xr.Dataset, load: xr.Dataset) -> Table:
     rows = []
     for slope, material, one in _cells(_adhesive(load)):
         one = one.isel(seed=0)
-        other = separation.sel(rms_slope=slope, material=material, seed=int(one["seed"])).isel(surface=0)
+        other = _shown(separation, slope).sel(material=material, seed=int(one["seed"]))
         row = [_energy(one)]
         for name, form in (
             ("pull_off_pressure", "{:.4g}"),
@@ -163,7 +169,8 @@ def elements(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) -> 
     """Boundary elements both ways, and the study's run of the same contact."""
     head = ["", "A/A₀ at the largest load", "pull-off, Pa", "at ū/h_rms", "loss, µJ/m²", "loss/Δγ"]
     rows = []
-    runs = {labels: select_run(campaign, labels) for labels in run_labels(campaign) if labels.study == study}
+    shown = [labels for labels in run_labels(campaign) if (labels.study, labels.model) == (study, ASPERITIES)]
+    runs = {labels: select_run(campaign, labels) for labels in shown}
     for solved in loops:
         run = runs[run_of_same_contact(runs.items(), solved)]
         gamma = float(solved["surface_energy"])

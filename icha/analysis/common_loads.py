@@ -77,12 +77,12 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     -------
     Dataset on two grids of loads, `reduced_pressure` and `relative_load`, each over the range that all complete runs
     cover (of length zero where there is no such range) between stops of their first loading. On each, with the suffix
-    `_at_load` on the second: `contact_area_fraction` and `reduced_separation` along surface, seed, rms_slope and
-    material; over the seeds mean, standard deviation and half the width of the 95 % band of confidence of both
-    (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
+    `_at_load` on the second: `contact_area_fraction` and `reduced_separation` along the labels of the runs; over the
+    seeds mean, standard deviation and half the width of the 95 % band of confidence of both (`area_mean`,
+    `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
     `material_spread` and `slope_spread`, the largest over the smallest area of all materials (slopes), less one. Runs
     that are not complete lack values, as `status` says, and do not count; `seed_count` says how many seeds there are of
-    every surface, slope and material. A single one has no deviation and no band: they are missing.
+    every model, surface, slope and material. A single one has no deviation and no band: they are missing.
     """
     complete = study["status"].transpose(*LABELS).values == COMPLETE
     seed_count = complete.sum(axis=LABELS.index("seed"))
@@ -110,7 +110,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
 def _loads(study):
     """Loads of all steps on both axes, NaN but at the stops of the first loading: tensile ones have no logarithm."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
-    slope = study["rms_slope"].values[None, None, :, None, None]
+    slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
     loads = {"reduced_pressure": pressure, "relative_load": pressure * slope}
     return {axis: np.where(shown, load, np.nan) for axis, load in loads.items()}

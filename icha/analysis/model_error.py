@@ -10,6 +10,7 @@ import xarray as xr
 from scipy.stats import wasserstein_distance
 
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.models import ASPERITIES
 from icha.datasets.attributes import DERIVED, collected
 from icha.datasets.bins import bin_values
 from icha.datasets.build import described, variable
@@ -24,7 +25,9 @@ from icha.path.targets import REDUCED_PRESSURE
 _TITLE = "Error of the model against boundary elements"
 _SUMMARY = "The same topographies, loads and ranges of attraction by the model and by boundary elements."
 
-AXES = (*LABELS, "reduced_pressure")
+# Labels of the runs, all of one model.
+_LABELS = tuple(label for label in LABELS if label != "model")
+AXES = (*_LABELS, "reduced_pressure")
 
 # What a run and a solution must share for their difference to be the model's error, and to which relative accuracy.
 SHARED = (
@@ -54,7 +57,7 @@ def model_error(
     *,
     attrs: Mapping[str, str] = {},
 ) -> xr.DataTree:
-    """The runs of a campaign beside their boundary-element solutions, state by state.
+    """The runs of a campaign by asperities beside their boundary-element solutions, state by state.
 
     Parameters
     ----------
@@ -272,27 +275,27 @@ def _entry_dataset(campaign, entry, states):
     shape = tuple(map(len, axes.values()))
     coords = {
         label: xr.Variable(label, np.array(axes[label], dtype=study[label].dtype), study[label].attrs)
-        for label in LABELS
+        for label in _LABELS
     }
     coords["reduced_pressure"] = variable(ASKED, axes["reduced_pressure"])
     of_contact = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
-    variables = {"status": variable(STATUS, np.array(of_contact).reshape(shape)[..., 0])}
+    variables = {"status": variable(STATUS._replace(dims=_LABELS), np.array(of_contact).reshape(shape)[..., 0])}
     variables |= _along_axes([states.get(labels) for labels in grid], shape)
     variables |= _over_seeds(variables)
     bins = described(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
     result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
-    own = study.sel(surface=axes["surface"], seed=axes["seed"], material=axes["material"])
+    own = study.sel(model=ASPERITIES, surface=axes["surface"], seed=axes["seed"], material=axes["material"])
     own = own.sel(rms_slope=axes["rms_slope"], method="nearest").assign_coords(rms_slope=result["rms_slope"])
     for name in (*MATERIAL, "tabor_parameter"):
-        result[name] = own[name]
+        result[name] = own[name].drop_vars("model", errors="ignore")
     return result
 
 
 def _axes(study, states):
     """Values of `AXES` that an entry asks for."""
     asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
-    axes = {label: [value for value in study[label].values.tolist() if value in asked[label]] for label in LABELS}
+    axes = {label: [value for value in study[label].values.tolist() if value in asked[label]] for label in _LABELS}
     return axes | {axis: sorted(asked[axis]) for axis in ("rms_slope", "reduced_pressure")}
 
 

@@ -7,9 +7,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from icha.datasets.format import RUN, SURFACE
+from icha.datasets.labels import LABELS
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
 from icha.figures.style import COLOURS, ONE_COLUMN, TWO_COLUMNS, new_figure, styled
 from icha.support.atomic_files import whole_file
+
+# By model, in their order.
+_LINES = ("-", "--")
 
 
 def draw(kind: str, data: xr.Dataset | xr.DataTree, path: Path) -> None:
@@ -35,24 +39,26 @@ def _campaign(tree: xr.DataTree) -> Figure:
     rows = figure.subplots(len(names), 2, squeeze=False)
     for axes, name in zip(rows, names, strict=True):
         study = tree[name].to_dataset()
-        runs = study.stack(run=("surface", "seed", "rms_slope", "material"), create_index=False)
-        materials = list(study["material"].values)
+        runs = study.stack(run=LABELS, create_index=False)
+        materials, models = list(study["material"].values), study["model"].values.tolist()
         for k in range(runs.sizes["run"]):
             run = runs.isel(run=k)
             colour = COLOURS[materials.index(str(run["material"].values)) % len(COLOURS)]
-            _curves(axes, run, colour, lw=0.7)
+            _curves(axes, run, colour, lw=0.7, ls=_LINES[models.index(str(run["model"].values))])
         for material, colour in zip(materials, COLOURS, strict=False):
             axes[0].plot([], [], color=colour, label=material)
+        for model, ls in zip(models, _LINES, strict=False) if len(models) > 1 else ():
+            axes[0].plot([], [], color="black", ls=ls, label=model.replace("_", " "))
         axes[0].legend()
         axes[0].set_title(name)
         _label(axes, loops="work" in study)
     return figure
 
 
-def _curves(axes, run, colour, lw=1.0):
+def _curves(axes, run, colour, lw=1.0, ls="-"):
     pressure = run["reduced_pressure"].values
     for ax, name in zip(axes, ("contact_area_fraction", "reduced_separation"), strict=True):
-        ax.plot(pressure, run[name].values, color=colour, marker=".", ms=3, lw=lw)
+        ax.plot(pressure, run[name].values, color=colour, marker=".", ms=3, lw=lw, ls=ls)
 
 
 def _label(axes, *, loops):

@@ -59,6 +59,7 @@ def show_run(run, name: str) -> None:
     place = [run.attrs[key] for key in ("campaign", "study") if run.attrs.get(key)]
     if place:
         say(f"campaign {' and study '.join(place)}")
+    say(f"model:    {run.attrs.get('contact_model', 'unknown').replace('_', ' ')}")
     say(
         f"material: E* {quantity(value('contact_modulus'), 'Pa')}, surface energy "
         f"{quantity(value('surface_energy'), 'J/m²')}, range {quantity(value('interaction_range'), 'm')}, "
@@ -122,17 +123,20 @@ def _show_surface(surface, file) -> None:
 
 
 def _show_campaign(tree, file) -> None:
+    from icha.datasets.labels import LABELS
+
     say = typer.echo
     say(f"{file}: {tree.attrs.get('title', 'campaign')}")
     say(tree.attrs.get("summary", ""))
     for name, node in tree.children.items():
         study = node.to_dataset()
-        sizes = ", ".join(f"{study.sizes[d]} {d}" for d in ("surface", "seed", "rms_slope", "material"))
+        sizes = ", ".join(f"{study.sizes[d]} {d}" for d in LABELS)
         status = study["status"].values.ravel()
         meanings = study["status"].attrs.get("flag_meanings", "").split()
         numbers = {word: int((status == k).sum()) for k, word in enumerate(meanings)}
         counts = ", ".join(f"{number} {word}" for word, number in numbers.items() if number)
         say(f"\n{name}: {sizes}; {counts}")
+        say(f"  models {', '.join(study['model'].values)}")
         for label, variable in (("A/A0", "contact_area_fraction"), ("p*", "reduced_pressure")):
             values = study[variable].values
             if (known := values[values == values]).size:

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import FAILED, Mistake
+from icha.contact.models import ASPERITIES, MODELS
 
 
 def _length(value: str | None) -> float | None:
@@ -68,6 +69,9 @@ def simulate(
         str | None, _unset("Stops p/(E* h'rms), increasing. Left out: 1e-3,3e-3,1e-2,3e-2.", _numbers)
     ] = None,
     areas: Annotated[str | None, _unset("Stops instead: contact area fractions A/A0, increasing.", _numbers)] = None,
+    model: Annotated[
+        str, typer.Option(help=f"Model of contact: {' or '.join(MODELS)}, which are slower.")
+    ] = ASPERITIES,
     unload: Annotated[bool, typer.Option("--unload", help="Pull the surfaces apart again.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the file if it is there.")] = False,
 ) -> None:
@@ -94,7 +98,9 @@ def simulate(
             pressures = [1e-3, 3e-3, 1e-2, 3e-2]
         path = LoadingPath(pressures, areas, unload=unload)
         with _Progress(len(path.targets)) as progress:
-            run = press(topography, material, path, seed=seed if surface is None else -1, progress=progress)
+            run = press(
+                topography, material, path, model=model, seed=seed if surface is None else -1, progress=progress
+            )
     except ConvergenceError as error:
         run = error.dataset
     except ValueError as error:

@@ -11,6 +11,7 @@ from pydantic import (
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
+from icha.contact.models import ASPERITIES
 from icha.path.limits import STEP
 from icha.path.states import ReducedPressure
 from icha.support.rules import GRID, REFINEMENT, TOLERANCE, Real
@@ -61,6 +62,9 @@ class BesideStudy(Section):
             yield from self._study_problems(campaign, campaign.studies[self.study])
 
     def _study_problems(self, campaign, study):
+        if ASPERITIES not in study.models:
+            reason = f"has no runs to compare with; allowed: a study with {ASPERITIES!r} among its `models`"
+            yield ("study",), self.study, reason
         for key in ("surfaces", "seeds", "rms_slopes", "materials"):
             there = getattr(study, key)
             for index, value in enumerate(getattr(self, key) or []):

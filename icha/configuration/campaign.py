@@ -6,6 +6,7 @@ is wrong with it is worded in `icha.configuration.errors`; the JSON schema is ge
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, NamedTuple
@@ -29,6 +30,7 @@ from icha.configuration.publication import Publication
 from icha.configuration.studies import Study
 from icha.configuration.surfaces import AnySurface, SelfAffineSurface
 from icha.configuration.values import MEASURED
+from icha.contact.models import BOUNDARY_ELEMENTS
 from icha.support.values import (
     ROUNDING,
     Name,
@@ -39,6 +41,8 @@ from icha.support.values import (
 
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
+# Cells of boundary elements per shortest wavelength: fewer are refused, and fewer than that warned of.
+_LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 # Rms slopes beyond this are rather a mistake about units than a surface.
 _STEEP = 3.0
 
@@ -206,12 +210,44 @@ class Campaign(Section):
         """What keeps it from being run although each of its values is allowed by itself."""
         for label, study in self.studies.items():
             yield from _within(("studies", label), study.problems(self.snapshots_of(label)))
+            yield from _within(("studies", label), self._model_problems(study))
         for section in (*BESIDE_STUDIES, "measurements"):
             for label, entry in getattr(self, section).items():
                 yield from _within((section, label), entry.problems(self))
         yield from _within(("publication",), self.publication.problems(self))
         for label, figure in self.figures.drawn().items():
             yield from _within(("figures", label), figure.problems(self))
+
+    def _model_problems(self, study: Study) -> Iterator[Problem]:
+        """Surfaces of a study that its models cannot press."""
+        if BOUNDARY_ELEMENTS not in study.models:
+            return
+        at = ("models", study.models.index(BOUNDARY_ELEMENTS))
+        for name in study.surfaces:
+            if self.boundary(name) != "periodic":
+                reason = f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or "
+                yield at, BOUNDARY_ELEMENTS, reason + "surfaces with `boundary: periodic`"
+            cells = self._cells_per_short_wave(name)
+            if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
+                reason = (
+                    f"need at least {_LEAST_CELLS} grid cells per shortest wavelength, and {name!r} has {cells:.3g}; "
+                    f"allowed: asperities, or a `grid` of {self._grid_of_cells(name, _LEAST_CELLS)} or more for "
+                    f"{name!r} (recommended: {self._grid_of_cells(name, _ADVISABLE_CELLS)})"
+                )
+                yield at, BOUNDARY_ELEMENTS, reason
+
+    def _cells_per_short_wave(self, surface: str) -> float | None:
+        """Grid cells per shortest wavelength of a self-affine surface; None of another."""
+        section = self.surfaces[surface]
+        return section.cells_per_short_wave if isinstance(section, SelfAffineSurface) else None
+
+    def _grid_of_cells(self, surface: str, cells: int) -> int:
+        """The least grid of a self-affine surface with so many cells per shortest wavelength."""
+        section = self.surfaces[surface]
+        return math.ceil(cells * section.period / section.short_wavelength * (1 - ROUNDING))
+
+    def _pressed_by_boundary_elements(self, surface: str) -> bool:
+        return any(surface in each.surfaces and BOUNDARY_ELEMENTS in each.models for each in self.studies.values())
 
     def warnings(self) -> list[str]:
         """What is allowed but not advisable."""
@@ -220,10 +256,21 @@ class Campaign(Section):
             surface, topography = self.surfaces[name], self.topography(name)
             origin = self.origin("surfaces", name)
             variant = "" if origin == name else f" (variant {name})"
-            if isinstance(surface, SelfAffineSurface) and surface.cells_per_short_wave < 4 * (1 - ROUNDING):
+            cells = self._cells_per_short_wave(name)
+            if cells is not None and cells < 4 * (1 - ROUNDING):
                 found.append(
-                    f"surfaces.{origin}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per "
-                    f"shortest wavelength{variant}; 4 are the least advisable, 8 recommended"
+                    f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
+                    f"{variant}; 4 are the least advisable, 8 recommended"
+                )
+            elif (
+                cells is not None
+                and cells < _ADVISABLE_CELLS * (1 - ROUNDING)
+                and self._pressed_by_boundary_elements(name)
+            ):
+                found.append(
+                    f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
+                    f"wavelength{variant}, with which areas are off by a few per cent; recommended: "
+                    f"{self._grid_of_cells(name, _ADVISABLE_CELLS)} or more"
                 )
             if topography is not None and (topography.rms_slope or 0) > _STEEP:
                 found.append(

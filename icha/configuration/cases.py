@@ -8,8 +8,12 @@ from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, numbe
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
-    """All runs of a campaign, study by study, in the order of the configuration's lists."""
-    return [RunLabels(label, *contact) for label in campaign.studies for contact in campaign.contacts(label)]
+    """All runs of a campaign, study by study and model by model, in the order of the configuration's lists."""
+    return [
+        RunLabels(label, model, *contact)
+        for label, study in campaign.studies.items()
+        for model, contact in itertools.product(study.models, campaign.contacts(label))
+    ]
 
 
 def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:

@@ -414,7 +414,12 @@ class Publication(Section):
         """Failures that are known of runs that are none of its `icha.configuration.campaign.Campaign`."""
         if not self.known_failures:
             return
-        runs = {RunLabels(study, *contact).path for study in campaign.studies for contact in campaign.contacts(study)}
+        runs = {
+            RunLabels(label, model, *contact).path
+            for label, study in campaign.studies.items()
+            for model in study.models
+            for contact in campaign.contacts(label)
+        }
         for index, failure in enumerate(self.known_failures):
             if failure.run not in runs:
                 reason = f"is not a run; allowed: a run of the campaign, such as {min(runs)}"

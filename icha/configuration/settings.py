@@ -7,6 +7,7 @@ from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.contact.models import ASPERITIES
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
 
@@ -21,13 +22,16 @@ def surface_settings(campaign: Campaign, name: str) -> dict:
 
 
 def run_settings(campaign: Campaign, case: RunLabels) -> dict:
-    """Everything that determines a run's numbers, in SI units: arguments of the model's own objects."""
+    """Everything that determines a run's numbers, in SI units: arguments of the model's own objects.
+
+    Those that are left at their defaults are left out, the model among them.
+    """
     return {
         "material": campaign.materials[case.material].model_dump(),
-        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
+        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study), case.model),
         "rms_slope": case.rms_slope,
         "seed": case.seed,
-    }
+    } | ({} if case.model == ASPERITIES else {"model": case.model})
 
 
 def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:

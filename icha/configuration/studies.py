@@ -14,6 +14,7 @@ from pydantic import (
 from icha.configuration.materials import MaterialSection
 from icha.configuration.surfaces import SURFACE_KINDS
 from icha.configuration.values import SCALAR_SCHEMA, Slope, Slopes, Values
+from icha.contact.models import ASPERITIES, MODELS
 from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
 from icha.path.targets import Path
@@ -145,6 +146,12 @@ class Study(Section):
         description="An explicit list of runs instead of the lists of the study, which serve for what a case does not "
         "name.",
     )
+    models: Annotated[list[Literal[MODELS]], Field(min_length=1), AfterValidator(distinct)] = Field(
+        default=[ASPERITIES],
+        description="Models of contact with which every run is computed: `asperities`, which are quick, and "
+        "`boundary_elements` in the limit of a short range of attraction, which need a periodic surface and a grid of "
+        "at least 4 cells (better 8) per shortest wavelength.",
+    )
     targets: Targets = Field(description="Stops of the loading path.")
     snapshots: Annotated[list[Snapshot], AfterValidator(distinct)] | None = Field(
         default=None,
@@ -166,7 +173,8 @@ class Study(Section):
     united_until: Literal["detachment", "overlap"] = Field(
         default="detachment",
         description="Until when coalesced spots stay one on the way back: until they detach as a whole and fall back "
-        "into their asperities, or until the two spots that they were made of would no longer overlap.",
+        "into their asperities, or until the two spots that they were made of would no longer overlap. Of model "
+        "`asperities`; patches of boundary elements part by themselves.",
     )
     max_step: number(STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
@@ -176,16 +184,18 @@ class Study(Section):
         """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
         Path(**self.path_settings(snapshots))
 
-    def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
-        """Arguments of the path of its runs (`icha.Path`); those that are left at their defaults are left out."""
+    def path_settings(self, snapshots: list[tuple[str, float]] | None, model: str = ASPERITIES) -> dict:
+        """Arguments of the path of a model's runs (`icha.Path`).
+
+        Those that are left at their defaults are left out, and those that mean nothing to the model.
+        """
         settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
         if self.unload or self.turning_points:
             settings |= {
                 "unload": self.unload,
                 "turning_points": [point.target for point in self.turning_points],
                 "control": self.control,
-                "united_until": self.united_until,
-            }
+            } | ({"united_until": self.united_until} if model == ASPERITIES else {})
         elif self.control != "separation":
             settings["control"] = self.control
         return settings

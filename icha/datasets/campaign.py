@@ -1,4 +1,4 @@
-"""The campaign dataset: the runs of every study as full arrays along surface, seed, rms slope and material."""
+"""The campaign dataset: the runs of every study as full arrays along model, surface, seed, rms slope and material."""
 
 import os
 import tempfile
@@ -12,6 +12,7 @@ from icha.datasets.campaign_file.write import write_campaign
 from icha.datasets.files import read_campaign
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED
+from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN
 
 
@@ -67,7 +68,8 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     if incomplete:
         there = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
         part["snapshot"] = np.flatnonzero(np.isfinite(there))
-    left_out = {*_OF_THE_CAMPAIGN, *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
+    of_others = {name for model, names in FURTHER.items() if model != labels.model for name in names}
+    left_out = {*_OF_THE_CAMPAIGN, *of_others, *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
     variables = {}
     for name, variable in study.variables.items():
         if name in left_out:
@@ -79,7 +81,7 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
             own = xr.Variable(own.dims, own.values.astype(np.int32), own.attrs)  # a float for other runs that lack it
         variables[name] = own
     coords = {name: variables.pop(name) for name in study.coords if name not in LABELS}
-    attrs = study.attrs | ({"incomplete": failure.item()} if incomplete else {})
+    attrs = study.attrs | {"contact_model": labels.model} | ({"incomplete": failure.item()} if incomplete else {})
     return xr.Dataset(variables, coords, attrs)
 
 

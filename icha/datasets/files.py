@@ -5,7 +5,7 @@ missing or has no more steps, and has the same bytes whenever it is written from
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 import netCDF4
@@ -26,6 +26,7 @@ from icha.datasets.netcdf import (
     not_finite,
 )
 from icha.datasets.variables.campaign import COMPLETE
+from icha.datasets.variables.run import CELLS
 from icha.support.atomic_files import whole_file
 
 # Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
@@ -82,7 +83,10 @@ def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.V
             storage["fill_value"] = INTEGER_FILL if whole else FLOAT_FILL
             values = np.where(np.isnan(values), storage["fill_value"], values)
             values = values.astype(np.int32) if whole else values
-        if variable.size in _COMPRESSED_SIZES:
+        if variable.dims[-2:] == CELLS:
+            # Maps are mostly zeros, and looked at one by one.
+            storage |= COMPRESSION | {"chunksizes": (*[1] * (variable.ndim - 2), *variable.shape[-2:])}
+        elif variable.size in _COMPRESSED_SIZES:
             storage |= COMPRESSION
         defined.append((define_numbers(group, name, variable.dims, values.dtype, attrs, **storage), values))
     return defined
@@ -166,8 +170,10 @@ def read_run(path: str | os.PathLike) -> xr.Dataset:
     return run
 
 
-def read_run_values(path: str | os.PathLike) -> tuple[Values, dict]:
+def read_run_values(path: str | os.PathLike, without: Collection[str] = ()) -> tuple[Values, dict]:
     """Read the values of a run dataset and its attributes, without those of its variables: quickly.
+
+    Variables along the dimensions `without` are left out.
 
     Raises
     ------
@@ -181,6 +187,7 @@ def read_run_values(path: str | os.PathLike) -> tuple[Values, dict]:
         values = {
             name: (variable.dimensions[: -1 if variable.dtype == "S1" else None], variable[...])
             for name, variable in file.variables.items()
+            if not set(without) & set(variable.dimensions)
         }
         return values, {name: file.getncattr(name) for name in file.ncattrs()}
 

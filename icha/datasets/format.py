@@ -11,7 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.files import read_campaign, read_dataset
+from icha.datasets.labels import LABELS
 from icha.datasets.variables import run as variables_of_run
 from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
 from icha.datasets.variables.terms import Variable
@@ -28,6 +30,7 @@ class UnknownFile(ValueError):
 
 # Conditions under which a variable must be there.
 ALWAYS, SNAPSHOTS, WAY_BACK = "", "snapshots", "a way back to separation"
+PATCHES, MAPS = "boundary elements", "snapshots of boundary elements"
 SYNTHESISED, MEASURED = "a spectrum", "a measurement"
 
 # The names that are promised, by the condition under which a file has them.
@@ -43,8 +46,10 @@ RUN_NAMES = {
         *("gap_density", "pressure_density", "pressure_bin_mean"),
         *("gap_bin_edges", "gap_bin_centre", "gap_bin_bounds"),
         *("pressure_bin_edges", "pressure_bin_centre", "pressure_bin_bounds"),
-        *("spot_snapshot", "spot_x", "spot_y", "spot_radius", "spot_force"),
+        *("spot_snapshot", "spot_x", "spot_y", "spot_radius", "spot_area", "spot_perimeter", "spot_force"),
     ),
+    PATCHES: ("front_residual", "gap_residual", "pressure_residual"),
+    MAPS: ("contact_map", "contact_pressure"),
     WAY_BACK: (
         *("work", "stored_energy", "dissipated_by_jump_in", "dissipated_by_jump_off", "dissipated_by_coalescence"),
         *("dissipated_by_load_jump", "pull_off_pressure", "pull_off_separation", "detachment_pressure"),
@@ -60,10 +65,10 @@ SURFACE_NAMES = {
     SYNTHESISED: ("rolloff_wavelength", "short_wavelength", "hurst"),
     MEASURED: ("measured_rms_slope", "psd_wavevector", "psd_wavevector_bounds", "power_spectrum"),
 }
-_OF_RUN = variables_of_run.RUN | variables_of_run.CYCLE | variables_of_run.LOOP
+_OF_RUN = variables_of_run.RUN | variables_of_run.PATCHES | variables_of_run.CYCLE | variables_of_run.LOOP
 
 # Dimensions of every variable of a run in a study of a campaign dataset: those of the run are added.
-DESIGN = ("surface", "seed", "rms_slope", "material")
+DESIGN = LABELS
 _OF_STUDY = {name: Variable(DESIGN, "1", "") for name in ("status", "step_count", "failure")} | {
     name: _OF_RUN[name]._replace(dims=(*DESIGN, "step"))
     for name in RUN_NAMES[ALWAYS]
@@ -72,7 +77,10 @@ _OF_STUDY = {name: Variable(DESIGN, "1", "") for name in ("status", "step_count"
 
 # Global attributes. Those of a campaign are written by the workflow, not by `icha.simulate`.
 ATTRIBUTES = {
-    RUN: ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level", "references"),
+    RUN: (
+        *("title", "summary", "keywords", "Conventions", "source", "history", "processing_level", "references"),
+        "contact_model",
+    ),
     SURFACE: ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level"),
     CAMPAIGN: (
         *("title", "summary", "keywords", "Conventions", "source", "history", "processing_level", "references"),
@@ -130,7 +138,16 @@ def flaws(kind: str, data: xr.Dataset | xr.DataTree) -> list[str]:
 def _flaws_of_run(run):
     needed = (*ATTRIBUTES[RUN], *(IN_CAMPAIGN if run.attrs.get("campaign") else ()))
     yield from _flaws_of_attributes(run.attrs, needed)
-    there = {SNAPSHOTS: run.sizes.get("snapshot", 0) > 0, WAY_BACK: "hysteresis_loss" in run}
+    model, kept = run.attrs.get("contact_model", ""), run.sizes.get("snapshot", 0) > 0
+    if model and model not in MODELS:
+        yield f"attribute contact_model: {model!r}; allowed: {', '.join(MODELS)}"
+    by_patches = model == BOUNDARY_ELEMENTS
+    there = {
+        SNAPSHOTS: kept,
+        WAY_BACK: "hysteresis_loss" in run,
+        PATCHES: by_patches,
+        MAPS: by_patches and kept,
+    }
     missing = list(_flaws_of_variables(run, _OF_RUN, RUN_NAMES, there))
     yield from missing
     yield from _flaws_of_numbers(run)

@@ -2,16 +2,24 @@
 
 from typing import NamedTuple
 
+from icha.contact.models import ASPERITIES
+
 # Where their files stand among others of their kind, without the ending; in braces what differs from one to the next.
-RUN = "{study}/{surface}/seed{seed}/slope{slope}/{material}"
+RUN = "{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}"
 CONTACT = "{entry}/{surface}/seed{seed}/slope{slope}/{material}"
 SOLUTION = CONTACT + "/p{pressure}"
 
 
+def model_folder(model: str) -> str:
+    """What stands before the name of a run's file: the model in a folder of its own, but for asperities."""
+    return "" if model == ASPERITIES else f"{model}/"
+
+
 class RunLabels(NamedTuple):
-    """Which run of a campaign: names of study, surface and material, seed, and rms slope as configured."""
+    """Which run of a campaign: names of study, model, surface and material, seed, and rms slope as configured."""
 
     study: str
+    model: str
     surface: str
     seed: int
     rms_slope: float
@@ -59,8 +67,8 @@ class SolutionLabels(NamedTuple):
 
     @property
     def run(self) -> RunLabels:
-        """The run that is compared with it."""
-        return RunLabels(*self[1:6])
+        """The run that is compared with it, one of asperities."""
+        return RunLabels(self.study, ASPERITIES, *self[2:6])
 
     @property
     def path(self) -> str:
@@ -77,10 +85,11 @@ _NUMBERS = {"rms_slope": "slope", "reduced_pressure": "pressure"}
 
 def parts(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
     """What stands in the braces of a path."""
-    return {
+    found = {
         _NUMBERS.get(name, name): number_label(value) if name in _NUMBERS else str(value)
         for name, value in labels._asdict().items()
     }
+    return found | ({"model_folder": model_folder(labels.model)} if isinstance(labels, RunLabels) else {})
 
 
 def number_label(value: float) -> str:

@@ -51,6 +51,8 @@ class AsperityObservables:
             "spot_x": spots.position[:, 0],
             "spot_y": spots.position[:, 1],
             "spot_radius": spots.contact_radius,
+            "spot_area": np.pi * spots.contact_radius**2,
+            "spot_perimeter": 2 * np.pi * spots.contact_radius,
             "spot_force": law.force(spots.contact_radius, spots.radius_of_curvature),
             "spot_curvature_radius": spots.radius_of_curvature,
             "spot_members": spots.members,

@@ -40,7 +40,7 @@ def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | 
         kind, value = min(snapshots)  # the first one that is met
     else:
         return None
-    _, *contact = options.run(campaign)
+    _, _, *contact = options.run(campaign)
     finest_first = sorted(campaign.boundary_elements.items(), key=lambda each: -each[1].refinement)
     return next(
         (

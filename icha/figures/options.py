@@ -7,6 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
+from icha.contact.models import first_of
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.declaration import Campaign, FigureOptions, Inputs
@@ -88,9 +89,10 @@ class RunFigure(StudyFigure):
 
     def run(self, campaign: Campaign) -> RunLabels:
         """The run that is shown: of the study's that are asked for the first with adhesion, or the first of all."""
+        model = first_of(campaign.studies[self.study].models)
         runs = [
             run
-            for run in (RunLabels(self.study, *contact) for contact in campaign.contacts(self.study))
+            for run in (RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study))
             if self.surface in (None, run.surface)
             and self.seed in (None, run.seed)
             and self.rms_slope in (None, run.rms_slope)

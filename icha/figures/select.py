@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.models import first_of
 from icha.datasets.labels import LABELS, RunLabels
 from icha.figures.style import number, slope_label
 
@@ -19,7 +20,9 @@ class NothingToDraw(ValueError):
 
 
 def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All complete runs of a study, at least one; without their spots and events, which take long, if not `ragged`.
+    """All complete runs of a study by the model that is shown (`shown_model`), at least one.
+
+    Without their spots and events, which take long, if not `ragged`.
 
     Raises
     ------
@@ -36,7 +39,9 @@ def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> lis
     _check_study(campaign, study)
     dataset = campaign[study].to_dataset()
     axes = [dataset[label].values.tolist() for label in LABELS]
-    complete = np.argwhere(dataset["status"].transpose(*LABELS).values == COMPLETE)
+    status = dataset["status"].transpose(*LABELS).values
+    by_model = np.reshape(dataset["model"].values == shown_model(dataset), (-1, *[1] * (status.ndim - 1)))
+    complete = np.argwhere((status == COMPLETE) & by_model)
     if not len(complete):
         raise NothingToDraw(f"study {study}: no run is complete, so there is nothing to draw")
     if not ragged:
@@ -46,6 +51,11 @@ def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> lis
     found = (RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True))) for index in complete.tolist())
     runs = [(labels, select_run(campaign, labels)) for labels in found]
     return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
+
+
+def shown_model(study: xr.Dataset) -> str:
+    """The model whose runs figures show of a study: asperities, or else the study's first."""
+    return first_of(study["model"].values.tolist())
 
 
 def _check_study(campaign, study):
@@ -77,7 +87,7 @@ def pick_run(
     rms_slope: float | None = None,
     material: str | None = None,
 ) -> tuple[RunLabels, xr.Dataset]:
-    """The first run of a study asked for, with adhesion if there is one and no material is asked for.
+    """The first run asked for of a study and its `shown_model`, with adhesion if there is one and no material is named.
 
     Raises
     ------
@@ -90,7 +100,8 @@ def pick_run(
     from icha.datasets.variables.campaign import COMPLETE
 
     _check_study(campaign, study)
-    runs = [labels for labels in run_labels(campaign) if labels.study == study]
+    model = shown_model(campaign[study].to_dataset())
+    runs = [labels for labels in run_labels(campaign) if (labels.study, labels.model) == (study, model)]
     runs = [labels for labels in runs if surface in (None, labels.surface) and seed in (None, labels.seed)]
     runs = [labels for labels in runs if rms_slope is None or np.isclose(rms_slope, labels.rms_slope)]
     if not runs:

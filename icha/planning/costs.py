@@ -129,6 +129,30 @@ def sweep_cost(grid: int, summits: float, sweep: Sweep) -> Cost:
     return Cost(seconds, _PROGRAM + _DOUBLE * grid**2 + 9 * 1024 * summits, disk)
 
 
+# Boundary elements in the limit of a short range: seconds of a pair of transforms over n^2 log2 n; pairs for a state
+# with adhesion and without; states for a stop, and the way in from first contact, in h_rms, along which steps are long.
+_TRANSFORMS = 2.9e-9
+_PAIRS, _PAIRS_WITHOUT_ADHESION = 300, 60
+_STATES_AT_STOP, _WAY_IN = 3, 3.0
+# Arrays of the grid that they hold at a time; bytes of a cell that a snapshot's maps take, compressed.
+PATCH_ARRAYS = 30
+_MAPS = 1.5
+
+
+def patch_states(sweep: Sweep) -> float:
+    """Equilibria of a run by boundary elements: at its stops, between them, and as many on every further leg."""
+    return (1 + sweep.legs) * (_STATES_AT_STOP * sweep.stops + _WAY_IN / sweep.max_step)
+
+
+def patch_cost(grid: int, sweep: Sweep) -> Cost:
+    """A run of `icha.simulate` by boundary elements on a surface of `grid` nodes a side."""
+    cells, states = grid**2, patch_states(sweep)
+    pairs = _PAIRS if sweep.adhesive else _PAIRS_WITHOUT_ADHESION
+    seconds = JOB_SECONDS + _DATASET + states * pairs * _TRANSFORMS * cells * math.log2(grid)
+    disk = 80e3 + 160 * states + _MAPS * cells * (sweep.snapshots + bool(sweep.legs))
+    return Cost(seconds, _PROGRAM + PATCH_ARRAYS * _DOUBLE * cells, disk)
+
+
 def cyclic_steps(spots: float, sweep: Sweep) -> float:
     """Equilibria of a path both ways: every spot comes and goes, and with adhesion each of its jumps is resolved."""
     events = 2 * spots

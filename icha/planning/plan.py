@@ -10,8 +10,10 @@ from pathlib import Path
 from icha.configuration.campaign import Campaign
 from icha.configuration.settings import run_settings, run_sha256
 from icha.configuration.surfaces import SelfAffineSurface
+from icha.contact.models import ASPERITIES
 from icha.datasets.results import job_file
 from icha.planning import costs
+from icha.planning.resources import run_threads
 from icha.planning.results import campaign_files
 from icha.support.checksums import is_whole
 
@@ -84,14 +86,18 @@ def _items(campaign, results) -> Iterator[Item]:
     files = campaign_files(campaign)
     for path, (name, _) in files.surfaces.items():
         yield there("surfaces", path, costs.surface_cost(grid(name)), threads(name))
-    sweep_cost = cache(costs.sweep_cost)
+    sweep_cost, patch_cost = cache(costs.sweep_cost), cache(costs.patch_cost)
     for path, case in files.runs.items():
         state, reason = run_state(results / path, run_sha256(campaign, case))
         if not is_whole(results, path):
             state, reason = DAMAGED, ""
         settings = _described(run_settings(campaign, case), case.rms_slope)
-        cost = sweep_cost(grid(case.surface), asperities(case.surface), settings)
-        yield Item(f"study {case.study}", path, state, cost, threads(case.surface), reason)
+        part, cores = f"study {case.study}", run_threads(campaign, case)
+        if case.model == ASPERITIES:
+            cost = sweep_cost(grid(case.surface), asperities(case.surface), settings)
+        else:
+            part, cost = f"{part}, boundary elements", patch_cost(grid(case.surface), settings)
+        yield Item(part, path, state, cost, cores, reason)
     yield from beside(
         "boundary elements",
         campaign.boundary_elements,

@@ -2,7 +2,9 @@
 
 from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
-from icha.planning.costs import job_threads
+from icha.contact.models import ASPERITIES
+from icha.datasets.labels import RunLabels
+from icha.planning.costs import PATCH_ARRAYS, job_threads
 
 _ARRAY = 8e-6
 """Megabytes of a number."""
@@ -18,12 +20,25 @@ def surface_memory(campaign: Campaign, surface: str) -> int:
     return int(600 + 4 * _ARRAY * campaign.grid(surface) ** 2)
 
 
-def sweep_minutes(campaign: Campaign, study: str, surface: str) -> int:
-    """Minutes after which a sweep is taken for stuck: many times what such sweeps have taken."""
-    if surface_threads(campaign, surface) > 1:
-        return 240
-    asked = campaign.studies[study]
-    return 120 if asked.unload or asked.turning_points else 30
+def run_threads(campaign: Campaign, case: RunLabels) -> int:
+    """Cores for a run: those of its surface, but one for boundary elements."""
+    return surface_threads(campaign, case.surface) if case.model == ASPERITIES else 1
+
+
+def run_memory(campaign: Campaign, case: RunLabels) -> int:
+    """Megabytes for a run: some arrays of the surface's size, for boundary elements some dozens, and the program."""
+    if case.model == ASPERITIES:
+        return surface_memory(campaign, case.surface)
+    return int(600 + 1.5 * PATCH_ARRAYS * _ARRAY * campaign.grid(case.surface) ** 2)
+
+
+def run_minutes(campaign: Campaign, case: RunLabels) -> int:
+    """Minutes after which a run is taken for stuck: many times what such runs have taken."""
+    if surface_threads(campaign, case.surface) > 1:
+        return 240 if case.model == ASPERITIES else 1440
+    asked = campaign.studies[case.study]
+    minutes = 120 if asked.unload or asked.turning_points else 30
+    return minutes if case.model == ASPERITIES else 8 * minutes
 
 
 def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:

@@ -15,10 +15,12 @@ from icha.datasets.results import ERROR_SOURCES, LOOP, ONE_ASPERITY, RUN, SOLUTI
 # What stands for what differs among files of the same kind, and how these are called, by the beginning of their path;
 # any other file is a kind of its own.
 _DIFFERENT = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
-_DIFFERENT |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "asperity": "<name>"}
+_DIFFERENT |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "asperity": "<name>", "model_folder": ""}
+# By the beginning of a path and its number of parts.
 _KINDS = {
-    pattern.partition("/{")[0]: pattern.format(**_DIFFERENT)
+    (pattern.partition("/{")[0], len(PurePosixPath(kind).parts)): kind
     for pattern in (SURFACE, RUN, SOLUTION, LOOP, ERROR_SOURCES, ONE_ASPERITY, THEORIES)
+    for kind in {pattern.format(**_DIFFERENT | {"model_folder": folder}) for folder in ("", "<model>/")}
 }
 # Numbers that are read at once.
 _BLOCK = 2**22
@@ -88,10 +90,8 @@ def dictionary_csv(entries: Iterable[Entry]) -> str:
 def kind_of(path: str) -> str:
     """What files like this one are called."""
     parts = PurePosixPath(path).parts
-    for kind in ("/".join(parts[:2]), parts[0]):
-        if kind in _KINDS and len(parts) == len(PurePosixPath(_KINDS[kind]).parts):
-            return _KINDS[kind]
-    return path
+    kinds = (_KINDS.get((beginning, len(parts))) for beginning in ("/".join(parts[:2]), parts[0]))
+    return next(filter(None, kinds), path)
 
 
 def _groups(group) -> Iterator[netCDF4.Dataset]:

@@ -67,6 +67,7 @@ class StudyDesign(NamedTuple):
     """The cells of a study, and what has become of them."""
 
     name: str
+    models: tuple[str, ...]
     surfaces: tuple[str, ...]
     seeds: tuple[int, ...]
     rms_slopes: tuple[float, ...]
@@ -227,7 +228,7 @@ def study_designs(dataset: xr.DataTree) -> list[StudyDesign]:
         found.append(
             StudyDesign(
                 name,
-                *(tuple(study[label].values.tolist()) for label in ("surface", "seed", "rms_slope", "material")),
+                *(tuple(study[label].values.tolist()) for label in LABELS),
                 {meaning: int(np.count_nonzero(status == k)) for k, meaning in enumerate(STATUS_MEANINGS)},
             )
         )

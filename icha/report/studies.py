@@ -71,10 +71,10 @@ def _failure(dataset, labels):
 
 
 def _lines(complete):
-    """The complete runs of every surface, slope and material."""
+    """The complete runs of every surface, slope, material and model."""
     lines: dict[tuple, list[RunLabels]] = {}
     for labels in complete:
-        lines.setdefault((labels.surface, labels.rms_slope, labels.material), []).append(labels)
+        lines.setdefault((labels.surface, labels.rms_slope, labels.material, labels.model), []).append(labels)
     return lines
 
 
@@ -164,16 +164,16 @@ _EVENT_NAMES = {
 
 
 def _loops(dataset):
-    """Pull-off and loss of the runs that were pulled off: means over the seeds of every surface, slope and material."""
+    """Pull-off and loss of the runs that were pulled off: means over the seeds of every line of `_lines`."""
     if "hysteresis_loss" not in dataset:
         return {"rows": [], "parts": {}, "count": 0}
     status = dataset["status"].transpose(*LABELS)
     whole = (status.values == COMPLETE) & np.isfinite(_of_runs(dataset, "hysteresis_loss"))
-    axes = [dataset[label].values.tolist() for label in LABELS]
+    axes = {label: dataset[label].values.tolist() for label in LABELS}
     lines: dict[tuple, list] = {}
-    for surface, seed, slope, material in np.argwhere(whole).tolist():
-        line = (axes[0][surface], axes[2][slope], axes[3][material])
-        lines.setdefault(line, []).append((surface, seed, slope, material))
+    for place in np.argwhere(whole).tolist():
+        line = tuple((label, axes[label][k]) for label, k in zip(LABELS, place, strict=True) if label != "seed")
+        lines.setdefault(line, []).append(tuple(place))
     rows = [_loop(dataset, line, members) for line, members in list(lines.items())[:MOST_ROWS]]
     shown = {name for row in rows for name, share in row["shares"].items() if share}
     parts = {name: text for name, text in _LOSS_NAMES.items() if name in shown}
@@ -201,9 +201,7 @@ def _loop(dataset, line, members):
     adhesive = values("surface_energy")[0] > 0
     parts = {name: values(name).sum() for name in _LOSS_NAMES}
     return {
-        "surface": line[0],
-        "rms_slope": line[1],
-        "material": line[2],
+        **dict(line),
         "seeds": len(members),
         "largest_pressure": _with_confidence(values("largest_reduced_pressure")),
         "largest_area": _with_confidence(values("largest_contact_area_fraction")),

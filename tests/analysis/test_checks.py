@@ -237,7 +237,7 @@ def test_missing_runs_fail_unless_nobody_asked_for_them():
     assert all(check.passed for check in check_campaign(sparse, asked[:-1]))
     lacking = [check for check in check_campaign(sparse, asked) if not check.passed]
     assert [check.name for check in lacking] == ["all runs"]
-    assert lacking[0].subject == str(RunLabels("slopes", "rough", 1, 0.2, "hertz"))
+    assert lacking[0].subject == str(RunLabels("slopes", "asperities", "rough", 1, 0.2, "hertz"))
 
 
 def test_failed_runs_have_one_check_with_their_reason():

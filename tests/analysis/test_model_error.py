@@ -39,7 +39,7 @@ def test_relative_errors_are_those_put_in():
     errors = model_error(tree(), solutions(area=lambda labels: 1.25, separation=0.8))["truth"]
     np.testing.assert_allclose(errors["area_error"].values, 1 / 1.25 - 1, rtol=1e-12)
     np.testing.assert_allclose(errors["separation_error"].values, 1 / 0.8 - 1, rtol=1e-12)
-    run = runs()["one", "rough", 2, 1.0, "hertz"]
+    run = runs()["one", "asperities", "rough", 2, 1.0, "hertz"]
     at = find_snapshot(run, "reduced_pressure", 1e-2)
     place = {"surface": "rough", "seed": 2, "rms_slope": 1.0, "material": "hertz", "reduced_pressure": 1e-2}
     state = errors.to_dataset().sel(place)
@@ -120,7 +120,7 @@ def test_overlap_of_maps():
 
 def test_spots_lie_where_boundary_elements_find_contact():
     """A map that is mirrored, transposed or shifted by a few cells shares next to nothing with the solution."""
-    run = runs()["one", "rough", 1, 1.0, "hertz"]
+    run = runs()["one", "asperities", "rough", 1, 1.0, "hertz"]
     solution = finite_range_solution(small.surface(), small.MATERIALS["hertz"], 3e-3, refinement=2, seed=1)
     compared = compare_state(run, 0, solution)
     assert compared["jaccard"] > 0.5
@@ -157,16 +157,16 @@ STATE = r"entry truth, run one/rough/seed1/slope1/soft, reduced pressure 0\.003:
 
 @pytest.mark.parametrize("name", SHARED)
 def test_another_contact_is_refused(name):
-    labels = RunLabels("one", "rough", 1, 1.0, "soft")
+    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
     solution = own_solution(runs()[labels], 3e-3)
     changed = solution.assign({name: solution[name] * 1.001})
     with pytest.raises(ValueError, match=STATE + name):
-        model_error(tree(), [(SolutionLabels("truth", *labels, 3e-3), changed)])
+        model_error(tree(), [(SolutionLabels("truth", labels.study, *labels[2:], 3e-3), changed)])
 
 
 def test_what_cannot_be_compared_is_named():
-    labels = RunLabels("one", "rough", 1, 1.0, "soft")
-    place = SolutionLabels("truth", *labels, 3e-3)
+    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
+    place = SolutionLabels("truth", labels.study, *labels[2:], 3e-3)
     solution = own_solution(runs()[labels], 3e-3)
     with pytest.raises(ValueError, match=STATE + "seed is 1 for the run, 2 for the solution"):
         model_error(tree(), [(place, solution.assign(seed=2))])
@@ -189,14 +189,17 @@ def test_what_cannot_be_compared_is_named():
 def test_runs_that_ended_early_do_not_count(tmp_path):
     """Of three seeds one run has failed; of the other material two have, and one has not been solved for."""
     factor = {1: 1.1, 2: 1.2, 3: 1.6}
-    failed = [RunLabels("one", "rough", 3, 1.0, "soft"), *(RunLabels("one", "rough", k, 1.0, "hertz") for k in (1, 2))]
+    failed = [
+        RunLabels("one", "asperities", "rough", 3, 1.0, "soft"),
+        *(RunLabels("one", "asperities", "rough", k, 1.0, "hertz") for k in (1, 2)),
+    ]
     nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
     members = {
         labels: run.isel(nothing).assign_attrs(incomplete="sticky") if labels in failed else run
         for labels, run in runs().items()
     }
     pairs = solutions(area=lambda labels: factor[labels.seed])
-    unsolved = RunLabels("one", "rough", 3, 1.0, "hertz")
+    unsolved = RunLabels("one", "asperities", "rough", 3, 1.0, "hertz")
     pairs = [(labels, solution) for labels, solution in pairs if labels.run != unsolved]
     errors = model_error(campaign_tree(members.items()), pairs)
     write_dataset(errors, tmp_path / "e.nc")

@@ -314,7 +314,7 @@ def test_surfaces_and_campaigns_are_shown(tmp_path, monkeypatch):
     shown = icha("show", "surface.nc", "--plot", "surface.pdf")
     assert shown.exit_code == 0 and "Hurst exponent: 0.8" in shown.output
     shown = icha("show", "campaign.nc", "--plot", "campaign.svg")
-    assert shown.exit_code == 0 and "slopes: 1 surface, 1 seed, 2 rms_slope, 2 material" in shown.output
+    assert shown.exit_code == 0 and "slopes: 1 model, 1 surface, 1 seed, 2 rms_slope, 2 material" in shown.output
     assert Path("surface.pdf").stat().st_size and Path("campaign.svg").stat().st_size
     one = icha("show", "campaign.nc", "--study", "single")
     assert "single: " in one.output and "slopes: " not in one.output

@@ -13,6 +13,7 @@ from icha.datasets.campaign import campaign_tree, run_labels, select_run
 from icha.datasets.campaign_file import group, write
 from icha.datasets.campaign_file.write import write_campaign
 from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
+from icha.datasets.labels import LABELS
 from icha.datasets.surface_file import read_surface, write_surface
 
 
@@ -179,7 +180,7 @@ def test_campaign_opens_labelled_and_holds_every_run(tmp_path):
     write_dataset(small.tree(), tmp_path / "c.nc")
     tree = xr.open_datatree(tmp_path / "c.nc")
     study = tree["slopes"]
-    assert study["contact_area_fraction"].dims == ("surface", "seed", "rms_slope", "material", "step")
+    assert study["contact_area_fraction"].dims == (*LABELS, "step")
     assert list(study["rms_slope"].values) == [0.2, 1.0]
     assert list(study["material"].values) == ["soft", "hertz"]
     assert study["contact_modulus"].dims == ("material",)
@@ -225,7 +226,7 @@ def test_combinations_that_nobody_asked_for_are_not_in_the_design(tmp_path):
     assert status.attrs["flag_meanings"] == "complete incomplete missing not_in_design"
     table = np.array(status.attrs["flag_meanings"].split())[status.values]
     assert status["rms_slope"].values.tolist() == [0.2, 1.0] and status["material"].values.tolist() == ["soft", "hertz"]
-    assert table.tolist() == [[[["not_in_design", "missing"], ["complete", "not_in_design"]]]]
+    assert table.tolist() == [[[[["not_in_design", "missing"], ["complete", "not_in_design"]]]]]
     area = tree["slopes"]["contact_area_fraction"]
     assert int(np.isnan(area).sum()) == 3 * area.sizes["step"]
     assert set(tree["slopes"]["failure"].values.flat) == {""}
@@ -322,7 +323,7 @@ def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing():
 
 def same(taken, run, labels):
     """That a run taken out of a campaign is what was put into it, and of the same kind."""
-    assert set(taken.data_vars) == {*run.data_vars, "surface", "material"}
+    assert set(taken.data_vars) == {*run.data_vars, "model", "surface", "material"}
     assert set(taken.coords) == set(run.coords)
     for name, variable in run.variables.items():
         where = f"{labels} {name}"
@@ -353,9 +354,9 @@ def test_padding_is_missing_and_nothing_else_is(tmp_path):
     assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
     study = read_campaign(tmp_path / "one.nc")["loops"].to_dataset()
     count = study["step_count"]
-    assert count.dtype.kind == "i" and count.dims == ("surface", "seed", "rms_slope", "material")
+    assert count.dtype.kind == "i" and count.dims == LABELS
     assert int(count.max()) == study.sizes["step"] > int(count.min())
-    beyond = (study["step"] >= count).transpose("surface", "seed", "rms_slope", "material", "step")
+    beyond = (study["step"] >= count).transpose(*LABELS, "step")
     for name, variable in study.variables.items():
         if variable.dtype.kind != "f":
             continue
@@ -363,6 +364,7 @@ def test_padding_is_missing_and_nothing_else_is(tmp_path):
         np.testing.assert_array_equal(lacking, beyond.values if "step" in variable.dims else False, err_msg=name)
     np.testing.assert_array_equal(study["branch"] == "", beyond)
     assert "branch" in study.coords and set(study.indexes) == {
+        "model",
         "surface",
         "seed",
         "rms_slope",
@@ -453,6 +455,6 @@ def test_runs_of_other_materials_under_one_name_are_refused():
 
 def test_selecting_what_is_not_there_says_what_is():
     with pytest.raises(ValueError, match="there are slopes, single"):
-        select_run(small.tree(), ("other", "rough", 1, 1.0, "soft"))
+        select_run(small.tree(), ("other", "asperities", "rough", 1, 1.0, "soft"))
     with pytest.raises(ValueError, match=r"no rms_slope 0\.3; there are 0\.2, 1"):
-        select_run(small.tree(), ("slopes", "rough", 1, 0.3, "soft"))
+        select_run(small.tree(), ("slopes", "asperities", "rough", 1, 0.3, "soft"))

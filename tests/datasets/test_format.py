@@ -42,7 +42,10 @@ def test_a_campaign_lacks_only_what_the_workflow_adds(files):
 def test_the_vocabulary_keeps_what_is_promised():
     """Names, dimensions and units that users rely on: a change of them is one of the format, and made here, too."""
     promised = PROMISED.read_text().splitlines()
-    tables = ((RUN_NAMES, of_run.RUN | of_run.CYCLE | of_run.LOOP), (SURFACE_NAMES, of_surface.SURFACE))
+    tables = (
+        (RUN_NAMES, of_run.RUN | of_run.PATCHES | of_run.CYCLE | of_run.LOOP),
+        (SURFACE_NAMES, of_surface.SURFACE),
+    )
     kept = [
         f"{name}({', '.join(table[name].dims)}) {table[name].units}; {condition}".removesuffix("; ")
         for names, table in tables
@@ -98,7 +101,7 @@ def test_spoilt_surfaces_and_campaigns_are_found(files):
     assert len(refused) == 1 and refused[0].startswith("attribute date_created is there")
     study = tree["slopes"].to_dataset()
     spoilt = study["nominal_pressure"].copy()
-    spoilt[0, 0, 0, 0, 0] = np.nan
+    spoilt[0, 0, 0, 0, 0, 0] = np.nan
     broken = xr.DataTree.from_dict({"/": tree.to_dataset(), "/slopes": study.assign(nominal_pressure=spoilt)})
     assert any("nominal_pressure: 1 values of complete runs" in flaw for flaw in flaws(CAMPAIGN, broken))
 

@@ -13,6 +13,8 @@ import pint
 import pytest
 from outside_validators import REPOSITORY, python_of_validators
 
+from icha.datasets.labels import LABELS
+
 GROUPS = {"run.nc": "/", "campaign.nc": "/slopes"}
 
 
@@ -58,7 +60,7 @@ import matplotlib.pyplot as plt
 import xarray as xr
 path, group, picture = sys.argv[1:]
 data = xr.open_dataset(path, group=group).load()
-place = {"surface": 0, "seed": 0, "rms_slope": 1, "material": 0}
+place = {"model": 0, "surface": 0, "seed": 0, "rms_slope": 1, "material": 0}
 one = data.isel({name: k for name, k in place.items() if name in data.dims})
 figure, axes = plt.subplots(1, 2)
 one.contact_area_fraction.plot(ax=axes[0], x="step")
@@ -110,8 +112,8 @@ def test_netcdf4_and_xarray_read_the_same_and_plot_it(folder, tmp_path, file, gr
         np.testing.assert_array_equal(missing, np.isnan(other), err_msg=name)
         np.testing.assert_array_equal(np.ma.getdata(values)[~missing], other[~missing], err_msg=name)
     assert {"gap_bin_centre", "pressure_bin_centre"} <= set(coordinates)
-    place = (0, 0, 1, 0)[: plain["gap_density"].ndim - 2]
-    shown = [plain["gap_bin_centre"][place[:3]], plain["gap_density"][(*place, 1)]]
+    place = (0, 0, 0, 1, 0)[: plain["gap_density"].ndim - 2]
+    shown = [plain["gap_bin_centre"][place[1:4]], plain["gap_density"][(*place, 1)]]
     if file == "campaign.nc":  # the run that failed lacks its second snapshot
         assert plain["failure"][place] == "the path ends early" and shown[1].mask.all()
     np.testing.assert_array_equal(line, np.transpose([np.ma.filled(each, np.nan) for each in shown]))
@@ -140,7 +142,7 @@ def test_missing_values_and_texts_are_what_was_written(folder):
     """Of the study with a failed run, by plain netCDF4."""
     plain = by_netcdf4(folder / "campaign.nc", "/slopes")
     labels = [dict(zip(plain["material"], range(2), strict=True))[name] for name in ("soft", "hertz")]
-    failed, whole = ((0, 0, 1, material) for material in labels)
+    failed, whole = ((0, 0, 0, 1, material) for material in labels)
     assert plain["step_count"][failed] == 3 and plain["status"][failed] == 1 and plain["status"][whole] == 0
     assert np.ma.getmaskarray(plain["nominal_pressure"][failed]).tolist() == [False] * 3 + [True] * (
         plain["nominal_pressure"].shape[-1] - 3
@@ -197,15 +199,15 @@ def test_ragged_arrays_can_be_followed_by_what_they_index(folder):
                 for name, variable in group.variables.items()
                 if "instance_dimension" in variable.ncattrs()
             }
-            expected = {f"spot_{label}" for label in ("surface", "seed", "rms_slope", "material", "snapshot")}
+            expected = {f"spot_{label}" for label in (*LABELS, "snapshot")}
             if "event" in group.dimensions:
-                expected |= {f"event_{label}" for label in ("surface", "seed", "rms_slope", "material", "step")}
+                expected |= {f"event_{label}" for label in (*LABELS, "step")}
             assert set(indices) == expected
             for variable in indices.values():
                 size = group.dimensions[variable.instance_dimension].size
                 assert variable.dtype.kind == "i" and np.all((variable[...] >= 0) & (variable[...] < size))
             counted = np.zeros(group["snapshot_step"].shape, int)
-            own = ("surface", "seed", "rms_slope", "material", "snapshot")
+            own = (*LABELS, "snapshot")
             np.add.at(counted, tuple(group[f"spot_{label}"][...] for label in own), 1)
             steps = group["snapshot_step"][...]
             for place in np.argwhere(~np.ma.getmaskarray(steps)):

@@ -62,7 +62,7 @@ def surface(tmp_path_factory):
 
 def solution(pressure=3e-3, shift=0):
     """Boundary elements of what figure 4 draws of the compared campaign, their contact shifted by some nodes."""
-    own = compared.own_solution(compared.runs()["one", "rough", 1, 1.0, "soft"], pressure)
+    own = compared.own_solution(compared.runs()["one", "asperities", "rough", 1, 1.0, "soft"], pressure)
     return own.assign(contact=own["contact"].roll(x=shift))
 
 
@@ -212,7 +212,7 @@ def test_the_state_of_pull_off_can_be_drawn(tmp_path):
     run["snapshot_target"].values[1] = 0.0
     run["snapshot_step"].values[1] = run.sizes["step"] - 2
     assert snapshot_label(run, 1) == "pull-off"
-    tree = campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)])
+    tree = campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)])
     for module in (fig3_distributions, fig8_patch_sizes):
         figure = module.figure(tree, study="one", kind="pull_off")
         assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
@@ -269,7 +269,7 @@ def test_fig4_enlarges_small_spots_more_and_stays_small(tmp_path):
     spots |= {"spot_snapshot": np.zeros(count, int)}
     run = run.assign({name: ("spot", values, small.run()[name].attrs) for name, values in spots.items()})
     run["grid"] = run["grid"].copy(data=grid)
-    tree = campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)])
+    tree = campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)])
     figure = fig4_contact_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="one")
     whole, enlarged = (np.ptp(axes.get_xlim()) for axes in figure.axes[:2])
     assert whole == pytest.approx(100)
@@ -354,7 +354,9 @@ def test_fig7_leaves_out_what_has_no_logarithm():
     assert len(p) == len(stiffness) == run.sizes["step"] - 2
     run["contact_stiffness"].values[:] = -1.0
     with pytest.raises(ValueError, match="study one: no stop with a positive load and a positive stiffness"):
-        fig7_stiffness.figure(campaign_tree([(RunLabels("one", "rough", 1, 1.0, "soft"), run)]), study="one")
+        fig7_stiffness.figure(
+            campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)]), study="one"
+        )
 
 
 def test_fig8_density_and_counts_of_a_known_distribution():
@@ -407,7 +409,7 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
         material = icha.Material(25e6, 0.0 if name == "bare" else 0.05, reach)
         path = icha.Path(reduced_pressures=[1e-2], max_step=0.2)
         runs[name] = icha.simulate(small.surface(), material, path, seed=1)
-    tree = campaign_tree([(RunLabels("tabor", "rough", 1, 1.0, name), run) for name, run in runs.items()])
+    tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, name), run) for name, run in runs.items()])
     left, right = fig9_tabor.figure(tree, study="tabor").axes
     for axes, name in ((left, "contact_area_fraction"), (right, "reduced_separation")):
         curve, bare = axes.get_lines()
@@ -417,7 +419,7 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
         assert set(bare.get_ydata()) == {float(runs["bare"][name].values[-1])}
     assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
     assert len({text.get_text() for text in left.get_legend().get_texts()}) == 2
-    tree = campaign_tree([(RunLabels("tabor", "rough", 1, 1.0, "bare"), runs["bare"])])
+    tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, "bare"), runs["bare"])])
     with pytest.raises(ValueError, match="study tabor: no complete run with adhesion"):
         fig9_tabor.figure(tree, study="tabor")
 
@@ -483,7 +485,9 @@ def test_fig3_shows_boundary_elements_of_the_same_state_only():
     # These solutions are the runs' own states, so that their points lie on those of the runs.
     truth = compared.errors()["bare"].to_dataset().isel(surface=0, seed=0, rms_slope=0, material=0, reduced_pressure=0)
     truth["solution_grid"] = 32
-    u, (density,) = fig3_distributions.gap_densities([(compared.runs()["one", "rough", 1, 1.0, "hertz"], 0)])
+    u, (density,) = fig3_distributions.gap_densities(
+        [(compared.runs()["one", "asperities", "rough", 1, 1.0, "hertz"], 0)]
+    )
     for drawn, own in zip(fig3_distributions.solution_gap_points(truth), (u, density), strict=True):
         np.testing.assert_allclose(drawn, own, rtol=1e-9)
 
@@ -505,7 +509,7 @@ def test_fig3_joined_bins_keep_what_they_hold():
 
 def test_fig4_puts_boundary_elements_beside_the_spots(surface):
     truth = solution(shift=2)
-    run = compared.runs()["one", "rough", 1, 1.0, "soft"]
+    run = compared.runs()["one", "asperities", "rough", 1, 1.0, "soft"]
     figure = fig4_contact_map.figure(compared.tree(), surface, truth, study="one")
     assert len(figure.axes) == 5  # four panels and the scale of heights
     contact = truth["contact"].values == 1
@@ -686,14 +690,14 @@ def many(surfaces=30, materials=1):
     runs = []
     for name, (k, kind) in itertools.product(names, enumerate(kinds)):
         run = small.run().assign(surface_energy=small.run()["surface_energy"] * (1 + 0.1 * k))
-        runs.append((RunLabels("many", name, 1, 1.0, kind), run))
+        runs.append((RunLabels("many", "asperities", name, 1, 1.0, kind), run))
     return campaign_tree(runs)
 
 
 def two_surfaces(slopes=(1.0,)):
     names = ["rough-hurst0.6", "rough-hurst0.9"]
     runs = [
-        (RunLabels("vary", name, 1, slope, material), small.run(1 + k, slope, material).assign(seed=1))
+        (RunLabels("vary", "asperities", name, 1, slope, material), small.run(1 + k, slope, material).assign(seed=1))
         for (k, name), slope, material in itertools.product(enumerate(names), slopes, ("soft", "hertz"))
     ]
     return names, campaign_tree(runs)
@@ -819,7 +823,7 @@ def test_names_of_a_scale_lose_what_they_share_but_no_digits():
 
 
 def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
-    runs = [(RunLabels("one", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2)]
+    runs = [(RunLabels("one", "asperities", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2)]
     runs[0] = (runs[0][0], runs[0][1].assign_attrs(incomplete="no equilibrium"))
     tree = campaign_tree(runs)
     with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):

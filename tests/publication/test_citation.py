@@ -9,9 +9,9 @@ from conftest import REPOSITORY
 from outside_validators import validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
-from icha import simulation
 from icha.configuration.publication import RELATIONS, RESOURCES, RelatedIdentifier
 from icha.datasets.model_paper import MODEL_PAPER
+from icha.models import asperities
 from icha.publication.citation import citation_cff, datacite_metadata, web_address, zenodo_metadata
 
 
@@ -108,8 +108,8 @@ def test_the_paper_of_the_model_is_cited_as_the_program_and_every_run_cite_it(pu
     paper = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))["preferred-citation"]
     names = [(author["given-names"], author["family-names"]) for author in paper["authors"]]
     assert yaml.safe_load(citation_cff(publication, COMMIT))["references"] == [paper]
-    assert simulation.REFERENCES.startswith(f"{MODEL_PAPER.line}; ")
-    assert zenodo_metadata(publication)["references"] == [simulation.REFERENCES.split("; ")[0]]
+    assert asperities.MODEL.references.startswith(f"{MODEL_PAPER.line}; ")
+    assert zenodo_metadata(publication)["references"] == [asperities.MODEL.references.split("; ")[0]]
     (item,) = datacite_metadata(publication)["relatedItems"]
     assert item["titles"] == [{"title": paper["title"]}] and "relatedItemIdentifier" not in item
     assert [(creator["givenName"], creator["familyName"]) for creator in item["creators"]] == names

@@ -304,7 +304,7 @@ def test_the_page_for_readers_tells_the_numbers(published):
         "> G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media",
         "Every run that was asked for is here and complete.",
         "| completed | 1 | 0 | 0 | 0 if the run reached the end of its path, else 1 |",
-        "| load | plate | 0 | 0.5 | soft | 1 | 1 | 0 |",
+        "| load | asperities | plate | 0 | 0.5 | soft | 1 | 1 | 0 |",
         "| soft | 2.5e+07 | 0.05 | 4e-08 |",
         "sha256sum -c SHA256SUMS",
         committed_commit(published),

@@ -130,7 +130,7 @@ def test_error_of_the_model_has_a_section_where_it_is_known(write):
     for value in (np.median(errors), errors.min(), errors.max()):
         assert f"{value:.1f} %".replace("-", "−") in adhesive
     assert f"{errors.mean():.1f} ± {_half_width(errors):.1f}".replace("-", "−") in adhesive
-    run = compared.runs()["one", "rough", 2, 1.0, "hertz"]
+    run = compared.runs()["one", "asperities", "rough", 2, 1.0, "hertz"]
     areas = [
         float(own["contact_area_fraction"].values[0])
         for labels, own in compared.runs().items()
@@ -342,7 +342,10 @@ def test_surfaces_show_spectra_and_where_measurements_come_from(write, tmp_path)
 def test_long_tables_are_folded_and_cut_and_say_so(write, tmp_path):
     count = MOST_ROWS + 20
     runs = [
-        (RunLabels("many", "rough", seed, 1.0, "soft"), small.run().assign(seed=small.run()["seed"] * 0 + seed))
+        (
+            RunLabels("many", "asperities", "rough", seed, 1.0, "soft"),
+            small.run().assign(seed=small.run()["seed"] * 0 + seed),
+        )
         for seed in range(1, count + 1)
     ]
     tree = campaign_tree(runs)
@@ -390,7 +393,7 @@ def test_comparison_of_slopes_without_adhesion_shows_no_spread():
 def test_differences_are_told_where_there_is_something_to_compare(write):
     def own_slopes(*materials):
         runs = [
-            (RunLabels("own", f"patch{slope:g}", 1, slope, material), small.run(1, slope, material))
+            (RunLabels("own", "asperities", f"patch{slope:g}", 1, slope, material), small.run(1, slope, material))
             for slope in (1.0, 0.2)
             for material in materials
         ]
@@ -411,9 +414,9 @@ def test_comparison_can_be_kept(tmp_path):
         write_dataset(compare_campaign(small.tree()), tmp_path / name)
     assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
     single = read_campaign(tmp_path / "a.nc")["single"]
-    areas = single["contact_area_fraction"].values
-    np.testing.assert_allclose(single["area_mean"].values, areas.mean(axis=1))
-    np.testing.assert_allclose(single["area_deviation"].values, areas.std(axis=1, ddof=1))
+    areas, seeds = single["contact_area_fraction"].values, single["contact_area_fraction"].dims.index("seed")
+    np.testing.assert_allclose(single["area_mean"].values, areas.mean(axis=seeds))
+    np.testing.assert_allclose(single["area_deviation"].values, areas.std(axis=seeds, ddof=1))
     assert float(single["material_spread"].max()) == 0
 
 

@@ -85,14 +85,16 @@ def test_ways_are_averaged_at_the_same_displacement_and_are_zero_when_separated(
 
 
 def test_the_comparison_has_bands_over_the_complete_seeds():
-    runs = [(RunLabels("one", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2, 3)]
-    runs.append((RunLabels("one", "rough", 4, 1.0, "soft"), small.run(4).assign_attrs(incomplete="a test")))
+    runs = [(RunLabels("one", "asperities", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2, 3)]
+    runs.append(
+        (RunLabels("one", "asperities", "rough", 4, 1.0, "soft"), small.run(4).assign_attrs(incomplete="a test"))
+    )
     comparison = compare_runs(campaign_tree(runs)["one"].to_dataset())
-    areas = comparison["contact_area_fraction"].transpose(*LABELS, ...).values[0, :3, 0, 0]
+    areas = comparison["contact_area_fraction"].transpose(*LABELS, ...).values[0, 0, :3, 0, 0]
     expected = ensemble(areas)
     assert comparison["seed_count"].item() == 3
     for name in ("mean", "deviation", "confidence"):
-        np.testing.assert_allclose(comparison[f"area_{name}"].values[0, 0, 0], getattr(expected, name), rtol=1e-12)
+        np.testing.assert_allclose(comparison[f"area_{name}"].values[0, 0, 0, 0], getattr(expected, name), rtol=1e-12)
         assert np.all(comparison[f"separation_{name}"].values > 0)
     one = compare_runs(campaign_tree(runs[:1])["one"].to_dataset())
     assert np.isnan(one["area_confidence"].values).all() and np.isfinite(one["area_mean"].values).all()

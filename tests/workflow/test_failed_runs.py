@@ -56,7 +56,7 @@ def dataset(tmp_path):
     from make_dataset import make_dataset
 
     def make(files):
-        labels = [tuple(RunLabels("sticky", "rough", 1, 1.0, name)) for name in files]
+        labels = [tuple(RunLabels("sticky", "asperities", "rough", 1, 1.0, name)) for name in files]
         make_dataset(
             files.values(), tmp_path / "c.nc", labels=labels, attributes={"title": "Sticky", "config_sha256": "1"}
         )

@@ -36,6 +36,8 @@ pathvars:
     benchmarks=f"{RESULTS}/benchmarks",
     # One surface pressed against one material.
     contact="{surface}/seed{seed}/slope{slope}/{material}",
+    # The same in a study, by a model.
+    run="{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}",
 
 
 wildcard_constraints:
@@ -52,6 +54,11 @@ wildcard_constraints:
 def held(files, pattern, wildcards):
     """What one of `files` holds, by the wildcards of its path."""
     return files[f"{RESULTS}/{pattern}".format(**wildcards)]
+
+
+def case_of(wildcards):
+    """The labels of a run."""
+    return held(FILES.runs, results.RUN, wildcards)
 
 
 def as_it_is(value):

@@ -1,34 +1,44 @@
-# One loading sweep each.
+# One sweep each, by asperities or by another model of contact, whose runs are in a folder of its name.
 
 from icha.configuration.settings import run_settings, run_sha256
-from icha.planning.resources import sweep_minutes
+from icha.contact.models import MODELS
+from icha.datasets.labels import model_folder
+from icha.planning.resources import run_memory, run_minutes, run_threads
+
+
+wildcard_constraints:
+    model_folder="|".join(map(model_folder, MODELS)),
+
+
+# By model, which the script imports by its name.
+CODE_OF_RUN = {model: code_of("run_sweep.py", f"icha.models.{model}") for model in MODELS}
 
 
 rule run:
     input:
         surface="<results>/surfaces/{surface}/seed{seed}.nc",
     output:
-        "<results>/runs/{study}/<contact>.nc",
+        "<results>/runs/<run>.nc",
     log:
-        "<logs>/runs/{study}/<contact>.log",
+        "<logs>/runs/<run>.log",
     benchmark:
-        "<benchmarks>/runs/{study}/<contact>.jsonl"
+        "<benchmarks>/runs/<run>.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: lambda wildcards: surface_threads(CAMPAIGN, wildcards.surface)
+    threads: lambda wildcards: run_threads(CAMPAIGN, case_of(wildcards))
     resources:
-        mem_mb=lambda wildcards: surface_memory(CAMPAIGN, wildcards.surface),
-        runtime=lambda wildcards: sweep_minutes(CAMPAIGN, wildcards.study, wildcards.surface),
+        mem_mb=lambda wildcards: run_memory(CAMPAIGN, case_of(wildcards)),
+        runtime=lambda wildcards: run_minutes(CAMPAIGN, case_of(wildcards)),
     params:
-        settings=lambda wildcards: run_settings(CAMPAIGN, held(FILES.runs, results.RUN, wildcards)),
+        settings=lambda wildcards: run_settings(CAMPAIGN, case_of(wildcards)),
         attributes=lambda wildcards: ATTRIBUTES
         | {
             "study": wildcards.study,
-            "config_sha256": run_sha256(CAMPAIGN, held(FILES.runs, results.RUN, wildcards)),
+            "config_sha256": run_sha256(CAMPAIGN, case_of(wildcards)),
         },
-        code=code_of("run_sweep.py"),
+        code=lambda wildcards: CODE_OF_RUN[case_of(wildcards).model],
     message:
         "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
-        "{wildcards.material}"
+        "{wildcards.model_folder}{wildcards.material}"
     script:
         "../scripts/run_sweep.py"

@@ -11,21 +11,24 @@ from icha.datasets.campaign_file.spool import Entry, Members, plain
 from icha.datasets.files import read_run
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED, VARIES_WITH
+from icha.datasets.variables.run import CELLS
 
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
     """The runs of a study along its axes.
 
-    name : of the study. axes : values of every label. model : a run that shows what variables there are. widths : of
+    name : of the study. axes : values of every label. sample : a run that shows what variables there are, with those of
+    all models. origins : global attributes of a run of every model. widths : of
     texts, in bytes. sizes : of the dimensions that runs have in common. snapshots : position of every kind and target.
-    entries : the runs there are, in the order of the axes; positions (n, 4) : of these; failures : why each of these is
+    entries : the runs there are, in the order of the axes; positions (n, 5) : of these; failures : why each of these is
     incomplete, an empty text if it is not. status, step_count : along `LABELS`.
     """
 
     name: str
     axes: dict[str, list]
-    model: xr.Dataset
+    sample: xr.Dataset
+    origins: list[dict]
     widths: dict[str, int]
     sizes: dict[str, int]
     snapshots: dict[tuple[bytes, float], int]
@@ -41,7 +44,7 @@ class Arrangement:
 
     def dims_of(self, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """The labels that a variable of the runs varies with, and its own dimensions; no labels of what is ragged."""
-        own = self.model[name].dims
+        own = self.sample[name].dims
         if name in self.sizes or set(RAGGED) & set(own):
             return (), own
         return VARIES_WITH.get(name, LABELS), own
@@ -84,16 +87,17 @@ def _arranged_study(name, members, design):
     axes |= {label: sorted(axes[label]) for label in ("seed", "rms_slope")}
     at = [{value: k for k, value in enumerate(axes[label])} for label in LABELS]
     position = {labels: tuple(k[value] for k, value in zip(at, labels[1:], strict=True)) for labels in design}
-    model = members.model if isinstance(members.model, xr.Dataset) else read_run(members.model)
+    samples = {model: _sample(members.samples[model]) for model in axes["model"] if model in members.samples}
+    sample = _combined(list(samples.values()))
     # In the order of the design, whatever that in which they came.
     entries = [members.entries[labels] for labels in position if labels in members.entries]
     snapshots = _snapshots(entries)
-    sizes = {dim: size for dim, size in model.sizes.items() if dim not in RAGGED}
+    sizes = {dim: size for dim, size in sample.sizes.items() if dim not in RAGGED}
     if "snapshot" in sizes:
         sizes["snapshot"] = len(snapshots)
     if "step" in sizes:
         sizes["step"] = int(_sizes(entries, "step").max())
-    _check(entries, model, sizes)
+    _check(entries, samples, sizes)
 
     entries = sorted(entries, key=lambda entry: position[entry.labels])
     positions = np.array([position[entry.labels] for entry in entries])
@@ -105,8 +109,36 @@ def _arranged_study(name, members, design):
     step_count = np.zeros(shape, np.int32)
     step_count[tuple(positions.T)] = _sizes(entries, "step")
     return Arrangement(
-        name, axes, model, members.widths, sizes, snapshots, entries, positions, failures, status, step_count
+        name,
+        axes,
+        sample,
+        [each.attrs for each in samples.values()],
+        members.widths,
+        sizes,
+        snapshots,
+        entries,
+        positions,
+        failures,
+        status,
+        step_count,
     )
+
+
+def _sample(source):
+    run = source if isinstance(source, xr.Dataset) else read_run(source)
+    return run.drop_dims(CELLS, errors="ignore")
+
+
+def _combined(samples):
+    """A run with the variables that any of the samples has, as long as the shortest of them."""
+    whole, *others = samples
+    for other in others:
+        further = other.drop_vars([name for name in other.variables if name in whole.variables])
+        common = {
+            dim: slice(0, min(size, further.sizes[dim])) for dim, size in whole.sizes.items() if dim in further.sizes
+        }
+        whole = whole.isel(common).assign(further.isel(common).variables)
+    return whole
 
 
 def _sizes(entries, dim):
@@ -123,13 +155,20 @@ def _snapshots(entries):
     return {each: k for k, each in enumerate(known)}
 
 
-def _check(entries, model, sizes):
-    """Refuse runs with other variables, or others along dimensions that all have in common."""
-    names = frozenset(model.variables)
-    may_lack = frozenset(name for name in names if not set(RAGGED) & set(model[name].dims))
+def _check(entries, samples, sizes):
+    """Refuse runs with other variables than their model's, or others along dimensions that all have in common."""
+    names = {model: frozenset(sample.variables) for model, sample in samples.items()}
+    ragged = {
+        model: {name for name, variable in sample.variables.items() if set(RAGGED) & set(variable.dims)}
+        for model, sample in samples.items()
+    }
+    for model, own in ragged.items():
+        if odd := own ^ next(iter(ragged.values())):
+            raise ValueError(f"model {model}: variables differ from those of other models: {', '.join(sorted(odd))}")
     for entry in entries:
-        odd = entry.names ^ names
-        if odd - (may_lack if entry.failure else frozenset()):
+        model = entry.labels.model
+        odd = entry.names ^ names[model]
+        if odd - (names[model] - ragged[model] if entry.failure else frozenset()):
             known = ", ".join(sorted(odd))
             raise ValueError(f"{entry.labels}: variables differ from those of the study's other runs: {known}")
         for dim, size in sizes.items():

@@ -24,6 +24,7 @@ from icha.datasets.netcdf import (
     is_text,
 )
 from icha.datasets.variables.campaign import CAMPAIGN, FAILURE, RAGGED, place_of
+from icha.datasets.variables.run import FURTHER
 
 # A block holds at most so many runs, and of each variable so many values: some megabytes of all together.
 _RUNS_IN_BLOCK = 256
@@ -31,9 +32,9 @@ VALUES_IN_BLOCK = 2**18
 _VALUES_IN_CHUNK = 2**16
 
 _LAYOUT = (
-    "Variables of the runs along surface, seed, rms_slope and material. Spots and events of all runs, in this order of "
-    "the runs, are ragged arrays along spot and event: the variables with an instance_dimension say where along that "
-    "dimension each belongs, from 0; those that agree in all of them are of one snapshot of one run."
+    "Variables of the runs along model, surface, seed, rms_slope and material. Spots and events of all runs, in this "
+    "order of the runs, are ragged arrays along spot and event: the variables with an instance_dimension say where "
+    "along that dimension each belongs, from 0; those that agree in all of them are of one snapshot of one run."
 )
 
 
@@ -79,23 +80,27 @@ class Group:
 
 def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str]) -> Group:
     """Make dimensions, variables and attributes of a study's group; `attrs` are those of the file."""
-    model = study.model
-    counts = {dim: int(study.sizes_of(dim).sum()) for dim in RAGGED if dim in model.dims}
+    sample = study.sample
+    counts = {dim: int(study.sizes_of(dim).sum()) for dim in RAGGED if dim in sample.dims}
     sizes = dict(zip(LABELS, study.status.shape, strict=True)) | study.sizes | counts
     define_dimensions(group, sizes)
-    own = {"study": study.name} | {name: model.attrs[name] for name in ("license",) if name in model.attrs}
+    own = {"study": study.name} | {name: sample.attrs[name] for name in ("license",) if name in sample.attrs}
     # Not the checksum of one of its runs.
     own |= {name: attrs[name] for name in ("config_sha256",) if name in attrs}
-    group.setncatts(collected(f"Study {study.name}", _LAYOUT, COLLECTED, [model.attrs]) | own)
+    group.setncatts(collected(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins) | own)
 
-    names = [name for name in model.variables if name not in LABELS]
+    names = [name for name in sample.variables if name not in LABELS]
     dims = {name: sum(study.dims_of(name), ()) for name in names} | {label: (label,) for label in LABELS}
-    coordinates = coordinates_of(model.variables, {*model.coords, *LABELS}, dims)
+    coordinates = coordinates_of(sample.variables, {*sample.coords, *LABELS}, dims)
     storage = _Storage.of(study, sizes, names)
     columns = {}
     for name in names:
         if name not in sizes:
-            attributes = model[name].attrs | ({"coordinates": coordinates[name]} if name in coordinates else {})
+            attributes = (
+                sample[name].attrs
+                | _why_lacking(study, name)
+                | ({"coordinates": coordinates[name]} if name in coordinates else {})
+            )
             columns[name] = _define_column(group, study, storage, name, attributes)
     known = [*_define_numbers_along(group, study), *_define_of_campaign(group, study, storage)]
     width = max(1, *(len(failure.encode()) for failure in study.failures))
@@ -144,10 +149,17 @@ def _block(sizes, along, values):
     return tuple(reversed(block))
 
 
+def _why_lacking(study, name):
+    """Attribute of a variable that some of the study's models do not have."""
+    owners = [model for model, own in FURTHER.items() if name in own]
+    lacking = [model for model in study.axes["model"] if owners and model not in owners]
+    return {"missing": f"of runs by {' and '.join(lacking)}"} if lacking else {}
+
+
 def _define_column(group, study, storage, name, attributes):
     """Make a variable of the runs."""
     along, own = study.dims_of(name)
-    dtype = study.model[name].dtype
+    dtype = study.sample[name].dtype
     if is_text(dtype):
         width = study.widths[name]
         options = storage.options(along, own, width)
@@ -165,8 +177,8 @@ def _define_column(group, study, storage, name, attributes):
 def _define_numbers_along(group, study):
     """Make the variables that number the positions along the dimensions of runs, and give them with their values."""
     for dim, size in study.sizes.items():
-        if dim in study.model.variables:
-            variable = define_numbers(group, dim, (dim,), np.int32, study.model[dim].attrs)
+        if dim in study.sample.variables:
+            variable = define_numbers(group, dim, (dim,), np.int32, study.sample[dim].attrs)
             yield variable, np.arange(size, dtype=np.int32)
 
 

@@ -12,6 +12,7 @@ import xarray as xr
 from icha.datasets.files import Values, read_run_values
 from icha.datasets.labels import RunLabels
 from icha.datasets.netcdf import characters, is_text, not_finite
+from icha.datasets.variables.run import CELLS
 
 
 class Entry(NamedTuple):
@@ -31,12 +32,15 @@ class Entry(NamedTuple):
 
 @dataclass
 class Members:
-    """The runs of a study as they come, the widths of their texts in bytes, and a run that shows what a study has."""
+    """The runs of a study as they come, the widths of their texts in bytes.
+
+    samples, ranks : of every model a run that shows what its runs have, and how well it does.
+    """
 
     entries: dict[RunLabels, Entry] = field(default_factory=dict)
     widths: dict[str, int] = field(default_factory=dict)
-    model: xr.Dataset | str | os.PathLike | None = None
-    rank: tuple = ()
+    samples: dict[str, xr.Dataset | str | os.PathLike] = field(default_factory=dict)
+    ranks: dict[str, tuple] = field(default_factory=dict)
 
 
 def spooled(
@@ -58,8 +62,8 @@ def spooled(
         members = studies.setdefault(labels.study, Members())
         if labels in members.entries:
             raise ValueError(f"{labels}: this run is given twice")
-        values, attrs = _values_of(source) if isinstance(source, xr.Dataset) else read_run_values(source)
-        _check_labels(labels, values)
+        values, attrs = _values_of(source) if isinstance(source, xr.Dataset) else read_run_values(source, CELLS)
+        _check_labels(labels, values, attrs)
         _refuse_values_not_finite(labels, values)
         sizes = {dim: n for dims, v in values.values() for dim, n in zip(dims, v.shape, strict=False)}
         alike = frozenset(values), tuple(sorted(sizes.items())), _snapshots(values)
@@ -71,8 +75,8 @@ def spooled(
                 members.widths[name] = max(members.widths.get(name, 1), v.shape[-1])
         # Of a run that ended early some variables may be unknown: what it would have reached at the end.
         rank = ("incomplete" not in attrs, sizes.get("step", 0))
-        if members.model is None or rank > members.rank:
-            members.model, members.rank = source, rank
+        if rank > members.ranks.get(labels.model, ()):
+            members.samples[labels.model], members.ranks[labels.model] = source, rank
     if not studies:
         raise ValueError("a campaign dataset needs at least one run")
     return studies
@@ -94,7 +98,7 @@ def _values_of(run: xr.Dataset) -> tuple[Values, dict]:
     """What `icha.datasets.files.read_run_values` gives of a run's file, of the run itself."""
     values = {
         name: (variable.dims, characters(variable.values) if is_text(variable.dtype) else variable.values)
-        for name, variable in run.variables.items()
+        for name, variable in run.drop_dims(CELLS, errors="ignore").variables.items()
     }
     return values, run.attrs
 
@@ -107,7 +111,9 @@ def _failure(values, attrs) -> str:
     return f"{failed} of its steps did not converge" if failed else ""
 
 
-def _check_labels(labels, values):
+def _check_labels(labels, values, attrs):
+    if attrs.get("contact_model", labels.model) != labels.model:
+        raise ValueError(f"{labels}: the dataset's model is {attrs['contact_model']}")
     for label, tolerance in (("rms_slope", 1e-6), ("seed", 0)):
         if label in values:
             value, named = float(values[label][1]), float(getattr(labels, label))

@@ -37,19 +37,21 @@ def write_campaign(
 ) -> None:
     """Write all runs of a campaign to one netCDF-4 file: a group per study, full arrays along the labels of the runs.
 
-    The groups have the dimensions surface, seed, rms_slope and material, and those of the run dataset. A run has
-    `step_count` steps; beyond them, along `step`, numbers are missing and texts empty. Spots and events of all runs
-    stand one after the other along `spot` and `event`; `spot_surface`, `spot_seed`, `spot_rms_slope` and
-    `spot_material`, `event_surface` and so on, and `spot_snapshot`, are positions along these dimensions, from 0.
-    `status(surface, seed, rms_slope, material)` says of every combination whether its run is complete, incomplete,
+    The groups have the dimensions model, surface, seed, rms_slope and material, and those of the run dataset but for
+    those of the maps of boundary elements, which stay in the files of the runs. A run has `step_count` steps; beyond
+    them, along `step`, numbers are missing and texts empty. Spots and events of all runs stand one after the other
+    along `spot` and `event`; `spot_model`, `spot_surface`, `spot_seed`, `spot_rms_slope` and `spot_material`,
+    `event_model` and so on, and `spot_snapshot`, are positions along these dimensions, from 0. `status(model, surface,
+    seed, rms_slope, material)` says of every combination whether its run is complete, incomplete,
     missing or not in the design; `failure` says why a run is incomplete. What is not known of an incomplete run, and
-    everything of those that are not there, is missing.
+    everything of those that are not there, is missing; so is what only runs of another model have.
 
     Parameters
     ----------
-    runs : pairs of labels (study, surface, seed, rms_slope, material) and run dataset, or its file. Studies, surfaces
-        and materials keep the order in which they first come in the design, seeds and slopes are sorted. A run that
-        failed has the reason in its attribute `incomplete`; one that did not converge or lacks snapshots that others
+    runs : pairs of labels (study, model, surface, seed, rms_slope, material) and run dataset, or its file. Studies,
+        models, surfaces and materials keep the order in which they first come in the design, seeds and slopes are
+        sorted. A run that failed has the reason in its attribute `incomplete`; one that did not converge or lacks
+        snapshots that others
         of its study have is incomplete, too.
     path : the file, which appears whole or not at all. The same runs give the same bytes.
     design : labels of the runs that were asked for; those given, if left out. Other combinations of their labels are
@@ -67,8 +69,8 @@ def write_campaign(
     with tempfile.TemporaryFile(dir=path.parent) as spool:
         studies = arranged(spooled(runs, spool), design)
         with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
-            models = [study.model.attrs for study in studies]
-            file.setncatts(collected("Campaign of rough contacts", _STUDIES, COLLECTED, models) | dict(attrs))
+            origins = [each for study in studies for each in study.origins]
+            file.setncatts(collected("Campaign of rough contacts", _STUDIES, COLLECTED, origins) | dict(attrs))
             # All is defined before anything is written, which is quicker: see icha.datasets.netcdf.
             groups = [define_group(file.createGroup(study.name), study, attrs) for study in studies]
             for group in groups:

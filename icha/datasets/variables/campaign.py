@@ -17,7 +17,7 @@ STATUS = Variable(
     {
         "flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8),
         "flag_meanings": " ".join(STATUS_MEANINGS),
-        "comment": "values that a run does not have are filled with _FillValue",
+        "comment": "values that a run, or all runs of its model, do not have are filled with _FillValue",
     },
 )
 STEP_COUNT = Variable(
@@ -33,6 +33,7 @@ CAMPAIGN = {
     "step_count": STEP_COUNT,
     "seed": Variable(("seed",), "1", "seed of the surface", np.int32, coordinate=True),
     "rms_slope": Variable(("rms_slope",), "1", "root mean square slope of the surface", coordinate=True),
+    "model": Variable(("model",), "1", "model of contact: asperities or boundary_elements", str, coordinate=True),
     "surface": Variable(("surface",), "1", "name of the surface", str, coordinate=True),
     "material": Variable(("material",), "1", "name of the material", str, coordinate=True),
     "failure": FAILURE,
@@ -50,7 +51,7 @@ def place_of(dim: str, label: str) -> Variable:
 
 
 _TOPOGRAPHY = ("surface", "seed", "rms_slope")
-# What a quantity of a run can depend on; everything else depends on all four labels. The snapshots' targets are those
+# What a quantity of a run can depend on; everything else depends on all five labels. The snapshots' targets are those
 # of the study's path, the bins are fixed in units of h_rms and of E* h'_rms.
 VARIES_WITH = {
     **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range"), ("material",)),

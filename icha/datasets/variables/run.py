@@ -3,11 +3,14 @@
 import numpy as np
 
 from icha.contact.events import EVENT_KINDS
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets.bins import bin_table
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Variable, terms
 
 _STEP, _SNAPSHOT, _SPOT, _EVENT = ("step",), ("snapshot",), ("spot",), ("event",)
 _GAP_BIN, _PRESSURE_BIN = ("snapshot", "gap_bin"), ("snapshot", "pressure_bin")
+# The cells of the surface's grid: rows along y, columns along x.
+CELLS = ("row", "column")
 
 
 def _index_of(dim):
@@ -74,10 +77,16 @@ RUN = {
     "spot_snapshot": Variable(_SPOT, "1", "snapshot to which the spot belongs", int, _index_of("snapshot")),
     "spot_x": Variable(_SPOT, "m", "x of the spot's centre"),
     "spot_y": Variable(_SPOT, "m", "y of the spot's centre"),
-    "spot_radius": Variable(_SPOT, "m", "contact radius"),
+    "spot_radius": Variable(_SPOT, "m", "contact radius, that of a circle of the same area"),
+    "spot_area": Variable(_SPOT, "m^2", "contact area"),
+    "spot_perimeter": Variable(_SPOT, "m", "length of the edge of the contact area"),
     "spot_force": Variable(_SPOT, "N", "contact force, negative in tension"),
-    "spot_curvature_radius": Variable(_SPOT, "m", "radius of curvature of the spot's paraboloid"),
-    "spot_members": Variable(_SPOT, "1", "number of asperities united in the spot", int),
+    "spot_curvature_radius": Variable(
+        _SPOT, "m", "radius of curvature of the spot's paraboloid, of boundary elements that of its highest summit"
+    ),
+    "spot_members": Variable(
+        _SPOT, "1", "number of asperities united in the spot, of boundary elements that of the summits in it", int
+    ),
     **terms(*MATERIAL, *ROUGHNESS),
     "spectral_moment_0": Variable((), "m^2", "spectral moment m0 of a profile: variance of its height"),
     "spectral_moment_2": Variable((), "1", "spectral moment m2 of a profile: variance of its slope"),
@@ -91,11 +100,29 @@ RUN = {
     "asperity_count": Variable((), "1", "number of asperities on the surface", int),
     "control": Variable((), "1", "what is imposed: separation or load", str),
     "united_until": Variable(
-        (), "1", "until when united spots stay united on the way back: detachment or overlap", str
+        (),
+        "1",
+        "until when united spots stay united on the way back: detachment or overlap; empty for boundary elements",
+        str,
     ),
 }
 
-# Besides, those of a path that goes on after the first loading ...
+# Besides, those of boundary elements ...
+PATCHES = {
+    "front_residual": Variable(
+        _STEP,
+        "1",
+        "largest deviation from 1 along the edges of contact of the root of energy release rate over surface energy",
+    ),
+    "gap_residual": Variable(_STEP, "1", "largest gap in contact, or overlap out of it, over h_rms"),
+    "pressure_residual": Variable(_STEP, "1", "largest pressure out of contact over contact modulus and rms slope"),
+    "contact_map": Variable((*_SNAPSHOT, *CELLS), "1", "part of the cell that is in contact", np.float32),
+    "contact_pressure": Variable((*_SNAPSHOT, *CELLS), "Pa", "pressure in the cell, negative in tension", np.float32),
+}
+# By model: what its runs have besides those of all models.
+FURTHER = {ASPERITIES: {}, BOUNDARY_ELEMENTS: PATCHES}
+
+# ... those of a path that goes on after the first loading ...
 CYCLE = {
     "work": Variable(
         _STEP,

@@ -1,0 +1,27 @@
+"""Boundary elements in the limit of a short range of attraction: fronts of contact obey Griffith's criterion."""
+
+import importlib
+
+from icha.asperity.material import Material
+from icha.contact.observables import Observables
+from icha.models.model import Model
+from icha.path.targets import Path
+from icha.surfaces.surface import Surface
+
+
+def _observables(surface: Surface, material: Material, path: Path) -> Observables:
+    contact = importlib.import_module("icha.boundary_elements.contact").BoundaryElements.of(surface, material)
+    return importlib.import_module("icha.boundary_elements.observables").PatchObservables(contact, surface)
+
+
+MODEL = Model(
+    title="boundary elements",
+    method="boundary elements in the limit of a short range of attraction, fronts at Griffith's energy release rate",
+    references=(
+        "A. A. Griffith, Phil. Trans. R. Soc. A 221 (1921) 163-198, doi:10.1098/rsta.1921.0006; "
+        "K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. A 324 (1971) 301-313, doi:10.1098/rspa.1971.0141; "
+        "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
+    ),
+    united_by_rule=False,
+    observables=_observables,
+)

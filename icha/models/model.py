@@ -1,0 +1,28 @@
+"""What a run needs to know of a model of contact."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from icha.asperity.material import Material
+from icha.contact.observables import Observables
+from icha.path.targets import Path
+from icha.surfaces.surface import Surface
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model of contact.
+
+    Parameters
+    ----------
+    title, method : what it is, for the title and the summary of a run.
+    references : publications of its methods.
+    united_by_rule : whether the path's `united_until` means something to it.
+    observables : of the contact of a surface and a material, for a path; ValueError if it cannot be computed.
+    """
+
+    title: str
+    method: str
+    references: str
+    united_by_rule: bool
+    observables: Callable[[Surface, Material, Path], Observables]
