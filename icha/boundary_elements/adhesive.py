@@ -1,4 +1,4 @@
-"""Contact with adhesion at a given separation: fronts come to rest, and new contact forms within reach of the attraction."""
+"""Contact with adhesion at a given separation: fronts come to rest, and contact forms within reach of the attraction."""
 
 from __future__ import annotations
 
@@ -58,4 +58,6 @@ def settled(
         if not new.any():
             return state, int(np.count_nonzero(seeds))
         tried |= new
-        state = Held(np.where(new.reshape(heights.shape), 1.0, state.fraction), state.pressure, state.gap, 0.0, state.around)
+        state = Held(
+            np.where(new.reshape(heights.shape), 1.0, state.fraction), state.pressure, state.gap, 0.0, state.around
+        )

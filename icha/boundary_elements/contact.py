@@ -25,7 +25,7 @@ from icha.surfaces.surface import Surface
 # Relative error of a held load or area.
 _HELD = 1e-10
 _MAX_TRIALS = 60
-# A trial so near the target, relatively, is gone on from even if it lies beyond. Closer separations, in h_rms, are the same.
+# A trial so near the target, relatively, is gone on from even if it lies beyond. Closer separations, in h_rms, are one.
 _CLOSE = 1e-3
 _SAME = 1e-13
 # What a load of zero is held to, over E*; and an area without adhesion, in cells.
@@ -40,8 +40,8 @@ _EDGE = (np.pi - 1 + np.log(2)) / 24
 class BoundaryElements:
     """A periodic rough surface against a half-space, cell by cell: a `ContactModel`.
 
-    heights: (n, n), m. spacing: m. law: of one summit, for how far its attraction reaches. The solver works in cells and
-    E*: `space`, `front` and `summits` are in these units.
+    heights: (n, n), m. spacing: m. law: of one summit, for how far its attraction reaches. The solver works in cells
+    and E*: `space`, `front` and `summits` are in these units.
     """
 
     heights: np.ndarray
@@ -72,9 +72,7 @@ class BoundaryElements:
             -law.jump_in_approach(asperities.radius_of_curvature) / h,
         )
         front = Front(material.surface_energy / (material.contact_modulus * h))
-        return cls(
-            surface.heights, h, law, surface.rms_height, asperities, HalfSpace.of(surface.grid), front, summits
-        )
+        return cls(surface.heights, h, law, surface.rms_height, asperities, HalfSpace.of(surface.grid), front, summits)
 
     # --- what a path asks of every model --------------------------------------------------------------------------
 
@@ -130,9 +128,7 @@ class BoundaryElements:
         if self.adhesive:
             return areas(state.fraction, neighbours(state.fraction))
         touching = state.touching
-        bare = sum(
-            (touching & ~np.roll(touching, way, axis)).astype(float) for axis in (0, 1) for way in (-1, 1)
-        )
+        bare = sum((touching & ~np.roll(touching, way, axis)).astype(float) for axis in (0, 1) for way in (-1, 1))
         return touching - _EDGE * bare
 
     def mean_gap(self, state: CellState) -> float:

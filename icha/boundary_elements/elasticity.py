@@ -32,7 +32,12 @@ class Held:
 
 
 def solve_bonds(
-    space: HalfSpace, touching: np.ndarray, bonds: np.ndarray, wanted: np.ndarray, pressure: np.ndarray, tolerance: float
+    space: HalfSpace,
+    touching: np.ndarray,
+    bonds: np.ndarray,
+    wanted: np.ndarray,
+    pressure: np.ndarray,
+    tolerance: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pressures p with (K + bonds) p = wanted where `touching`, zero elsewhere; and K p everywhere.
 
@@ -70,12 +75,17 @@ def solve_bonds(
 
 
 def held(
-    space: HalfSpace, heights: np.ndarray, separation: float, fraction: np.ndarray, pressure: np.ndarray, tolerance: float
+    space: HalfSpace,
+    heights: np.ndarray,
+    separation: float,
+    fraction: np.ndarray,
+    pressure: np.ndarray,
+    tolerance: float,
 ) -> Held:
     """The elastic equilibrium of given fractions of contact.
 
-    Bonds pull only: cells that are partly in contact and come under pressure close. Where the surfaces would overlap they
-    touch, under pressure: whether they also stick is for the front to say.
+    Bonds pull only: cells that are partly in contact and come under pressure close. Where the surfaces would overlap
+    they touch, under pressure: whether they also stick is for the front to say.
 
     Parameters
     ----------
@@ -104,6 +114,6 @@ def front_tension(front: Front, held: Held) -> np.ndarray:
     """sqrt(G/dgamma) of every cell, (n, n): above 1 a cell in contact opens, below 1 an open one closes."""
     strengths = front.strengths(held.around)
     touching = held.fraction > 0
-    return np.where(
-        touching, -held.pressure / np.where(touching, held.fraction, 1.0), held.gap / COMPLIANCE
-    ) / strengths
+    return (
+        np.where(touching, -held.pressure / np.where(touching, held.fraction, 1.0), held.gap / COMPLIANCE) / strengths
+    )

@@ -1,11 +1,11 @@
 """The front of contact within its cells: what holds a cell that is partly in contact, and when its front rests.
 
 A cell has a fraction of contact f. It is held by a bond of compliance c(f) = C (1/f - 1): closed for f = 1, none for
-f = 0. At a given energy of adhesion the front rests where the energy of bonds, half-space and adhesion is stationary in
-f, which is where the tension of the cell is f times the strength, s = sqrt(2 dgamma/C): a traction that falls linearly
-with the gap and does the work dgamma (Griffith; A. A. Griffith, Phil. Trans. A 221 (1921) 163). C is that of the rows at
-a straight front, times a factor: then a front moves through its cells without being trapped by them, and what is between
-open and closed is about two cells wide.
+f = 0. At a given energy of adhesion the front rests where the energy of bonds, half-space and adhesion is stationary
+in f, which is where the tension of the cell is f times the strength, s = sqrt(2 dgamma/C): a traction that falls
+linearly with the gap and does the work dgamma (A. A. Griffith, Phil. Trans. A 221 (1921) 163). C is that of the rows at
+a straight front, times a factor: then a front moves through its cells without being trapped by them, and what is
+between open and closed is about two cells wide.
 
 Such a front lies by a constant part of a cell within the sum of its fractions. An area that counts cells by their
 neighbours,
@@ -24,8 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import correlate1d
 
-# Compliance of the last row of a straight contact, with the kernel 2/q, over h/E*; the front's own is larger by a factor
-# at which circular spots, wherever in their cells, follow JKR with the least scatter (docs/short_range.md).
+# Compliance of the last row of a straight contact, with the kernel 2/q, over h/E*. The front's own is larger by a
+# factor at which circular spots, wherever in their cells, follow JKR (docs/short_range.md).
 _ROW = 1.7316
 _SOFTER = 1.6
 COMPLIANCE = _SOFTER * _ROW

@@ -2,14 +2,13 @@
 
 The energy U(f) - dgamma A(f) falls with every step, so that what is found is a local minimum that can be reached from
 where the search began; where the front is unstable it runs until it rests. A step solves the linearised equations of
-contact (displacement given), of the front (tension = f strength) and of its strength; where these lead up, the bonds are
-made softer in them, which shortens the step (Levenberg and Marquardt).
+contact (displacement given), of the front (tension = f strength) and of its strength; where these lead up, the bonds
+are made softer in them, which shortens the step (Levenberg and Marquardt).
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import binary_dilation
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.boundary_elements.elasticity import Held, front_tension, held
@@ -50,7 +49,7 @@ def moving(front: Front, state: Held) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def front_residual(front: Front, state: Held) -> float:
-    """Largest deviation of sqrt(G/dgamma) from 1 where the front is free to move, from below or above where it is not."""
+    """Largest deviation of sqrt(G/dgamma) from 1 where the front is free to move."""
     closing, opening, tension = moving(front, state)
     off = np.abs(tension - 1)[closing | opening]
     return float(np.max(off, initial=0.0))

@@ -8,7 +8,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 
-
 def labelled(touching: np.ndarray) -> tuple[np.ndarray, int]:
     """Number of the patch of every cell, (n, n), 0 outside, and how many there are; cells that share an edge belong
     together, over the edges of the period too.
@@ -44,6 +43,8 @@ def centres(labels: np.ndarray, count: int, weight: np.ndarray) -> np.ndarray:
     result = np.empty((count, 2))
     for axis, at in enumerate((inside % n, inside // n)):
         phase = turn[at]
-        mean = np.bincount(own, weights * phase.real, count + 1) + 1j * np.bincount(own, weights * phase.imag, count + 1)
+        mean = np.bincount(own, weights * phase.real, count + 1) + 1j * np.bincount(
+            own, weights * phase.imag, count + 1
+        )
         result[:, axis] = np.angle(mean[1:]) * n / (2 * np.pi) % n
     return result
