@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import small_campaign as small
+import xarray as xr
 
 import icha
 from icha.analysis.model_error import SHARED, contact_of_spots, model_error, state_of
@@ -63,6 +64,30 @@ def solutions(entry="truth", keep=lambda labels: True, *, area=lambda labels: 1.
     ]
 
 
+def own_patches(run, *, area=1.0, separation=1.0):
+    """A run by boundary elements made of one by asperities: area and separation multiplied, its spots as maps."""
+    maps = [contact_of_spots(run, k, GRID) for k in range(run.sizes["snapshot"])]
+    step = xr.zeros_like(run["reduced_pressure"])
+    return run.assign(
+        contact_area_fraction=run["contact_area_fraction"] * area,
+        reduced_separation=run["reduced_separation"] * separation,
+        front_residual=step + 1e-4,
+        gap_residual=step,
+        pressure_residual=step,
+        contact_map=(("snapshot", "row", "column"), np.array(maps, np.float32)),
+        contact_pressure=(("snapshot", "row", "column"), np.zeros((len(maps), GRID, GRID), np.float32)),
+    ).assign_attrs(contact_model="boundary_elements")
+
+
+def patches(keep=lambda labels: True, **factors):
+    """Runs by boundary elements beside those by asperities that `keep` names."""
+    return [
+        (labels._replace(model="boundary_elements"), own_patches(run, **factors))
+        for labels, run in runs().items()
+        if keep(labels)
+    ]
+
+
 AREA_FACTORS = {1: 1.1, 2: 1.2, 3: 1.6}
 
 
@@ -77,5 +102,11 @@ def solutions_of_errors():
 
 @cache
 def errors():
-    """The error against `solutions_of_errors`."""
+    """The error against `solutions_of_errors`, at finite ranges."""
     return model_error(tree(), solutions_of_errors())
+
+
+@cache
+def short_range_errors():
+    """The error against `solutions_of_errors` and, in the limit of a short range, runs with half as much area again."""
+    return model_error(tree(), solutions_of_errors(), runs=patches(area=1.5, separation=0.9))

@@ -1,4 +1,8 @@
-"""How far the model is from boundary elements on the same topography, at the same load and range of attraction."""
+"""How far asperities are from boundary elements on the same topography, at the same load.
+
+In the limit of a short range those are runs of the same study by another model, with stops at the same loads; at finite
+ranges they are solutions of Tamaas beside the study.
+"""
 
 import itertools
 import warnings
@@ -14,16 +18,16 @@ from icha.contact.models import ASPERITIES
 from icha.datasets.attributes import DERIVED, collected
 from icha.datasets.bins import bin_values
 from icha.datasets.build import described, variable
-from icha.datasets.campaign import find_snapshot, select_run, spots_of
+from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spots_of
 from icha.datasets.labels import LABELS, RunLabels, SolutionLabels
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
-from icha.datasets.variables.model_error import ASKED, BINS, MODEL_ERROR
+from icha.datasets.variables.model_error import ASKED, BINS, FINITE_RANGE, MODEL_ERROR, SHORT_RANGE
 from icha.datasets.variables.terms import MATERIAL, Variable
 from icha.equilibrium.distributions import nodes_in_discs
 from icha.path.targets import REDUCED_PRESSURE
 
 _TITLE = "Error of the model against boundary elements"
-_SUMMARY = "The same topographies, loads and ranges of attraction by the model and by boundary elements."
+_SUMMARY = "The same topographies, loads and materials by the model and by boundary elements."
 
 # Labels of the runs, all of one model.
 _LABELS = tuple(label for label in LABELS if label != "model")
@@ -39,6 +43,8 @@ SHARED = (
     "interaction_range",
 )
 _ROUNDING = 1e-6
+# From this part on a cell of a contact map is in contact.
+_HALF = 0.5
 
 # Of these, mean and deviation over the seeds.
 SUMMARISED = (
@@ -53,23 +59,29 @@ SUMMARISED = (
 
 def model_error(
     campaign: xr.DataTree,
-    solutions: Iterable[tuple[SolutionLabels | tuple, xr.Dataset]],
+    solutions: Iterable[tuple[SolutionLabels | tuple, xr.Dataset]] = (),
     *,
+    runs: Iterable[tuple[RunLabels | tuple, xr.Dataset]] = (),
     attrs: Mapping[str, str] = {},
 ) -> xr.DataTree:
-    """The runs of a campaign by asperities beside their boundary-element solutions, state by state.
+    """The runs of a campaign by asperities beside boundary elements, state by state.
 
     Parameters
     ----------
     campaign : the campaign dataset; its runs have a snapshot of kind `reduced_pressure` at every solution's load.
-    solutions : pairs of labels (entry, study, surface, seed, rms_slope, material, reduced_pressure) and the solution's
-        dataset (`icha.references.finite_range`), in any order.
+    solutions : at finite ranges: pairs of labels (entry, study, surface, seed, rms_slope, material, reduced_pressure)
+        and the solution's dataset (`icha.references.finite_range`), in any order.
+    runs : in the limit of a short range: pairs of labels and dataset of the runs by boundary elements, with their maps,
+        in any order. They are compared at the stops of kind `reduced_pressure` of their first loading, distributions
+        and maps where both models keep a snapshot.
     attrs : further global attributes.
 
     Returns
     -------
-    DataTree with a group for every entry, along surface, seed, rms_slope, material and reduced_pressure (the one
-    asked for): those of `icha.datasets.variables.model_error`; for those of `SUMMARISED` the mean over the seeds,
+    DataTree with a group for the runs of every study, named as the study is, and for every entry of solutions; its
+    attribute `truth` says which (`SHORT_RANGE`, `FINITE_RANGE`). All are along surface, seed, rms_slope, material and
+    reduced_pressure (the one asked for) and have those of `icha.datasets.variables.model_error`; for those of
+    `SUMMARISED` the mean over the seeds,
     `<name>_mean`, and from two seeds on their standard deviation, `<name>_deviation`; modulus, energy, range and Tabor
     parameter of the runs. `status(surface, seed, rms_slope, material)` says which of these combinations have solutions
     beside a complete run; elsewhere values are missing, and do not count.
@@ -81,8 +93,19 @@ def model_error(
         than the solution's; if a contact lacks a state that others of its entry have, or has one twice.
     """
     select = cache(lambda labels: select_run(campaign, labels))
-    entries: dict[str, dict[SolutionLabels, dict]] = {}
+    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     origins: dict[str, list[dict[str, str]]] = {}
+    for labels, truth in runs:
+        labels = RunLabels(*labels)
+        run = select(labels._replace(model=ASPERITIES))
+        states = entries.setdefault(labels.study, {})
+        try:
+            states |= _compare_stops(labels, run, truth)
+        except ValueError as error:
+            raise ValueError(f"{labels}: {error}") from None
+        origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
+    entries = {study: _with_all_loads(states) for study, states in entries.items() if states}
+    short_range = set(entries)
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)
         states = entries.setdefault(labels.entry, {})
@@ -102,13 +125,13 @@ def model_error(
             raise ValueError(f"{_name(labels)}: {error}") from None
         origins.setdefault(labels.entry, []).extend((run.attrs, solution.attrs))
     if not entries:
-        raise ValueError("a model error needs at least one boundary-element solution")
-    groups = {
-        f"/{entry}": _entry_dataset(campaign, entry, states).assign_attrs(
-            collected(f"{_TITLE}, entry {entry}", _SUMMARY, DERIVED, origins.get(entry, []))
-        )
-        for entry, states in entries.items()
-    }
+        raise ValueError("a model error needs at least one run or solution by boundary elements")
+    groups = {}
+    for entry, states in entries.items():
+        truth = SHORT_RANGE if entry in short_range else FINITE_RANGE
+        title = f"{_TITLE}, {'study' if entry in short_range else 'entry'} {entry}"
+        described = collected(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
+        groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(described)
     root = collected(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
 
@@ -123,6 +146,67 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
     """
     check_same_contact(run, solution)
     state = state_of(run, snapshot)
+    return _amounts(state, solution) | _shapes(run, snapshot, state, solution)
+
+
+def _compare_stops(labels, run, truth):
+    """The states of a run by boundary elements and of the one by asperities, by their labels; None where one failed."""
+    check_same_contact(run, truth)
+    failed = "incomplete" in run.attrs or "incomplete" in truth.attrs
+    found = {}
+    stops, true_stops = _stops(run), _stops(truth)
+    for load in dict.fromkeys((*stops, *true_stops)):
+        state = None
+        if not failed and load in stops and load in true_stops:
+            solution = _as_solution(truth, true_stops[load], load)
+            state = _amounts(run.isel(step=stops[load]), solution)
+            if "contact" in solution and (kept := _snapshot_at(run, load)) is not None:
+                state |= _shapes(run, kept, state_of(run, kept), solution)
+        found[SolutionLabels(labels.study, labels.study, *labels[2:], load)] = state
+    return found
+
+
+def _with_all_loads(states):
+    """The states of a study with those, None, that a run lacks and others have."""
+    loads = {labels.reduced_pressure for labels in states}
+    everywhere = {labels._replace(reduced_pressure=load) for labels in states for load in loads}
+    return dict.fromkeys(everywhere) | states
+
+
+def _stops(run):
+    """Steps of the stops of a run's first loading at given reduced pressures, by these."""
+    asked = loading_stops(run) & (run["step_kind"] == REDUCED_PRESSURE)
+    return {float(run["step_target"].values[step]): step for step in np.flatnonzero(asked.values).tolist()}
+
+
+def _snapshot_at(run, load):
+    """Where a run keeps its state of a reduced pressure; None if it does not."""
+    try:
+        return find_snapshot(run, REDUCED_PRESSURE, load)
+    except ValueError:
+        return None
+
+
+def _as_solution(run, step, load):
+    """A state of a run by boundary elements under the names of a solution; distributions and map if it keeps them.
+
+    Their contact has an edge, beyond which nothing acts: all its areas are one.
+    """
+    state, kept = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step), _snapshot_at(run, load)
+    if kept is not None:
+        contact = run["contact_map"].isel(snapshot=kept).rename(row="y", column="x") >= _HALF
+        state = state_of(run, kept).assign(contact=contact)
+    area = state["contact_area_fraction"]
+    return state.assign(
+        contact_area_fraction_raw=area,
+        energetic_area_fraction=area,
+        residual=state["front_residual"],
+        load_error=state["reduced_pressure"] / load - 1,
+    )
+
+
+def _amounts(state, solution):
+    """Areas and separations of a state and a solution, and what is known of the solution itself."""
     area, truth = (float(each["contact_area_fraction"]) for each in (state, solution))
     separation, true_separation = (float(each["reduced_separation"]) for each in (state, solution))
     for name, value in (("contact area", truth), ("mean separation", true_separation)):
@@ -132,10 +216,6 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
     # range vanishes.
     adhesive = float(solution["surface_energy"]) > 0
     raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
-    spots = contact_of_spots(run, snapshot, solution.sizes["x"])
-    contact = solution["contact"].transpose("y", "x").values == 1
-    height = float(solution["rms_height"])
-    pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     return {
         "contact_area_fraction": area,
         "contact_area_fraction_boundary_elements": truth,
@@ -147,15 +227,25 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
         "area_error": area / truth - 1,
         "energetic_area_error": area / (energetic if adhesive else truth) - 1,
         "separation_error": separation / true_separation - 1,
+        "load_error": float(solution["load_error"]),
+        "residual": float(solution["residual"]),
+        "solution_grid": int(solution["grid"]),
+    }
+
+
+def _shapes(run, snapshot, state, solution):
+    """How far distributions and contact map of a snapshot and a solution are apart, and what the solution has."""
+    spots = contact_of_spots(run, snapshot, solution.sizes["x"])
+    contact = solution["contact"].transpose("y", "x").values == 1
+    height = float(solution["rms_height"])
+    pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
+    return {
         "gap_distribution_distance": gap_distribution_distance(state, solution) / height,
         "pressure_distribution_distance": pressure_distribution_distance(state, solution)
         / float(state["nominal_pressure"]),
         "jaccard": jaccard(spots, contact),
         "shared_of_icha": shared(spots, contact),
         "shared_of_boundary_elements": shared(contact, spots),
-        "load_error": float(solution["load_error"]),
-        "residual": float(solution["residual"]),
-        "solution_grid": int(solution["grid"]),
         "gap_density": solution["gap_density"].values * height,
         "pressure_density": solution["pressure_density"].values * pressure,
     }
@@ -278,8 +368,9 @@ def _entry_dataset(campaign, entry, states):
         for label in _LABELS
     }
     coords["reduced_pressure"] = variable(ASKED, axes["reduced_pressure"])
-    of_contact = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
-    variables = {"status": variable(STATUS._replace(dims=_LABELS), np.array(of_contact).reshape(shape)[..., 0])}
+    # Of a contact that was compared at some loads the best one counts.
+    of_state = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
+    variables = {"status": variable(STATUS._replace(dims=_LABELS), np.reshape(of_state, shape).min(axis=-1))}
     variables |= _along_axes([states.get(labels) for labels in grid], shape)
     variables |= _over_seeds(variables)
     bins = described(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
@@ -305,7 +396,7 @@ def _along_axes(states, shape):
     variables = {}
     for name, description in MODEL_ERROR.items():
         unknown = np.full([bins[dim] for dim in description.dims], np.nan)
-        values = np.array([unknown if state is None else state[name] for state in states])
+        values = np.array([unknown if state is None else state.get(name, unknown) for state in states])
         values = values.reshape(shape + values.shape[1:])
         variables[name] = xr.Variable(AXES + description.dims, values, description.attributes)
         if description.dtype is int and values.dtype.kind == "f":
@@ -320,7 +411,7 @@ def _over_seeds(variables):
     found = {}
     for name in SUMMARISED:
         values, long_name = variables[name].values, MODEL_ERROR[name].long_name
-        mean = Variable(others, "1", f"mean over the seeds: {long_name}")
+        mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=MODEL_ERROR[name].further)
         # Of no complete run there is no mean.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)

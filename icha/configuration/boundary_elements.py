@@ -109,14 +109,14 @@ Refinement = Annotated[
 
 
 class BoundaryElements(BesideStudy):
-    """Boundary-element solutions of a study's own topographies, beside its runs."""
+    """Boundary elements at a finite range of attraction on a study's own topographies, beside its runs."""
 
     reduced_pressures: Loads
     refinement: Refinement = 1
 
 
 class BoundaryElementLoops(BesideStudy):
-    """Boundary elements from separation to the largest load of a study's runs and back."""
+    """Boundary elements at a finite range of attraction, both ways, to the largest load of a study's runs."""
 
     refinement: Refinement = 1
     separation_step: number(STEP) = Field(

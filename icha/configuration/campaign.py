@@ -30,7 +30,7 @@ from icha.configuration.publication import Publication
 from icha.configuration.studies import Study
 from icha.configuration.surfaces import AnySurface, SelfAffineSurface
 from icha.configuration.values import MEASURED
-from icha.contact.models import BOUNDARY_ELEMENTS
+from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.support.values import (
     ROUNDING,
     Name,
@@ -121,6 +121,11 @@ class Campaign(Section):
         return own.model_copy(
             update={key: getattr(own, key) or getattr(self, key) for key in ("title", "summary", "license")}
         )
+
+    def compares_models(self, study: str) -> bool:
+        """Whether the runs of a study by asperities have others by boundary elements beside them at given loads."""
+        asked = self.studies[study]
+        return set(asked.models) == set(MODELS) and bool(asked.targets.reduced_pressures)
 
     def loop_load(self, entry: BoundaryElementLoops) -> float:
         """The reduced pressure at which boundary elements both ways turn: the last one of their study."""
@@ -214,6 +219,10 @@ class Campaign(Section):
         for section in (*BESIDE_STUDIES, "measurements"):
             for label, entry in getattr(self, section).items():
                 yield from _within((section, label), entry.problems(self))
+        for label in self.boundary_elements:
+            if label in self.studies and self.compares_models(label):
+                reason = "is the name of a study that has boundary elements of its own; allowed: another name"
+                yield ("boundary_elements", label), label, reason
         yield from _within(("publication",), self.publication.problems(self))
         for label, figure in self.figures.drawn().items():
             yield from _within(("figures", label), figure.problems(self))

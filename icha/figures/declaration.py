@@ -31,6 +31,9 @@ class Campaign(Protocol):
     def solved(self, entry: Any) -> list[tuple[str, int, float, str]]:
         """The same of an entry beside a study."""
 
+    def compares_models(self, study: str) -> bool:
+        """Whether the runs of a study by asperities have others by boundary elements beside them at given loads."""
+
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
         """Kind and value of all states that the runs of a study keep; None where they keep their last one."""
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL, bars_handle
 from icha.figures.scale import MOST_COLOURS, Scale, places_scale
 from icha.figures.select import NothingToDraw, study_errors
@@ -41,7 +42,8 @@ _OTHER = {"ls": ":", "lw": 0.9, "marker": ".", "ms": 3}
 class Quantity(NamedTuple):
     """A variable of the model error, the label of its axis, and its factor and limits on it (None: as they come).
 
-    The variable `other`, if there is one, is a dotted line without markers where there is adhesion.
+    The variable `other`, if there is one, is a dotted line without markers where boundary elements with adhesion have a
+    finite range.
     """
 
     name: str
@@ -69,8 +71,9 @@ class _Curves(NamedTuple):
     def look(self, key: tuple) -> tuple[str, dict]:
         """Name of a curve in the legend, and arguments of `Axes.errorbar`."""
         entry, surface, slope, material = key
-        # Solutions of the same state on another grid, say.
-        again = [each[0] for each in self.keys if each[1:] == key[1:]].index(entry)
+        # Solutions of the same state at a finite range, or on another grid.
+        same = [each[0] for each in self.keys if each[1:] == key[1:]]
+        again, truths = same.index(entry), [self.entries[each].attrs["truth"] for each in same]
         place, kind = self.places.index((surface, slope)), self.materials.index(material)
         colour = COLOURS[(place if self.own_rows else kind + 1) % len(COLOURS)]
         colour = self.scale.colours[place] if self.scale else colour
@@ -78,7 +81,8 @@ class _Curves(NamedTuple):
         if not self.scale:
             name += [surface] if len({each for each, _ in self.places}) > 1 else []
             name += [slope_label(slope)] if len({each for _, each in self.places}) > 1 else []
-        name += [entry] if again else []
+        name += ["at finite range"] if len(set(truths)) > 1 and truths[again] == FINITE_RANGE else []
+        name += [entry] if truths.index(truths[again]) < again else []
         return ", ".join(name), {
             "color": colour,
             "marker": MARKERS[(0 if self.own_rows else place) % len(MARKERS)],
@@ -134,7 +138,7 @@ def draw_errors(model_error: xr.DataTree, *, study: str, quantities: tuple[Quant
     for ax, quantity in zip(panels[-1], quantities, strict=True):
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylim(*quantity.limits)
-    if any(each.other for each in quantities) and (curves.interfaces["surface_energy"] > 0).any():
+    if any(each.other for each in quantities) and any(map(has_cohesive_zone, curves.entries.values())):
         named["against the energetic area"] = legend_handle(color=GREY, **_OTHER)
     named |= bars_handle(counts)
     if curves.scale:
@@ -177,7 +181,7 @@ def _draw_curve(row, errors, quantities, look, apart, counts):
         bars = quantity.factor * over.confidence if over.count.max() > 1 else None
         handle = ax.errorbar(p, quantity.factor * over.mean, bars, **look)
         counts.update(over.count.tolist())
-        if quantity.other and float(errors["surface_energy"]) > 0:
+        if quantity.other and has_cohesive_zone(errors):
             ax.plot(p, quantity.factor * errors[f"{quantity.other}_mean"].values, color=look["color"], **_OTHER)
     return handle
 
@@ -187,6 +191,11 @@ def _legend_rows(curves):
     keys, places = curves.keys, curves.places
     names = len(places) + len(keys) - len({key[1:] for key in keys}) if curves.own_rows else len(keys)
     return 2 * np.ceil(names / (4 if curves.own_rows else 2))
+
+
+def has_cohesive_zone(errors):
+    """Whether boundary elements attract out of contact, so that they have a second area."""
+    return errors.attrs["truth"] == FINITE_RANGE and bool((errors["surface_energy"] > 0).any())
 
 
 def interfaces_of(entries, materials):

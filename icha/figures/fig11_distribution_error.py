@@ -11,17 +11,18 @@ from icha.figures.options import ComparedFigure, model_error_only
 DECLARATION = Declaration(
     description=(
         "How far distributions of pressure and gap and the contact map are from those of boundary elements. The study "
-        "needs `boundary_elements`."
+        "needs both `models`, or an entry of `boundary_elements`."
     ),
     caption=(
-        "How the states of ICHA differ from those of boundary elements of the same topographies, loads and interaction "
-        "range, by an independent code, against the reduced pressure F/(E* h'rms A0): first Wasserstein distance (area "
-        "between the cumulative distributions) between the P(p), in units of the nominal pressure, and between the "
-        "P(u), in units of the rms height, both over the nominal area; and the overlap of the contact maps, area in "
-        "contact in both over area in contact in either, on the nodes of the boundary elements. Points: mean over the "
-        "seeds; bars: the 95 % confidence of that mean (Student's t); open markers are without adhesion. At the ranges "
-        "that a grid resolves boundary elements show practically no hysteresis: with adhesion they bound the limit of "
-        "short ranges (JKR), they do not prove it."
+        "How the states of ICHA differ from those of boundary elements of the same topographies and loads, in the "
+        "limit of a short range of attraction unless the legend says otherwise, against the reduced pressure "
+        "F/(E* h'rms A0): first Wasserstein distance (area between the cumulative distributions) between the P(p), in "
+        "units of the nominal pressure, and between the P(u), in units of the rms height, both over the nominal area; "
+        "and the overlap of the contact maps, area in contact in both over area in contact in either, on the nodes of "
+        "the boundary elements. Points: mean over the seeds; bars: the 95 % confidence of that mean (Student's t); "
+        "open markers are without adhesion. Where boundary elements have a finite range they are an independent code: "
+        "at the ranges that a grid resolves they show practically no hysteresis, so that with adhesion they bound the "
+        "limit of short ranges (JKR), and do not prove it."
     ),
     options=ComparedFigure,
     inputs=model_error_only,

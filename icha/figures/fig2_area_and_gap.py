@@ -20,7 +20,7 @@ from icha.figures.curves import (
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.options import StudyFigure, is_compared
-from icha.figures.select import study_errors
+from icha.figures.select import is_short_range, study_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
 
@@ -43,14 +43,15 @@ DECLARATION = Declaration(
         "F/(E* h'rms A0), on double logarithmic axes. Markers: ICHA, one for each stop of the loading path; open "
         "markers are without adhesion. Where there are several seeds the lines are means over them at common loads, "
         "with the 95 % band of confidence of the mean (Student's t). Thin dashed lines, where there are any: the way "
-        "back, unloading, while the load is compressive. Upright crosses, where there are any: boundary elements, an "
-        "independent code, on the same topographies (means over their seeds) and with the same interaction range, in "
-        "the colour of the material; their area is corrected by the perimeter of the contact. At the ranges that a "
-        "grid resolves they show practically no hysteresis, so that with adhesion they bound the limit of short ranges "
-        "(JKR), and do not prove it. Lines: adhesionless theories of Persson (area) and of Yang and Persson "
-        "(separation), the linear law of Bush, Gibson and Thomas where few summits touch, and the theories of separate "
-        "summits of Greenwood and Williamson (no adhesion) and of Fuller and Tabor (with adhesion, in the colour of "
-        "the material), with the spectral moments of the surface, of several the first one. Oblique crosses: "
+        "back, unloading, while the load is compressive. Upright crosses, where there are any: boundary elements in "
+        "the limit of a short range of attraction, on the same topographies (means over their seeds), in the colour of "
+        "the material. Crosses of three arms, where there are any: boundary elements by an independent code at the "
+        "finite interaction range of the material; their area is corrected by the perimeter of the contact, and as "
+        "they show practically no hysteresis at ranges that a grid resolves, with adhesion they bound the limit of "
+        "short ranges (JKR), and do not prove it. Lines: adhesionless theories of Persson (area) and of Yang and "
+        "Persson (separation), the linear law of Bush, Gibson and Thomas where few summits touch, and the theories of "
+        "separate summits of Greenwood and Williamson (no adhesion) and of Fuller and Tabor (with adhesion, in the "
+        "colour of the material), with the spectral moments of the surface, of several the first one. Oblique crosses: "
         "adhesionless Green's function molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no "
         "roll-off), reduced from published data."
     ),
@@ -59,8 +60,9 @@ DECLARATION = Declaration(
 )
 
 
-# Boundary elements; further solutions of the same states, on other grids, have markers of their own.
-_CROSSES = ("+", "1", "2", "3", "4")
+# Boundary elements in the limit of a short range, and at finite ones; further solutions of the same states, on other
+# grids, have markers of their own.
+_CROSS, _FINITE_RANGE = "+", ("1", "2", "3", "4")
 
 
 @styled
@@ -141,11 +143,12 @@ def _separations(run):
 
 def _draw_solutions(left, right, colours, entries):
     """Mark the states of boundary elements, means over their seeds; returns pressures, areas and separations."""
-    states, drawn = [], []
+    states, drawn, named = [], [], set()
     for entry, errors in entries.items():
+        name = errors.attrs["truth"]
         for material in errors["material"].values.tolist():
-            again = drawn.count(material)
-            drawn.append(material)
+            again = drawn.count((name, material))
+            drawn.append((name, material))
             own = errors.sel(material=material)
             area, gap = (
                 ensemble(own[f"{name}_boundary_elements"].transpose("seed", ..., "reduced_pressure").values).mean
@@ -154,7 +157,7 @@ def _draw_solutions(left, right, colours, entries):
             p = np.broadcast_to(own["reduced_pressure"].values, area.shape)
             look = {
                 "ls": "none",
-                "marker": _CROSSES[again % len(_CROSSES)],
+                "marker": _CROSS if is_short_range(errors) else _FINITE_RANGE[again % len(_FINITE_RANGE)],
                 "mec": colours.get(material, GREY),
                 "mew": 1.0,
                 # The larger ones show behind the others where the results agree, as the runs' markers do.
@@ -164,9 +167,11 @@ def _draw_solutions(left, right, colours, entries):
             states.append((p.ravel(), area.ravel(), gap.ravel()))
             for ax, values in ((left, states[-1][1]), (right, states[-1][2])):
                 ax.plot(states[-1][0], values, **look)
-                if again or len(drawn) == 1:
-                    name = f"boundary elements, {entry}" if again else "boundary elements"
-                    ax.plot([], [], **look | {"mec": GREY, "ms": 8}, label=name)
+            label = f"{name}, {entry}" if again else name
+            if label not in named:
+                named.add(label)
+                for ax in (left, right):
+                    ax.plot([], [], **look | {"mec": GREY, "ms": 8}, label=label)
     return states
 
 

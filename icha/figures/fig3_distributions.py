@@ -33,11 +33,12 @@ DECLARATION = Declaration(
         "lines are means over them, with the 95 % band of confidence of the mean (Student's t). Gaps are in units of "
         "the rms height, pressures of E* h'rms. Only contact carries pressure in this model, so the integral of (b) is "
         "A/A0 and that of (a) is 1 - A/A0 less the overlap fraction; adhesion gives the tensile tail at negative "
-        "pressures. Broad pale lines, where there are any: boundary elements, an independent code, on the same "
-        "topographies (means over those seeds that have them) and with the same interaction range, in the colour of "
-        "the material; gaps out of contact and pressures in contact. At the ranges that a grid resolves they show "
-        "practically no hysteresis, so that with adhesion they bound the limit of short ranges (JKR), and do not prove "
-        "it. Line: Persson's theory of adhesionless contact."
+        "pressures. Broad pale lines, where there are any: boundary elements in the limit of a short range of "
+        "attraction, on the same topographies (means over those seeds that have them), in the colour of the material; "
+        "gaps out of contact and pressures in contact. Where there are only those of an independent code at the finite "
+        "interaction range of the material, it is these, as the legend says: at the ranges that a grid resolves they "
+        "show practically no hysteresis, so that with adhesion they bound the limit of short ranges (JKR), and do not "
+        "prove it. Line: Persson's theory of adhesionless contact."
     ),
     options=SnapshotFigure,
     inputs=inputs,
@@ -82,7 +83,7 @@ def figure(
     looks, scale = material_looks(dataset, [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2)
-    lowest, highest, top, named, floor = -0.3, 0.3, 0.0, False, []
+    lowest, highest, top, named, floor = -0.3, 0.3, 0.0, {}, []
     for line, look in zip(lines, looks, strict=True):
         u, densities = gap_densities(line.members)
         draw_members(left, u, densities, look, len(lines), markevery=1 + len(u) // _MOST_MARKERS)
@@ -101,14 +102,14 @@ def figure(
             broad = _BROAD | {"color": look["color"]}
             left.plot(*solution_gap_points(*truths), **broad)
             right.plot(*solution_pressure_points(*truths), **broad)
-            named = True
+            named[truths[0].attrs["truth"]] = None
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
     say_which_snapshots(fig, [left, right], dataset, lines, scale)
-    if named:
+    for name in named:
         for ax in (left, right):
-            ax.plot([], [], **_BROAD | {"color": GREY}, label="boundary elements")
+            ax.plot([], [], **_BROAD | {"color": GREY}, label=name)
     if load > 0:
         line = np.linspace(0.002, highest, 300)
         right.semilogy(line, persson_pressure_density(line, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
@@ -209,5 +210,7 @@ def _solution(entries, labels, load):
             for label, value in (("rms_slope", labels.rms_slope), ("reduced_pressure", load))
         }
         if all(map(len, close.values())):
-            return errors.sel(at).isel({label: found[0] for label, found in close.items()})
+            truth = errors.sel(at).isel({label: found[0] for label, found in close.items()})
+            if np.isfinite(truth["gap_density"].values).all():
+                return truth
     return None

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.labels import SolutionLabels
+from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.maps import block_means, draw_whole
 from icha.figures.options import RunFigure, SnapshotFigure
@@ -25,14 +27,20 @@ class MapFigure(SnapshotFigure, RunFigure):
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, the topography of the one that is drawn, and boundary elements of its state, if there are any."""
-    found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, options.run(campaign))}
+    """The runs, the topography of the one that is drawn, and boundary elements of its state, if there are any.
+
+    Those in the limit of a short range are another run of the study, whose file has the maps; they come first.
+    """
+    run = options.run(campaign)
+    found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, run)}
+    if run.model == ASPERITIES and BOUNDARY_ELEMENTS in campaign.studies[options.study].models:
+        return found | {"truth": files.path(results.RUN, run._replace(model=BOUNDARY_ELEMENTS))}
     solution = finest_solution(campaign, options)
     return found | ({"solution": files.path(results.SOLUTION, solution)} if solution else {})
 
 
 def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | None:
-    """The finest boundary-element solution of the state that is drawn, if there is any."""
+    """The finest solution by boundary elements at a finite range of the state that is drawn, if there is any."""
     snapshots = campaign.snapshots_of(options.study) or [campaign.studies[options.study].targets.last]
     if options.snapshot is not None:
         kind, value = options.snapshot.target
@@ -59,12 +67,13 @@ DECLARATION = Declaration(
         "Contact spots (red circles, true size and position) over the topography, of which the highest parts are "
         "yellow: one period of a periodic surface, where circles that cross a border continue at the opposite one, or "
         "the whole of a free square, where they end beyond its edges. The load is given above the map. The framed part "
-        "around the largest spot is enlarged. Where there is a boundary-element solution of the same topography, load "
-        "and interaction range, by an independent code, its contact stands beside that of ICHA (b), its edge (black) "
-        "beside the enlarged circles (c), and the map (d) shows where both are in contact and where only one of them "
-        "is; the overlap is the area in contact in both over that in either. The areas given are corrected by the "
-        "perimeter of the contact for boundary elements. At the ranges that a grid resolves these show practically no "
-        "hysteresis, so that with adhesion they bound the limit of short ranges (JKR), and do not prove it."
+        "around the largest spot is enlarged. Where there are boundary elements of the same topography and state, "
+        "their contact stands beside that of ICHA (b), its edge (black) beside the enlarged circles (c), and the map "
+        "(d) shows where both are in contact and where only one of them is; the overlap is the area in contact in both "
+        "over that in either. They are those in the limit of a short range of attraction, or, where the map (b) says "
+        "so, an independent code at the finite interaction range of the material: its area is corrected by the "
+        "perimeter of the contact, and as it shows practically no hysteresis at the ranges that a grid resolves, with "
+        "adhesion it bounds the limit of short ranges (JKR), and does not prove it."
     ),
     options=MapFigure,
     inputs=inputs,
@@ -93,6 +102,7 @@ def figure(
     campaign: xr.DataTree,
     surface: xr.Dataset,
     solution: xr.Dataset | None = None,
+    truth: xr.Dataset | None = None,
     *,
     study: str,
     surface_name: str | None = None,
@@ -108,7 +118,8 @@ def figure(
     ----------
     campaign : the campaign dataset.
     surface : the surface file's dataset; it must be the topography of the run that is drawn.
-    solution : boundary elements (`icha.references.finite_range`) of the state that is drawn, if there are any.
+    solution : boundary elements at a finite range (`icha.references.finite_range`) of the state that is drawn, if any.
+    truth : the same run by boundary elements in the limit of a short range, with its maps, if there is one.
     study : name of the study.
     surface_name, seed, rms_slope, material : which run; what is left out is the study's first. For the material that
         is the first one with adhesion, if there is any.
@@ -126,27 +137,58 @@ def figure(
     at = find_snapshot(run, kind, target)
     if solution is not None:
         _check_solution(labels, run, at, solution)
+        solved = _Solved(solution["contact"], float(solution["contact_area_fraction"]), FINITE_RANGE)
+    elif truth is not None:
+        solved = _of_run(labels, run, at, truth)
+    else:
+        solved = None
     view = _view(run, at, surface)
 
-    fig = new_figure(TWO_COLUMNS, 3.35 if solution is None else 6.9)
-    panels = fig.subplots(1 if solution is None else 2, 2, squeeze=False)
-    whole, enlarged = panels[0, 0], panels[0, 1] if solution is None else panels[1, 0]
+    fig = new_figure(TWO_COLUMNS, 3.35 if solved is None else 6.9)
+    panels = fig.subplots(1 if solved is None else 2, 2, squeeze=False)
+    whole, enlarged = panels[0, 0], panels[0, 1] if solved is None else panels[1, 0]
     image = _draw_spots_over_topography(whole, enlarged, view)
     enlarged.set_title(f"enlarged ×{view.zoom}", loc="right")
     step = int(run["snapshot_step"].values[at])
     load = number(float(run["reduced_pressure"].values[step]))
     load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
     area = rf"$A/A_0$ = {float(run['contact_area_fraction'].values[step]):.3f}"
-    if solution is None:
+    if solved is None:
         whole.set_title(f"{load}, {area}", loc="right")
     else:
-        _draw_solution(panels, view, run, at, solution)
+        _draw_solution(panels, view, run, at, solved)
         fig.suptitle(load, fontsize="medium")
         whole.set_title(f"ICHA, {area}", loc="right")
     _frame(panels, enlarged, view)
-    bar = fig.colorbar(image, ax=panels, shrink=0.92 if solution is None else 0.46, pad=0.015, aspect=28)
+    bar = fig.colorbar(image, ax=panels, shrink=0.92 if solved is None else 0.46, pad=0.015, aspect=28)
     bar.set_label(f"height ({view.height_unit})")
     return fig
+
+
+class _Solved(NamedTuple):
+    """Contact of boundary elements: the part in contact of every node along y and x, A/A0, and which they are."""
+
+    contact: xr.DataArray
+    area: float
+    name: str
+
+
+def _of_run(labels, run, at, truth):
+    """The state of a run by boundary elements that a run keeps as its snapshot `at`; None if it failed before."""
+    from icha.analysis.model_error import check_same_contact, state_of
+    from icha.datasets.campaign import find_snapshot
+
+    try:
+        check_same_contact(run, truth)
+    except ValueError as error:
+        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
+    asked = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
+    try:
+        state = state_of(truth, find_snapshot(truth, *asked))
+    except ValueError:
+        return None
+    contact = state["contact_map"].rename(row="y", column="x")
+    return _Solved(contact, float(state["contact_area_fraction"]), SHORT_RANGE)
 
 
 def _check_solution(labels, run, at, solution):
@@ -232,7 +274,7 @@ def _draw_spots_over_topography(whole, enlarged, view):
     return image
 
 
-def _draw_solution(panels, view, run, at, solution):
+def _draw_solution(panels, view, run, at, solved):
     """Draw the contact of boundary elements: over the topography, around the enlarged spots, and beside the model's."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb
     from matplotlib.patches import Patch
@@ -240,21 +282,20 @@ def _draw_solution(panels, view, run, at, solution):
     from icha.analysis.model_error import contact_of_spots, jaccard
 
     (_, beside), (enlarged, compared) = panels
-    contact = solution["contact"].transpose("y", "x").values == 1
-    fine = len(contact)
+    part = solved.contact.transpose("y", "x").values.astype(float)
+    contact, fine = part >= 0.5, len(part)
     spots_cover = contact_of_spots(run, at, fine)
     draw_whole(beside, block_means(view.heights) * view.scale, len(view.heights), view.side, **view.look)
     red = LinearSegmentedColormap.from_list("contact", [(*_RED, 0.0), (*_RED, 0.9)])
     look = {"origin": "lower", "cmap": red, "vmin": 0, "vmax": 1}
-    draw_whole(beside, block_means(contact.astype(float)), fine, view.side, **look)
-    own, borders = _window(contact, view.side / fine, view.corner, view.window)
+    draw_whole(beside, block_means(part), fine, view.side, **look)
+    own, borders = _window(part, view.side / fine, view.corner, view.window)
     enlarged.contour(own, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
     palette = np.array([to_rgb(colour) for _, colour in _STATES])
     draw_whole(compared, block_means(palette[1 * spots_cover + 2 * contact]), fine, view.side, origin="lower")
     keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]
     compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
-    truth = float(solution["contact_area_fraction"])
-    beside.set_title(rf"boundary elements, $A/A_0$ = {truth:.3f}", loc="right")
+    beside.set_title(rf"{solved.name}, $A/A_0$ = {solved.area:.3f}", loc="right")
     compared.set_title(f"overlap {jaccard(spots_cover, contact):.2f}", loc="right")
 
 

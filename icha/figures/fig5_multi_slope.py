@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from pydantic import Field
+
+from icha.contact.models import BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.measured_table import read_columns
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
     UNLOADING,
+    Line,
     band_handle,
     draw_line,
     draw_ways_back,
@@ -19,7 +23,7 @@ from icha.figures.curves import (
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.options import StudyFigure
-from icha.figures.select import name_of_place
+from icha.figures.select import NothingToDraw, name_of_place, path_steps, study_runs
 from icha.figures.style import (
     BLACK,
     COLOURS,
@@ -35,10 +39,36 @@ from icha.figures.style import (
     slope_label,
     styled,
 )
+from icha.support.values import Name, Problem, unknown
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+
+class MultiSlopeFigure(StudyFigure):
+    """A figure of all runs of a study, and of others beside them."""
+
+    boundary_elements: Name | None = Field(
+        default=None,
+        description="Name of a study whose runs by boundary elements are drawn beside. Left out: the study itself, if "
+        "it has some.",
+    )
+
+    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
+        """The study, and the one beside it."""
+        return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """A study beside it that is not there, or has no runs by boundary elements."""
+        yield from super().problems(campaign)
+        beside = self.boundary_elements
+        if beside is None:
+            return
+        yield from unknown(("boundary_elements",), beside, campaign.studies)
+        if beside in campaign.studies and BOUNDARY_ELEMENTS not in campaign.studies[beside].models:
+            reason = f"has no runs by boundary elements; allowed: a study with {BOUNDARY_ELEMENTS!r} among its `models`"
+            yield ("boundary_elements",), beside, reason
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
@@ -81,10 +111,12 @@ DECLARATION = Declaration(
         "are several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
         "(Student's t). Without adhesion the curves of one topography, scaled to different slopes, are one curve in "
         "(a); what adhesion adds depends on the material and grows as the slope falls. In (b) the slope orders the "
-        "curves: at a given load the area falls as the slope rises. Thin dashed lines, where there are any: the way "
-        "back, unloading, while the load is compressive. Measurements, where given, are drawn as lines."
+        "curves: at a given load the area falls as the slope rises. Upright crosses, where there are any: boundary "
+        "elements in the limit of a short range of attraction, on the same topographies, in the colour of the "
+        "material. Thin dashed lines, where there are any: the way back, unloading, while the load is compressive. "
+        "Measurements, where given, are drawn as lines."
     ),
-    options=StudyFigure,
+    options=MultiSlopeFigure,
     inputs=inputs,
     arguments=arguments,
 )
@@ -96,6 +128,7 @@ def figure(
     tables: Sequence[str | os.PathLike] = (),
     *,
     study: str,
+    boundary_elements: str | None = None,
     measurements: Sequence[Mapping[str, Any]] = (),
 ) -> Figure:
     """Draw all runs of a study.
@@ -105,6 +138,7 @@ def figure(
     campaign : the campaign dataset.
     tables : files of measured curves to lay over; in panel (b) only those whose slope is known.
     study : name of the study.
+    boundary_elements : name of a study whose runs by boundary elements are drawn beside; left out, the study itself.
     measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (what a
         load is divided by to become p/(E* h'rms)), and `material` and `rms_slope`, None where they are not known.
 
@@ -139,6 +173,7 @@ def figure(
         draw_ways_back([(left, lambda p, a, _: (p, a)), (right, lambda p, a, _, slope=slope: (p * slope, a))], line)
         draw_line(left, line, _points, logarithmic=True, lines=len(curves.lines))
         draw_line(right, line, _points_at_load, logarithmic=True, lines=len(curves.lines))
+    crosses = _draw_boundary_elements((left, right), campaign, boundary_elements or study, colour)
     for ax in (left, right):
         logarithmic_axes(ax)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
@@ -147,7 +182,7 @@ def figure(
     right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
     left.set_ylabel(AREA_LABEL)
 
-    _add_legends(fig, (left, right), curves, dataset, _Looks(colour, marker, size))
+    _add_legends(fig, (left, right), curves, dataset, _Looks(colour, marker, size), crosses)
     if measurements:
         first = left.get_legend()
         if first is not None:
@@ -166,6 +201,27 @@ class _Looks(NamedTuple):
     size: dict[str, float]
 
 
+def _draw_boundary_elements(panels, campaign, study, colour):
+    """Mark the runs of a study by boundary elements, means over their seeds; returns their entries of the legend."""
+    try:
+        runs = study_runs(campaign, study, ragged=False, model=BOUNDARY_ELEMENTS)
+    except NothingToDraw:
+        return []
+    lines: dict[tuple, list] = {}
+    for labels, run in runs:
+        lines.setdefault((labels.surface, labels.rms_slope, labels.material), []).append((labels, run))
+    for (*_, material), members in lines.items():
+        (first, *_), own = zip(*members, strict=True)
+        look = _CROSS | dict.fromkeys(("color", "mec"), colour.get(material, GREY))
+        line = Line(first, [path_steps(run) for run in own], [], look)
+        for ax, points in zip(panels, (_points, _points_at_load), strict=True):
+            draw_line(ax, line, points, logarithmic=True, lines=len(lines))
+    return [legend_handle(**_CROSS, mec=GREY, label="boundary elements")]
+
+
+_CROSS = {"ls": "none", "marker": "+", "ms": 8, "mew": 1.0, "zorder": 6}
+
+
 def _draw_measured(left, right, table, known, colour, dashes):
     """Draw a measured curve; over the load only if its slope is known."""
     load, area = read_columns(table, known["columns"])
@@ -176,7 +232,7 @@ def _draw_measured(left, right, table, known, colour, dashes):
         right.plot(pressure * slope, area, **look)
 
 
-def _add_legends(fig, panels, curves, dataset, looks):
+def _add_legends(fig, panels, curves, dataset, looks, crosses):
     """Name materials in the first panel and all else in the second, or, where names are long, all below."""
     left, right = panels
     several = len({surface for surface, _ in looks.marker}) > 1
@@ -201,6 +257,7 @@ def _add_legends(fig, panels, curves, dataset, looks):
         curves.scale.draw(fig, [left, right])
         named = {line.look["label"]: line.look | {"ls": "none", "ms": 5} for line in curves.lines if line.look["label"]}
         material_handles = [legend_handle(**look) for look in named.values()]
+    place_handles += crosses
     if curves.unloaded:
         place_handles.append(legend_handle(color=GREY, label="unloading", **UNLOADING))
     if curves.several_seeds:

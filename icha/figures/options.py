@@ -108,13 +108,16 @@ class ComparedFigure(StudyFigure):
         """A study without boundary elements is one more."""
         yield from super().study_problems(campaign, study)
         if not is_compared(campaign, self.study):
-            reason = "has no boundary elements beside it; allowed: a study that an entry of boundary_elements names"
+            reason = (
+                "has no boundary elements beside it; allowed: a study with both `models` and reduced pressures for "
+                "targets, or one that an entry of boundary_elements names"
+            )
             yield ("study",), self.study, reason
 
 
 def is_compared(campaign: Campaign, study: str) -> bool:
-    """Whether there are boundary elements beside the runs of a study."""
-    return any(entry.study == study for entry in campaign.boundary_elements.values())
+    """Whether there are boundary elements beside the runs of a study, in either limit of the range."""
+    return campaign.compares_models(study) or any(entry.study == study for entry in campaign.boundary_elements.values())
 
 
 def not_unloaded(campaign: Campaign, location: tuple, name: str, *, in_part: bool) -> Iterator[Problem]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from icha.contact.models import first_of
 from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.style import number, slope_label
 
 if TYPE_CHECKING:
@@ -19,8 +20,10 @@ class NothingToDraw(ValueError):
     """A study has no complete run of the kind that a figure shows; the message says what is lacking."""
 
 
-def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All complete runs of a study by the model that is shown (`shown_model`), at least one.
+def study_runs(
+    campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
+) -> list[tuple[RunLabels, xr.Dataset]]:
+    """All complete runs of a study by a model, left out that which is shown (`shown_model`), at least one.
 
     Without their spots and events, which take long, if not `ragged`.
 
@@ -40,7 +43,8 @@ def study_runs(campaign: xr.DataTree, study: str, *, ragged: bool = True) -> lis
     dataset = campaign[study].to_dataset()
     axes = [dataset[label].values.tolist() for label in LABELS]
     status = dataset["status"].transpose(*LABELS).values
-    by_model = np.reshape(dataset["model"].values == shown_model(dataset), (-1, *[1] * (status.ndim - 1)))
+    asked = model or shown_model(dataset)
+    by_model = np.reshape(dataset["model"].values == asked, (-1, *[1] * (status.ndim - 1)))
     complete = np.argwhere((status == COMPLETE) & by_model)
     if not len(complete):
         raise NothingToDraw(f"study {study}: no run is complete, so there is nothing to draw")
@@ -209,6 +213,11 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     if kind == "pull_off":
         return "pull-off"
     return f"{_KIND_LABELS[kind]} = {number(value)}"
+
+
+def is_short_range(errors: xr.Dataset) -> bool:
+    """Whether an entry of a model error compares with boundary elements in the limit of a short range."""
+    return errors.attrs["truth"] == SHORT_RANGE
 
 
 def study_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import asperity_cases, loop_cases, run_cases, solution_cases, source_cases, surface_cases
+from icha.contact.models import BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
@@ -25,6 +26,8 @@ class CampaignFiles:
     one_asperity: dict[str, float | None]
     dataset: str
     comparison: str
+    compared: dict[str, RunLabels]
+    """The runs by boundary elements that stand beside those by asperities."""
     model_error: list[str]
     """One file; none without boundary elements, for then there is no error to tell."""
     checks: str
@@ -65,10 +68,16 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         return {path(pattern, case): case for case in cases}
 
     surfaces = surface_cases(campaign)
+    runs = each(results.RUN, run_cases(campaign))
+    compared = {
+        file: case
+        for file, case in runs.items()
+        if case.model == BOUNDARY_ELEMENTS and campaign.compares_models(case.study)
+    }
     solutions = each(results.SOLUTION, solution_cases(campaign))
     return CampaignFiles(
         surfaces={path(results.SURFACE, surface=name, seed=seed): (name, seed) for name, seed in surfaces},
-        runs=each(results.RUN, run_cases(campaign)),
+        runs=runs,
         theories={path(results.THEORIES, surface=name): name for name, _ in surfaces},
         solutions=solutions,
         loops=each(results.LOOP, loop_cases(campaign)),
@@ -76,7 +85,8 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         one_asperity={path(results.ONE_ASPERITY, asperity=n): mu for n, mu in asperity_cases(campaign).items()},
         dataset=path(results.DATASET),
         comparison=path(results.COMPARISON),
-        model_error=[path(results.MODEL_ERROR)] if solutions else [],
+        compared=compared,
+        model_error=[path(results.MODEL_ERROR)] if compared or solutions else [],
         checks=path(results.CHECKS),
         verdict=path(results.VERDICT),
         figures=[

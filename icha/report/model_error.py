@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from icha.analysis.model_error import SUMMARISED
+from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.support.statistics import ensemble
 
 
@@ -16,6 +17,8 @@ def entry_section(errors):
 
     def scatter(state, name):
         over = ensemble(state[name].values)
+        if not over.count:
+            return None  # of no snapshot
         return float(over.mean), float(over.confidence) if several else None
 
     rows = []
@@ -37,16 +40,19 @@ def entry_section(errors):
             )
 
     def spread(name):
-        values = errors[name].values
+        values = errors[name].values[np.isfinite(errors[name].values)]
+        if not len(values):
+            return None
         return {"median": float(np.median(values)), "least": float(values.min()), "most": float(values.max())}
 
     tabor = errors["tabor_parameter"].values
     return {
         "name": errors.attrs["entry"],
         "study": errors.attrs["study"],
+        "short_range": errors.attrs["truth"] == SHORT_RANGE,
         "axes": {label: errors[label].values.tolist() for label in ("rms_slope", "material", "seed")},
         "states": int(errors["area_error"].size),
-        "grids": sorted(set(errors["solution_grid"].values.ravel().tolist())),
+        "grids": sorted({int(n) for n in errors["solution_grid"].values.ravel() if np.isfinite(n)}),
         "adhesive": bool((errors["surface_energy"] > 0).any()),
         "tabor": list(dict.fromkeys(f"{mu:.2g}" for mu in (tabor.min(), tabor.max()))),
         "load_error": float(np.abs(errors["load_error"]).max()),

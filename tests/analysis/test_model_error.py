@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import small_campaign as small
 import xarray as xr
-from compared_campaign import own_solution, runs, solutions, tree
+from compared_campaign import PRESSURES, own_solution, patches, runs, solutions, tree
 
 from icha.analysis.model_error import (
     SHARED,
@@ -22,6 +22,8 @@ from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.campaign import campaign_tree, find_snapshot
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels, SolutionLabels
+from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE
+from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.references.finite_range import finite_range_solution
 
 
@@ -47,6 +49,63 @@ def test_relative_errors_are_those_put_in():
     edges = np.diff(state["pressure_bin_edges"].values)
     area = float(state["contact_area_fraction"])
     assert float(np.sum(state["pressure_density"].values * edges)) == pytest.approx(area, rel=1e-9)
+
+
+def test_runs_of_the_other_model_are_compared_at_the_same_stops():
+    errors = model_error(tree(), runs=patches(area=1.25, separation=0.8))["one"].to_dataset()
+    assert errors.attrs["truth"] == SHORT_RANGE and errors["reduced_pressure"].values.tolist() == list(PRESSURES)
+    assert (errors["status"] == COMPLETE).all()
+    np.testing.assert_allclose(errors["area_error"].values, 1 / 1.25 - 1, rtol=1e-12)
+    np.testing.assert_allclose(errors["separation_error"].values, 1 / 0.8 - 1, rtol=1e-12)
+    # Contact has an edge: its energetic area is its area. What was moved are areas, not the distributions and maps.
+    np.testing.assert_array_equal(errors["energetic_area_error"], errors["area_error"])
+    np.testing.assert_allclose(errors["gap_distribution_distance"], 0, atol=1e-12)
+    np.testing.assert_array_equal(errors["jaccard"], 1)
+    np.testing.assert_allclose(errors["residual"], 1e-4)
+    np.testing.assert_allclose(errors["load_error"], 0, atol=1e-6)
+
+
+def test_loads_without_a_snapshot_have_errors_of_area_and_separation_only(tmp_path):
+    kept = [(labels, run.isel(snapshot=[1])) for labels, run in patches(area=2.0)]
+    errors = model_error(tree(), runs=kept)
+    write_dataset(errors, tmp_path / "error.nc")
+    errors = read_campaign(tmp_path / "error.nc")["one"].to_dataset()
+    np.testing.assert_allclose(errors["area_error"], -0.5, rtol=1e-12)
+    assert np.isnan(errors["jaccard"].isel(reduced_pressure=0)).all()
+    np.testing.assert_array_equal(errors["jaccard"].isel(reduced_pressure=1), 1)
+
+
+def test_a_cell_is_in_contact_from_its_half_on():
+    ((labels, run), *_) = patches(lambda labels: labels.seed == 1)
+    covered = run["contact_map"] > 0
+    slight = run.assign(contact_map=xr.where(covered, run["contact_map"], np.float32(0.4)))
+    half = run.assign(contact_map=(0.5 * covered).astype(np.float32))
+    for changed in (slight, half):
+        errors = model_error(tree(), runs=[(labels, changed)])["one"]
+        np.testing.assert_array_equal(errors["jaccard"], 1)
+
+
+def test_runs_that_failed_by_either_model_do_not_count():
+    (first, *others) = patches(area=1.25)
+    labels, run = first
+    errors = model_error(tree(), runs=[(labels, run.isel(step=[0]).assign_attrs(incomplete="stuck")), *others])["one"]
+    place = {label: getattr(labels, label) for label in ("surface", "seed", "rms_slope", "material")}
+    assert int(errors["status"].sel(place)) == INCOMPLETE
+    assert np.isnan(errors["area_error"].sel(place)).all()
+    np.testing.assert_allclose(errors["area_error_mean"], 1 / 1.25 - 1, rtol=1e-12)
+
+
+def test_both_truths_stand_apart():
+    errors = model_error(tree(), solutions(area=lambda labels: 1.6), runs=patches(area=1.25))
+    assert [node.attrs["truth"] for node in errors.children.values()] == [SHORT_RANGE, FINITE_RANGE]
+    np.testing.assert_allclose(errors["one"]["area_error"], 1 / 1.25 - 1, rtol=1e-12)
+    np.testing.assert_allclose(errors["truth"]["area_error"], 1 / 1.6 - 1, rtol=1e-12)
+
+
+def test_a_run_of_another_contact_is_refused():
+    ((labels, run), *_) = patches()
+    with pytest.raises(ValueError, match=r"boundary_elements/soft: surface_energy is "):
+        model_error(tree(), runs=[(labels, run.assign(surface_energy=2 * run["surface_energy"]))])
 
 
 def test_energetic_area_counts_with_adhesion_only():

@@ -105,6 +105,13 @@ def test_boundary_elements_turn_where_their_study_does(load):
     assert settings["largest_reduced_pressure"] == 0.01 and settings["separation_step"] == 0.1
 
 
+def test_entries_and_compared_studies_have_names_of_their_own(load):
+    changes = {**LONG_RANGE, "boundary_elements": {"one": TRUTH}}
+    assert load(changes).campaign.boundary_elements
+    with pytest.raises(ConfigurationError, match=r"boundary_elements\.one: 'one' is the name of a study that has"):
+        load({**changes, "studies.one.models": ["asperities", "boundary_elements"]})
+
+
 def test_boundary_elements_are_a_product_of_the_studys_lists(load):
     campaign = load({**LONG_RANGE, "boundary_elements": {"truth": TRUTH | {"rms_slopes": [1.0]}}}).campaign
     cases = solution_cases(campaign)

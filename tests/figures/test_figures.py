@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.colors import to_hex, to_rgb
 
 import icha
-from icha.analysis.model_error import jaccard
+from icha.analysis.model_error import jaccard, model_error
 from icha.datasets.campaign import campaign_tree, find_snapshot
 from icha.datasets.files import read_dataset
 from icha.datasets.labels import RunLabels
@@ -100,6 +100,7 @@ NAMES += ["fig7", "fig7_alone", "fig8", "fig8_one", "fig9", "fig9_one"]
 NAMES += ["fig2_loops", "fig5_loops", "fig2_truth", "fig3_truth", "fig4_truth", "fig10", "fig11"]
 FIGURES = [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope]
 FIGURES += [fig7_stiffness, fig8_patch_sizes, fig9_tabor]
+KIND = "reduced_pressure"
 COMPARED = [fig10_model_error, fig11_distribution_error]
 
 
@@ -427,8 +428,8 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
 def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
     figure = fig2_area_and_gap.figure(compared.tree(), None, compared.errors(), study="one")
     for axes, name in zip(figure.axes, ("contact_area_fraction", "reduced_separation"), strict=True):
-        crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
-        runs = [line for line in axes.get_lines() if line.get_marker() not in ("+", "None")]
+        crosses = [line for line in axes.get_lines() if line.get_marker() == "1" and len(line.get_xdata())]
+        runs = [line for line in axes.get_lines() if line.get_marker() not in ("1", "None")]
         assert len(crosses) == 2 and len(runs) == 2
         assert {line.get_markeredgecolor() for line in crosses} == {line.get_markeredgecolor() for line in runs}
         for line, entry in zip(crosses, ("adhesive", "bare"), strict=True):
@@ -436,9 +437,25 @@ def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
             np.testing.assert_allclose(line.get_ydata(), truth.mean(axis=1).ravel(), rtol=1e-12)
             assert sorted(set(line.get_xdata())) == list(compared.PRESSURES)
         names = [text.get_text() for text in axes.get_legend().get_texts()]
-        assert names.count("boundary elements") == 1
+        assert names.count("boundary elements at finite range") == 1 and "boundary elements" not in names
     alone = fig2_area_and_gap.figure(small.tree(), None, compared.errors(), study="single")
-    assert not [line for line in alone.axes[0].get_lines() if line.get_marker() == "+"]
+    assert not [line for line in alone.axes[0].get_lines() if line.get_marker() in ("+", "1")]
+
+
+def test_fig2_marks_both_kinds_of_boundary_elements():
+    figure = fig2_area_and_gap.figure(compared.tree(), None, compared.short_range_errors(), study="one")
+    runs = compared.runs()
+    for axes, name, factor in zip(
+        figure.axes, ("contact_area_fraction", "reduced_separation"), (1.5, 0.9), strict=True
+    ):
+        crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
+        assert len(crosses) == 2
+        for line, material in zip(crosses, ("soft", "hertz"), strict=True):
+            own = [run[name].values for labels, run in runs.items() if labels.material == material]
+            np.testing.assert_allclose(line.get_ydata(), factor * np.mean(own, axis=0), rtol=1e-9)
+        assert len([line for line in axes.get_lines() if line.get_marker() == "1" and len(line.get_xdata())]) == 2
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert {"boundary elements", "boundary elements at finite range"} <= set(names) and len(names) == len(set(names))
 
 
 def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
@@ -448,7 +465,9 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
     figure = fig2_area_and_gap.figure(compared.tree(), references, compared.errors(), study="one")
     # Too many names for a panel: they stand below, each once.
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert {"Greenwood & Williamson", "Fuller & Tabor", "Yang & Persson", "boundary elements"} <= set(names)
+    assert {"Greenwood & Williamson", "Fuller & Tabor", "Yang & Persson", "boundary elements at finite range"} <= set(
+        names
+    )
     assert len(names) == len(set(names))
     for axes, name in zip(figure.axes, ("summit_area_fraction", "reduced_separation"), strict=True):
         assert axes.get_legend() is None
@@ -458,7 +477,7 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
         np.testing.assert_array_equal(drawn[0].get_ydata(), values)
         np.testing.assert_array_equal(drawn[0].get_xdata(), references["greenwood_williamson_reduced_pressure"].values)
         assert np.all(drawn[1].get_xdata() > 0)
-        runs = {line.get_markeredgecolor() for line in axes.get_lines() if line.get_marker() not in ("+", "x", "None")}
+        runs = {line.get_markeredgecolor() for line in axes.get_lines() if line.get_marker() not in ("1", "x", "None")}
         assert drawn[1].get_color() in runs
 
 
@@ -467,8 +486,9 @@ def test_fig2_tells_further_solutions_of_the_same_states_apart():
     twice = xr.DataTree.from_dict({"/first": bare, "/finer": bare})
     axes = fig2_area_and_gap.figure(compared.tree(), None, twice, study="one").axes[0]
     names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert "boundary elements" in names and "boundary elements, finer" in names
-    assert {"+", "1"} <= {line.get_marker() for line in axes.get_lines()}
+    name = "boundary elements at finite range"
+    assert name in names and f"{name}, finer" in names
+    assert {"1", "2"} <= {line.get_marker() for line in axes.get_lines()}
 
 
 def test_fig3_shows_boundary_elements_of_the_same_state_only():
@@ -490,6 +510,19 @@ def test_fig3_shows_boundary_elements_of_the_same_state_only():
     )
     for drawn, own in zip(fig3_distributions.solution_gap_points(truth), (u, density), strict=True):
         np.testing.assert_allclose(drawn, own, rtol=1e-9)
+
+
+def test_fig3_shows_the_limit_of_a_short_range_where_it_is_known():
+    figure = fig3_distributions.figure(compared.tree(), compared.short_range_errors(), study="one", target=3e-3)
+    for axes in figure.axes:
+        names = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert "boundary elements" in names and "boundary elements at finite range" not in names
+    # Of a load that those runs do not keep, it is the others.
+    kept = [(labels, run.isel(snapshot=[1])) for labels, run in compared.patches()]
+    errors = model_error(compared.tree(), compared.solutions_of_errors(), runs=kept)
+    figure = fig3_distributions.figure(compared.tree(), errors, study="one", target=3e-3)
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert "boundary elements at finite range" in names
 
 
 def test_fig3_joined_bins_keep_what_they_hold():
@@ -527,6 +560,43 @@ def test_fig4_puts_boundary_elements_beside_the_spots(surface):
     assert float(run["rms_slope"]) == pytest.approx(1)
 
 
+def test_fig4_shows_the_maps_of_the_other_model(surface):
+    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
+    truth = compared.own_patches(compared.runs()[labels], area=1.5)
+    shifted = truth.assign(contact_map=0.75 * truth["contact_map"].roll(column=2))
+    figure = fig4_contact_map.figure(compared.tree(), surface, truth=shifted, study="one", target=1e-2, kind=KIND)
+    area = 1.5 * float(compared.runs()[labels]["contact_area_fraction"].values[-1])
+    assert figure.axes[1].get_title(loc="right") == f"boundary elements, $A/A_0$ = {area:.3f}"
+    part = figure.axes[1].get_images()[1].get_array()[:-1, :-1]
+    np.testing.assert_array_equal(part, shifted["contact_map"].values[1])
+    own, other = truth["contact_map"].values[1] > 0, shifted["contact_map"].values[1] > 0
+    assert figure.axes[3].get_title(loc="right") == f"overlap {jaccard(own, other):.2f}"
+    other = shifted.assign(seed=2)
+    with pytest.raises(ValueError, match=r"soft: the boundary elements given are of another contact: seed is 1"):
+        fig4_contact_map.figure(compared.tree(), surface, truth=other, study="one")
+    # Where that run ended before, the model's spots stand alone.
+    ended = shifted.isel(snapshot=[0])
+    figure = fig4_contact_map.figure(compared.tree(), surface, truth=ended, study="one", target=1e-2, kind=KIND)
+    assert len(figure.axes) == 3
+
+
+def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    labels, run = runs[0]
+    own = compared.own_patches(run, area=1.5)
+    for study, options in (("slopes", {}), ("truth", {"boundary_elements": "truth"})):
+        beside = labels._replace(study=study, model="boundary_elements")
+        figure = fig5_multi_slope.figure(campaign_tree([*runs, (beside, own)]), study="slopes", **options)
+        for axes, factor in zip(figure.axes, (1.0, labels.rms_slope), strict=True):
+            (crosses,) = [line for line in axes.get_lines() if line.get_marker() == "+"]
+            np.testing.assert_allclose(crosses.get_xdata(), factor * np.array(small.PRESSURES), rtol=1e-6)
+            assert np.all(np.isin(crosses.get_ydata(), own["contact_area_fraction"].values))
+            drawn = {line.get_color() for line in axes.get_lines() if line.get_marker() not in ("+", "None")}
+            assert crosses.get_color() in drawn
+        texts = [text.get_text() for axes in figure.axes if axes.get_legend() for text in axes.get_legend().get_texts()]
+        assert texts.count("boundary elements") == 1
+
+
 def test_fig4_refuses_the_boundary_elements_of_another_state(surface):
     with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/soft: boundary elements of reduced pressure 0\.01"):
         fig4_contact_map.figure(compared.tree(), surface, solution(1e-2), study="one")
@@ -552,6 +622,21 @@ def test_fig10_shows_means_and_scatter_of_the_errors_in_per_cent():
     np.testing.assert_allclose(energetic.get_ydata(), ((expected + 100) / 1.2 - 100).mean())
     assert energetic.get_color() == adhesive.get_color()
     assert adhesive.get_markerfacecolor() != "white" and bare.get_markerfacecolor() == "white"
+
+
+def test_fig10_names_finite_ranges_where_the_limit_of_a_short_one_is_known():
+    figure = fig10_model_error.figure(compared.short_range_errors(), study="one")
+    left = figure.axes[0]
+    assert len(left.containers) == 4
+    for container in left.containers[:2]:
+        np.testing.assert_allclose(container[0].get_ydata(), 100 * (1 / 1.5 - 1))
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert sum("at finite range" in name for name in names) == 2 and "against the energetic area" in names
+    only = xr.DataTree.from_dict({"/one": compared.short_range_errors()["one"].to_dataset()})
+    figure = fig10_model_error.figure(only, study="one")
+    assert not [line for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert not any("finite range" in name or "energetic" in name for name in names)
 
 
 @pytest.mark.parametrize("module", COMPARED)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import yaml
 
 from icha.configuration.load import load_configuration
 from icha.datasets import results
@@ -52,3 +53,15 @@ def test_a_folder_stands_before_every_path(campaign):
 )
 def test_logs_of_jobs_lie_apart_from_their_files(path, expected):
     assert results.job_file(path, "logs", ".log") == expected
+
+
+def test_runs_of_both_models_at_given_loads_are_compared(tmp_path):
+    content = yaml.safe_load((ROOT / "config/campaigns/smoke.yaml").read_text(encoding="utf-8"))
+    del content["boundary_elements"], content["figures"]
+    for study in ("challenge", "multi_slope"):  # at given loads, and at given areas
+        content["studies"][study]["models"] = ["asperities", "boundary_elements"]
+    (tmp_path / "both.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    files = campaign_files(load_configuration(tmp_path / "both.yaml").campaign)
+    assert files.model_error == ["aggregated/model_error.nc"] and not files.solutions
+    assert {case.study for case in files.compared.values()} == {"challenge"}
+    assert set(files.compared) < set(files.runs) and all("/boundary_elements/" in file for file in files.compared)

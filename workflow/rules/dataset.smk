@@ -84,6 +84,7 @@ rule comparison:
 rule model_error:
     input:
         campaign=FILES.dataset,
+        runs=list(FILES.compared),
         solutions=list(FILES.solutions),
     output:
         "<results>/aggregated/model_error.nc",
@@ -97,6 +98,7 @@ rule model_error:
         mem_mb=4000,
         runtime=30,
     params:
+        run_labels=[tuple(labels) for labels in FILES.compared.values()],
         labels=[tuple(labels) for labels in FILES.solutions.values()],
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("measure_model_error.py"),

@@ -1,24 +1,27 @@
-"""Compare the runs of a campaign with the boundary-element solutions beside them."""
+"""Compare the runs of a campaign by asperities with boundary elements: other runs, and solutions beside them."""
 
 from job import attributes, guarded
 
 from icha.analysis.model_error import model_error
-from icha.datasets.files import read_campaign, read_dataset, write_dataset
-from icha.datasets.labels import SolutionLabels
+from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
+from icha.datasets.labels import RunLabels, SolutionLabels
 
 
-def measure_model_error(campaign, solutions, output, *, labels, attributes):
-    """Write the error of the runs of the file `campaign` against the files `solutions`, labelled in their order."""
+def measure_model_error(campaign, runs, solutions, output, *, run_labels, labels, attributes):
+    """Write the error of the file `campaign` against the files `runs` and `solutions`, labelled in their order."""
+    others = zip((RunLabels(*label) for label in run_labels), map(read_run, runs), strict=True)
     pairs = zip((SolutionLabels(*label) for label in labels), map(read_dataset, solutions), strict=True)
-    write_dataset(model_error(read_campaign(campaign), pairs, attrs=attributes), output)
+    write_dataset(model_error(read_campaign(campaign), pairs, runs=others, attrs=attributes), output)
 
 
 if "snakemake" in globals():
     with guarded(snakemake):
         measure_model_error(
             snakemake.input.campaign,
+            snakemake.input.runs,
             snakemake.input.solutions,
             snakemake.output[0],
+            run_labels=snakemake.params.run_labels,
             labels=snakemake.params.labels,
             attributes=attributes(snakemake),
         )
