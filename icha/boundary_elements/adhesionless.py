@@ -1,0 +1,46 @@
+"""Contact without adhesion: pressure where it touches, a gap where it does not, and never both."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from icha.boundary_elements.elasticity import solve_bonds
+from icha.boundary_elements.kernel import HalfSpace
+from icha.contact.failures import FullContact, NotConverged
+
+# Error of the displacement in contact, over the surface's largest height.
+_TOLERANCE = 1e-9
+_MAX_CHANGES = 200
+
+
+def pressed(
+    space: HalfSpace, heights: np.ndarray, separation: float, touching: np.ndarray, pressure: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells in contact, pressures (E*) and gaps (cells), all (n, n), at a separation (cells).
+
+    Cells in tension leave the contact and cells that overlap join it until there are neither: a Newton's method for the
+    complementarity of pressure and gap (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865).
+
+    Raises
+    ------
+    FullContact
+        If every cell touches.
+    NotConverged
+        If the contact does not settle.
+    """
+    overlap = heights - separation
+    tolerance = _TOLERANCE * np.abs(heights).max()
+    bonds = np.zeros_like(overlap)
+    touching = touching | (overlap > 0) if not touching.any() else touching
+    for _ in range(_MAX_CHANGES):
+        if not touching.any():
+            return touching, np.zeros_like(overlap), -overlap
+        if touching.all():
+            raise FullContact("every cell touches")
+        pressure, displaced = solve_bonds(space, touching, bonds, overlap, pressure, tolerance)
+        gap = displaced - overlap
+        leaving, joining = touching & (pressure < 0), ~touching & (gap < -tolerance)
+        if not leaving.any() and not joining.any():
+            return touching, pressure, gap
+        touching = (touching & ~leaving) | joining
+    raise NotConverged("the contact did not settle")

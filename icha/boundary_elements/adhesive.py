@@ -1,0 +1,63 @@
+"""Contact with adhesion at a given separation: fronts come to rest, and contact forms within reach of the attraction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from icha.boundary_elements.elasticity import Held
+from icha.boundary_elements.front import Front
+from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.newton import beside, front_at_rest
+from icha.contact.failures import FullContact
+
+# More of the surface than this in contact, and the rest follows.
+_NEARLY_ALL = 0.98
+
+
+@dataclass(frozen=True, eq=False)
+class Summits:
+    """Where contact may form out of nothing: cells (k,), how far above its node each summit rises, and how far its
+    attraction reaches, both in cells.
+    """
+
+    cell: np.ndarray
+    above: np.ndarray
+    reach: np.ndarray
+
+
+def settled(
+    space: HalfSpace, front: Front, heights: np.ndarray, summits: Summits, separation: float, state: Held
+) -> tuple[Held, int]:
+    """The contact in equilibrium at a separation (cells), and how many summits within reach it left open.
+
+    Fronts come to rest first; then the summit that is deepest in reach, and all that are so among their surroundings,
+    make contact, and fronts come to rest again. A summit that loses the contact again stays open.
+
+    Raises
+    ------
+    FullContact
+        If the contact runs over the whole surface.
+    NotConverged
+        If an equilibrium is not found.
+    """
+    tried = np.zeros(heights.size, dtype=bool)
+    while True:
+        state = front_at_rest(space, front, heights, separation, state)
+        if np.mean(state.fraction) > _NEARLY_ALL:
+            raise FullContact("the contact runs over the whole surface")
+        touching = state.fraction > 0
+        inside = state.gap.ravel()[summits.cell] - summits.above - summits.reach < 0
+        within = summits.cell[inside & ~touching.ravel()[summits.cell]]
+        seeds = np.zeros(heights.size, dtype=bool)
+        seeds[within] = True
+        # Without a summit, surfaces that overlap touch.
+        seeds |= ((state.gap < 0) & ~beside(touching)).ravel()
+        new = seeds & ~tried
+        if not new.any():
+            return state, int(np.count_nonzero(seeds))
+        tried |= new
+        state = Held(
+            np.where(new.reshape(heights.shape), 1.0, state.fraction), state.pressure, state.gap, 0.0, state.around
+        )

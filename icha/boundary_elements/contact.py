@@ -1,0 +1,285 @@
+"""Boundary elements in the short-range limit: a model of contact, which a path is followed with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
+from icha.boundary_elements.adhesionless import pressed
+from icha.boundary_elements.adhesive import Summits, settled
+from icha.boundary_elements.elasticity import Held
+from icha.boundary_elements.front import Front, area_gradient, areas, neighbours
+from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.newton import front_residual, tangent
+from icha.boundary_elements.patches import centres, labelled
+from icha.boundary_elements.states import CellState
+from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
+from icha.contact.failures import NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control
+from icha.surfaces.summits import Asperities, find_summits
+from icha.surfaces.surface import Surface
+
+# Relative error of a held load or area.
+_HELD = 1e-10
+_MAX_TRIALS = 60
+# A trial so near the target, relatively, is gone on from even if it lies beyond. Closer separations, in h_rms, are one.
+_CLOSE = 1e-3
+_SAME = 1e-13
+# What a load of zero is held to, over E*; and an area without adhesion, in cells.
+_NO_LOAD = 1e-6
+_CELLS = 2.0
+# Nodes along an edge overestimate an area by so much of the edges of cells (Yastrebov, Anciaux & Molinari, Tribol. Int.
+# 114 (2017) 161, eq. 9).
+_EDGE = (np.pi - 1 + np.log(2)) / 24
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryElements:
+    """A periodic rough surface against a half-space, cell by cell: a `ContactModel`.
+
+    heights: (n, n), m. spacing: m. law: of one summit, for how far its attraction reaches. The solver works in cells
+    and E*: `space`, `front` and `summits` are in these units.
+    """
+
+    heights: np.ndarray
+    spacing: float
+    law: JKR
+    rms_height: float
+    asperities: Asperities
+    space: HalfSpace
+    front: Front
+    summits: Summits
+
+    @classmethod
+    def of(cls, surface: Surface, material: Material) -> BoundaryElements:
+        """The contact of a surface and a material.
+
+        Raises
+        ------
+        ValueError
+            If the surface is a free square or has no summits.
+        """
+        surface.require_periodic("a model of boundary elements")
+        law, asperities, h = JKR(material), find_summits(surface), surface.spacing
+        column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
+        cell = row * surface.grid + column
+        summits = Summits(
+            cell,
+            (asperities.height - surface.heights.ravel()[cell]) / h,
+            -law.jump_in_approach(asperities.radius_of_curvature) / h,
+        )
+        front = Front(material.surface_energy / (material.contact_modulus * h))
+        return cls(surface.heights, h, law, surface.rms_height, asperities, HalfSpace.of(surface.grid), front, summits)
+
+    # --- what a path asks of every model --------------------------------------------------------------------------
+
+    @property
+    def adhesive(self) -> bool:
+        """Whether contact forms and breaks in jumps."""
+        return self.law.material.surface_energy > 0
+
+    @property
+    def contact_modulus(self) -> float:
+        """E*, Pa."""
+        return self.law.material.contact_modulus
+
+    @property
+    def area(self) -> float:
+        """Nominal contact area A0, m^2."""
+        return self.heights.size * self.spacing**2
+
+    def untouched(self) -> CellState:
+        """The state at which the first summit is about to make contact."""
+        reach = self.summits.reach * self.spacing if self.adhesive else 0.0
+        separation = float(np.max(self.asperities.height + reach)) if self.adhesive else float(self.heights.max())
+        nothing = np.zeros(self.heights.shape)
+        return CellState(separation, nothing, nothing, separation - self.heights)
+
+    def equilibrium(
+        self, state: CellState, separation: float, control: Control | None = None, *, let_go: int = 0
+    ) -> CellState:
+        """The contact brought to another mean separation (m), or to a given load or area; as of `ContactModel`.
+
+        Fronts lose their equilibrium together or alone without anybody's help: `let_go` changes nothing.
+        """
+        if control is None:
+            return self._at(state, separation)
+        return self._held(state, separation, control)
+
+    def released(self, region: np.ndarray, separation: float) -> CellState:
+        """The equilibrium at a separation (m) that a contact of a given region, (n, n) of bool, falls into."""
+        fraction = region.astype(float)
+        nothing = np.zeros(fraction.shape)
+        return self._at(CellState(separation, fraction, nothing, nothing), separation)
+
+    def pressure(self, state: CellState) -> float:
+        """Force over nominal area, Pa; negative in tension."""
+        return float(np.mean(state.pressure))
+
+    def area_fraction(self, state: CellState) -> float:
+        """Contact area over nominal area."""
+        return float(np.sum(self.area_of_cells(state))) / self.heights.size
+
+    def area_of_cells(self, state: CellState) -> np.ndarray:
+        """Contact area of every cell, (n, n), in cells: less than its fraction along the perimeter."""
+        if self.adhesive:
+            return areas(state.fraction, neighbours(state.fraction))
+        touching = state.touching
+        bare = sum((touching & ~np.roll(touching, way, axis)).astype(float) for axis in (0, 1) for way in (-1, 1))
+        return touching - _EDGE * bare
+
+    def mean_gap(self, state: CellState) -> float:
+        """Mean gap over the nominal area, m: the mean separation, for pressures displace no mean plane."""
+        return state.separation
+
+    def spot_count(self, state: CellState) -> int:
+        """Number of patches."""
+        return labelled(state.touching)[1]
+
+    def stiffness(self, state: CellState) -> float:
+        """Contact stiffness -dp/du, fronts moving along, Pa/m."""
+        return 0.0 - self.slope(PRESSURE, state)
+
+    def slope(self, quantity: str, state: CellState) -> float:
+        """Derivative of a quantity that can be held with respect to the mean separation, fronts moving along."""
+        if not state.touching.any():
+            return 0.0
+        around = neighbours(state.fraction)
+        fraction, pressure = tangent(self.space, self.front, self._cells(state, around))
+        if quantity == PRESSURE:
+            return float(np.mean(pressure)) * self.contact_modulus / self.spacing
+        if not self.adhesive:
+            return self._slope_of_area(state)
+        return float(np.mean(area_gradient(around) * fraction)) / self.spacing
+
+    def stored_energy(self, state: CellState) -> float:
+        """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
+        return float(np.sum(self._energy_of_cells(state))) / self.heights.size
+
+    def is_unstable(self, state: CellState) -> bool:
+        """Whether it is on an unstable branch: what is found here lies at a minimum of energy."""
+        return False
+
+    def events_between(self, before: CellState, after: CellState) -> Events:
+        """The events on the path from one state to a later one."""
+        return Events.joined(after.history[len(before.history) :])
+
+    # --- on the way -----------------------------------------------------------------------------------------------
+
+    def gap(self, state: CellState) -> np.ndarray:
+        """Gap at every node, (n, n), m."""
+        return state.gap
+
+    def _cells(self, state, around=None):
+        around = neighbours(state.fraction) if around is None else around
+        pressure, gap = state.pressure / self.contact_modulus, state.gap / self.spacing
+        return Held(state.fraction, pressure, gap, 0.0, around)
+
+    def _at(self, state, separation):
+        """The equilibrium at a separation, m."""
+        h = self.spacing
+        heights, u = self.heights / h, separation / h
+        if self.adhesive:
+            cells, pending = settled(self.space, self.front, heights, self.summits, u, self._cells(state))
+            fraction, pressure, gap = cells.fraction, cells.pressure, cells.gap
+            residual = front_residual(self.front, cells)
+        else:
+            touching, pressure, gap = pressed(
+                self.space, heights, u, state.touching, state.pressure / self.contact_modulus
+            )
+            fraction, pending, residual = touching.astype(float), 0, 0.0
+        closed = np.abs(gap[fraction >= 1]).max(initial=0.0)
+        new = CellState(
+            separation,
+            fraction,
+            pressure * self.contact_modulus,
+            gap * h,
+            residual,
+            max(closed, -gap[fraction <= 0].min(initial=0.0)) * h,
+            pending,
+            state.history,
+        )
+        return replace(new, history=(*state.history, self._events(state, new)))
+
+    def _held(self, state, separation, control):
+        """The equilibrium under a load or of an area, from a state not far away.
+
+        Where events may happen on the way nothing is passed: a trial that goes too far is taken back.
+        """
+
+        def value(state):
+            return self.pressure(state) if control.quantity == PRESSURE else self.area_fraction(state)
+
+        scale = abs(control.target) or _NO_LOAD * self.contact_modulus
+        # Without adhesion the area changes by whole cells.
+        enough = _HELD * scale
+        if control.quantity == AREA_FRACTION and not self.adhesive:
+            enough = max(enough, _CELLS / self.heights.size)
+        sign = np.sign(control.target - value(state)) or 1.0
+        short, far = state, None
+        start = state
+        for _ in range(_MAX_TRIALS):
+            new = self._at(start, separation)
+            error = value(new) - control.target
+            if abs(error) <= enough:
+                return new
+            if sign * error < 0:
+                short = new
+            else:
+                far = new
+            start = new if abs(error) < _CLOSE * scale else short
+            slope = self.slope(control.quantity, new)
+            separation = new.separation - error / slope if slope else np.nan
+            if far is None:
+                if not np.isfinite(separation):
+                    break
+                continue
+            low, high = sorted((short.separation, far.separation))
+            if high - low < _SAME * self.rms_height:
+                break
+            if not low < separation < high:
+                separation = 0.5 * (low + high)
+        raise NotConverged(f"a {control.quantity.replace('_', ' ')} of {control.target:g} is not met from here")
+
+    def _slope_of_area(self, state):
+        """Without adhesion: of the area as it grows with the load, about in proportion."""
+        pressure = self.pressure(state)
+        return self.area_fraction(state) * self.slope(PRESSURE, state) / pressure if pressure > 0 else 0.0
+
+    def _energy_of_cells(self, state):
+        """Elastic energy less that of adhesion of every cell, J/m^2."""
+        elastic = 0.5 * state.pressure * (self.heights - state.separation)
+        return elastic - self.law.material.surface_energy * self.area_of_cells(state)
+
+    def _events(self, before, after):
+        """What became of the patches: those that are new, gone, joined or split."""
+        (old, old_count), (new, new_count) = labelled(before.touching), labelled(after.touching)
+        both = (old > 0) & (new > 0)
+        pairs = np.unique(np.stack([old[both], new[both]]), axis=1)
+        parts_of_old = np.bincount(pairs[0], minlength=old_count + 1)[1:]
+        parts_of_new = np.bincount(pairs[1], minlength=new_count + 1)[1:]
+        events = [
+            self._event(JUMP_IN, after, new, np.flatnonzero(parts_of_new == 0), -1.0),
+            self._event(JUMP_OFF, before, old, np.flatnonzero(parts_of_old == 0), 1.0),
+            self._event(COALESCENCE, after, new, np.repeat(np.arange(new_count), np.maximum(parts_of_new - 1, 0)), 0.0),
+            self._event(SPLIT, before, old, np.repeat(np.arange(old_count), np.maximum(parts_of_old - 1, 0)), 0.0),
+        ]
+        return Events.joined(events)
+
+    def _event(self, kind, state, labels, which, sign):
+        """Events of one kind to patches `which`, (k,), of a state; of a jump the energy of its patch is set free."""
+        count = int(labels.max())
+        if not len(which):
+            return Events.joined(())
+        energy = np.bincount(labels.ravel(), self._energy_of_cells(state).ravel(), count + 1)[1:]
+        position = centres(labels, count, state.fraction) * self.spacing
+        summits = np.bincount(labels.ravel()[self.summits.cell], minlength=count + 1)[1:]
+        return Events(
+            np.full(len(which), kind, np.int8),
+            position[which],
+            summits[which],
+            np.maximum(sign * energy[which], 0.0) * self.spacing**2,
+        )

@@ -1,0 +1,73 @@
+"""The front of contact within its cells: what holds a cell that is partly in contact, and when its front rests.
+
+A cell has a fraction of contact f. It is held by a bond of compliance c(f) = C (1/f - 1): closed for f = 1, none for
+f = 0. At a given energy of adhesion the front rests where the energy of bonds, half-space and adhesion is stationary
+in f, which is where the tension of the cell is f times the strength, s = sqrt(2 dgamma/C): a traction that falls
+linearly with the gap and does the work dgamma (A. A. Griffith, Phil. Trans. A 221 (1921) 163). C is that of the rows at
+a straight front, times a factor: then a front moves through its cells without being trapped by them, and what is
+between open and closed is about two cells wide.
+
+Such a front lies by a constant part of a cell within the sum of its fractions. An area that counts cells by their
+neighbours,
+
+    A = sum f - b sum f (1 - w*f),   w a Gaussian stencil,
+
+takes a perimeter off the sum, in the area and, through its derivative, in the work of adhesion at curved fronts.
+
+In units of the grid: lengths in cells, pressures in E*.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import correlate1d
+
+# Compliance of the last row of a straight contact, with the kernel 2/q, over h/E*. The front's own is larger by a
+# factor at which circular spots, wherever in their cells, follow JKR (docs/short_range.md).
+_ROW = 1.7316
+_SOFTER = 1.6
+COMPLIANCE = _SOFTER * _ROW
+# The stencil of neighbours, its width in cells, and the weight of the perimeter (as above, from JKR spots).
+_WIDTH = 1.0
+_REACH = 4
+PERIMETER = 0.5
+_profile = np.exp(-0.5 * (np.arange(-_REACH, _REACH + 1) / _WIDTH) ** 2)
+STENCIL = _profile / _profile.sum()
+
+
+def neighbours(fraction: np.ndarray) -> np.ndarray:
+    """w*f: mean fraction of contact around every cell, (n, n), periodic."""
+    along = correlate1d(fraction, STENCIL, axis=1, mode="wrap")
+    return correlate1d(along, STENCIL, axis=0, mode="wrap")
+
+
+def areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """Contact area of every cell, in cells; around: `neighbours` of the fractions (n, n)."""
+    return fraction - PERIMETER * fraction * (1 - around)
+
+
+def area_gradient(around: np.ndarray) -> np.ndarray:
+    """Change of the whole area with the fraction of every cell."""
+    return 1 - PERIMETER + 2 * PERIMETER * around
+
+
+@dataclass(frozen=True)
+class Front:
+    """The front of a contact with a given adhesion length dgamma/E*, in cells; zero: no adhesion."""
+
+    adhesion_length: float
+
+    @property
+    def strength(self) -> float:
+        """Tension of a cell whose front is straight, when it begins to open, in E*."""
+        return float(np.sqrt(2 * self.adhesion_length / COMPLIANCE))
+
+    def strengths(self, around: np.ndarray) -> np.ndarray:
+        """Tension at which cells begin to open, from their neighbours: less where the front is convex."""
+        return self.strength * np.sqrt(area_gradient(around))
+
+    def strength_change(self, strengths: np.ndarray, around_change: np.ndarray) -> np.ndarray:
+        """Change of the strengths with that of the neighbours."""
+        return self.strength**2 * PERIMETER / strengths * around_change

@@ -1,0 +1,126 @@
+"""Observables of boundary elements: what a run's dataset has of their states, by the names of its variables."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.patches import centres, edges, labelled
+from icha.boundary_elements.states import CellState
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
+from icha.surfaces.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class PatchObservables:
+    """Observables of a contact of cells and of the surface that they are on, beyond those of every model."""
+
+    contact: BoundaryElements
+    surface: Surface
+
+    def of_contact(self) -> dict:
+        """What holds for all states."""
+        return {"asperity_count": len(self.contact.asperities)}
+
+    def of_step(self, state: CellState) -> dict:
+        """Residuals of the equilibrium, events so far, and how far Wu's formula is known to hold."""
+        contact = self.contact
+        touched = state.touching.ravel()[contact.summits.cell]
+        verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
+        outside = np.count_nonzero(~verified) / max(len(verified), 1)
+        counts = {
+            name: sum(events.count(kind) for events in state.history)
+            for name, kind in (
+                ("jump_in_count", JUMP_IN),
+                ("jump_off_count", JUMP_OFF),
+                ("coalescence_count", COALESCENCE),
+                ("split_count", SPLIT),
+            )
+        }
+        return counts | {
+            "residual": state.gap_residual / contact.rms_height,
+            "front_residual": state.front_residual,
+            "gap_residual": state.gap_residual / contact.rms_height,
+            "pressure_residual": float(np.max(np.abs(state.pressure[~state.touching]), initial=0.0))
+            / (contact.contact_modulus * self.surface.rms_slope),
+            "pending_count": state.pending,
+            "outside_wu_fraction": outside if contact.adhesive else 0.0,
+        }
+
+    def of_snapshot(self, state: CellState) -> dict:
+        """Distributions of gap and pressure, the patches, and the map of contact and pressure.
+
+        Raises
+        ------
+        ValueError
+            If a gap or a pressure lies beyond the bins.
+        """
+        gap, cells = self._gap_density(state), self.contact.area_of_cells(state)
+        pressure, mean = self._pressure_density(state, cells)
+        return {
+            "overlap_fraction": 0.0,
+            "area_beyond_edges": 0.0,
+            "gap_density": gap,
+            "pressure_density": pressure,
+            "pressure_bin_mean": mean,
+            "contact_map": state.fraction.astype(np.float32),
+            "contact_pressure": state.pressure.astype(np.float32),
+            **self._patches(state, cells),
+        }
+
+    @property
+    def largest_tension(self) -> float:
+        """Tension of all asperities pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
+        sum_of_radii = float(np.sum(self.contact.asperities.radius_of_curvature))
+        return 1.5 * np.pi * self.contact.law.material.surface_energy * sum_of_radii / self.contact.area
+
+    def _gap_density(self, state):
+        """Density of the gap over the nominal area, outside contact: with the area, it is whole."""
+        edges_of_bins = GAP_BINS * self.surface.rms_height
+        gap = np.maximum(state.gap, 0.0)
+        if gap.max() > edges_of_bins[-1]:
+            raise ValueError(f"gap: {gap.max():.3e} m exceeds the largest bin, {edges_of_bins[-1]:.3e} m")
+        outside = 1 - self.contact.area_of_cells(state)
+        content, _ = np.histogram(gap, edges_of_bins, weights=outside)
+        return content / gap.size / np.diff(edges_of_bins)
+
+    def _pressure_density(self, state, cells):
+        """Density of the pressure over the nominal area, and its mean in every bin; the pressure is the patches'."""
+        edges_of_bins = PRESSURE_BINS * (self.contact.contact_modulus * self.surface.rms_slope)
+        inside = state.touching
+        weight = cells[inside]
+        # The force of a cell on the part of it that touches.
+        pressure = state.pressure[inside] / weight
+        if len(pressure) and np.abs(pressure).max() > edges_of_bins[-1]:
+            raise ValueError(f"pressure: {np.abs(pressure).max():.3e} Pa exceeds the bins, {edges_of_bins[-1]:.3e} Pa")
+        content, _ = np.histogram(pressure, edges_of_bins, weights=weight)
+        force, _ = np.histogram(pressure, edges_of_bins, weights=weight * pressure)
+        mean = np.divide(force, content, out=np.zeros(len(content)), where=content > 0)
+        return content / inside.size / np.diff(edges_of_bins), mean
+
+    def _patches(self, state, cells):
+        """Every patch: centre of area, area, perimeter, force, summits, and the curvature of the highest of them."""
+        contact, h = self.contact, self.contact.spacing
+        labels, count = labelled(state.touching)
+
+        def sums(weight):
+            return np.bincount(labels.ravel(), weight.ravel(), count + 1)[1:]
+
+        area = sums(cells) * h**2
+        of_summit = labels.ravel()[contact.summits.cell]
+        order = np.argsort(contact.asperities.height, kind="stable")
+        # A patch whose summits have been left is that of a cap of the surface's mean curvature.
+        radius = np.full(count + 1, 1 / self.surface.rms_curvature)
+        radius[of_summit[order]] = contact.asperities.radius_of_curvature[order]
+        centre = centres(labels, count, state.fraction) * h
+        return {
+            "spot_x": centre[:, 0],
+            "spot_y": centre[:, 1],
+            "spot_radius": np.sqrt(area / np.pi),
+            "spot_area": area,
+            "spot_perimeter": np.pi / 4 * edges(state.touching, labels, count) * h,
+            "spot_force": sums(state.pressure) * h**2,
+            "spot_curvature_radius": radius[1:],
+            "spot_members": np.bincount(of_summit, minlength=count + 1)[1:],
+        }
