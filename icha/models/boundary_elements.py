@@ -1,8 +1,8 @@
 """Boundary elements in the limit of a short range of attraction: fronts of contact obey Griffith's criterion."""
 
-import importlib
-
 from icha.asperity.material import Material
+from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.observables import PatchObservables
 from icha.contact.observables import Observables
 from icha.models.model import Model
 from icha.path.targets import Path
@@ -10,8 +10,7 @@ from icha.surfaces.surface import Surface
 
 
 def _observables(surface: Surface, material: Material, path: Path) -> Observables:
-    contact = importlib.import_module("icha.boundary_elements.contact").BoundaryElements.of(surface, material)
-    return importlib.import_module("icha.boundary_elements.observables").PatchObservables(contact, surface)
+    return PatchObservables(BoundaryElements.of(surface, material), surface)
 
 
 MODEL = Model(
