@@ -70,7 +70,7 @@ DAMAGES = {
     "area from P(p)": scaled("pressure_density", 1 + 1e-6),
     "load from P(p)": scaled("pressure_bin_mean", 1 + 1e-6),
     "P(u) complete": scaled("gap_density", 1 + 1e-6),
-    "area of spots": scaled("spot_radius", 1 + 1e-6, 0),
+    "area of spots": scaled("spot_area", 1 + 1e-6, 0),
     "load of spots": scaled("spot_force", -1, 0),
     "finite": written("gap_density", np.nan, (0, 5)),
     "stiffness": written("contact_stiffness", -1.0, 2),

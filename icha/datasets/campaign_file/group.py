@@ -52,7 +52,7 @@ class Column(NamedTuple):
             values = np.moveaxis(values, [dims.index(dim) for dim in self.own], range(len(self.own)))
         if values.dtype.kind == "S":
             room = self.variable.shape[-1] - values.shape[-1]
-            values = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, room)])
+            values = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, room)], constant_values=b"")
         return values
 
     def places(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:

@@ -1,0 +1,185 @@
+"""The model as a choice: what a run by boundary elements is to a path, a file, a campaign and its checks."""
+
+import netCDF4
+import numpy as np
+import patches
+import pytest
+import small_campaign as small
+import xarray as xr
+
+import icha
+from icha.analysis.checks import check_campaign, check_run
+from icha.analysis.common_loads import compare_runs
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS, MODELS
+from icha.datasets.campaign import campaign_tree, run_labels, select_run
+from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.files import read_campaign, read_run, write_dataset
+from icha.datasets.format import CAMPAIGN, RUN, flaws, kind_of
+from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.variables.run import FURTHER, PATCHES
+from icha.figures.select import pick_run, study_runs
+
+PATH = icha.Path(reduced_pressures=[1e-3, 1e-2], snapshots=[("reduced_pressure", 1e-3), ("reduced_pressure", 1e-2)])
+BACK = icha.Path(reduced_pressures=[1e-3], unload=True, united_until="overlap")
+
+
+def run(model, path=PATH, material="soft", seed=1):
+    return icha.simulate(small.surface(seed), small.MATERIALS[material], path, model=model, seed=seed)
+
+
+def labels(model, material="soft", seed=1):
+    return RunLabels("one", model, "rough", seed, 1.0, material)
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """Both models of one material, and asperities alone of the other."""
+    patches.stand_in(monkeypatch)
+    found = {labels(model): run(model) for model in MODELS}
+    return found | {labels(ASPERITIES, "hertz"): run(ASPERITIES, material="hertz")}
+
+
+@pytest.mark.parametrize("model", ["asperity", "", None, ["asperities"], "boundary elements"])
+def test_other_models_are_refused_by_name(model):
+    with pytest.raises(ValueError, match=r"^model: .* must be one of asperities, boundary_elements"):
+        icha.simulate(small.surface(), small.MATERIALS["soft"], PATH, model=model)
+
+
+def test_asperities_are_what_is_meant_where_no_model_is_named(runs):
+    plain = icha.simulate(small.surface(), small.MATERIALS["soft"], PATH, seed=1)
+    xr.testing.assert_identical(plain, runs[labels(ASPERITIES)])
+
+
+def test_a_run_says_by_which_model_it_is(runs, tmp_path):
+    asperities, patched = runs[labels(ASPERITIES)], runs[labels(BOUNDARY_ELEMENTS)]
+    assert set(patched.variables) - set(asperities.variables) == set(PATCHES)
+    assert patched["contact_map"].shape == (2, 32, 32) and patched["contact_map"].dtype == np.float32
+    assert asperities.attrs["contact_model"] == ASPERITIES and patched.attrs["contact_model"] == BOUNDARY_ELEMENTS
+    for name in ("title", "summary", "references"):
+        assert asperities.attrs[name] != patched.attrs[name]
+    assert "boundary elements" in patched.attrs["title"] and "Griffith" in patched.attrs["references"]
+    assert str(run(BOUNDARY_ELEMENTS, BACK)["united_until"].values) == ""
+    assert str(run(ASPERITIES, BACK)["united_until"].values) == "overlap"
+    write_dataset(patched, tmp_path / "run.nc")
+    kind, back = kind_of(tmp_path / "run.nc")
+    assert kind == RUN and flaws(RUN, back) == []
+    with netCDF4.Dataset(tmp_path / "run.nc") as file:
+        storage = file["contact_map"]
+        assert storage.chunking() == [1, 32, 32] and storage.filters()["zlib"]
+    lacking = back.drop_vars(["contact_map", "front_residual"])
+    assert flaws(RUN, lacking) == [
+        "front_residual is missing in a file with boundary elements",
+        "contact_map is missing in a file with snapshots of boundary elements",
+    ]
+    assert any("contact_model: 'guess'" in flaw for flaw in flaws(RUN, back.assign_attrs(contact_model="guess")))
+
+
+def test_areas_of_spots_are_those_of_their_circles(runs):
+    one = runs[labels(ASPERITIES)]
+    np.testing.assert_allclose(one["spot_area"], np.pi * one["spot_radius"] ** 2)
+    np.testing.assert_allclose(one["spot_perimeter"] ** 2, 4 * np.pi * one["spot_area"])
+
+
+def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
+    assert LABELS[0] == "model"
+    tree = small.tree()
+    for study in tree.children.values():
+        assert study["contact_area_fraction"].dims == (*LABELS, "step") and study["model"].values.tolist() == [
+            ASPERITIES
+        ]
+    write_campaign(runs.items(), tmp_path / "both.nc", attrs={"campaign": "both", "license": "CC0-1.0"})
+    tree = read_campaign(tmp_path / "both.nc")
+    study = tree["one"].to_dataset()
+    assert study["model"].values.tolist() == [ASPERITIES, BOUNDARY_ELEMENTS]
+    assert study["status"].values.ravel().tolist() == [0, 0, 0, 3]
+    # Maps stay in the files of the runs; what asperities do not have is missing.
+    assert not {"contact_map", "contact_pressure", "row", "column"} & {*study.variables, *study.dims}
+    front = study["front_residual"]
+    assert np.isnan(front.sel(model=ASPERITIES)).all() and front.attrs["missing"] == "of runs by asperities"
+    assert (front.sel(model=BOUNDARY_ELEMENTS, material="soft") == 1e-4).all()
+    assert set(np.unique(study["spot_model"])) == {0, 1}
+    assert [flaw for flaw in flaws(CAMPAIGN, tree) if "attribute" not in flaw] == []
+    assert run_labels(tree) == [labels(ASPERITIES), labels(ASPERITIES, "hertz"), labels(BOUNDARY_ELEMENTS)]
+    assert "Griffith" in tree.attrs["references"] and "Violano" in tree.attrs["references"]
+
+
+def test_every_run_of_both_models_is_taken_out_unchanged(runs):
+    tree = campaign_tree(runs.items())
+    for each, original in runs.items():
+        taken = select_run(tree, each)
+        assert taken.attrs["contact_model"] == each.model
+        kept = set(original.variables) - {"contact_map", "contact_pressure"}
+        assert set(taken.variables) - {"model", "surface", "material"} == kept
+        for name in kept:
+            np.testing.assert_array_equal(taken[name].values, original[name].values, err_msg=f"{each} {name}")
+    with pytest.raises(ValueError, match=r"no model 'other'; there are asperities, boundary_elements"):
+        select_run(tree, labels("other"))
+
+
+def test_the_same_bytes_from_files_and_in_another_order(runs, tmp_path):
+    files = {}
+    for k, (each, own) in enumerate(runs.items()):
+        write_dataset(own, tmp_path / f"{k}.nc")
+        files[each] = tmp_path / f"{k}.nc"
+    write_campaign(runs.items(), tmp_path / "memory.nc", design=runs)
+    write_campaign(reversed(files.items()), tmp_path / "files.nc", design=runs)
+    assert (tmp_path / "memory.nc").read_bytes() == (tmp_path / "files.nc").read_bytes()
+    assert read_run(files[labels(BOUNDARY_ELEMENTS)])["contact_map"].sum() > 0
+
+
+def test_a_run_under_the_name_of_another_model_is_refused(runs):
+    with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/boundary_elements/soft: the dataset's model is asp"):
+        campaign_tree([(labels(BOUNDARY_ELEMENTS), runs[labels(ASPERITIES)])])
+
+
+def test_a_failed_run_of_boundary_elements_leaves_the_others_whole(runs):
+    broken = labels(BOUNDARY_ELEMENTS)
+    whole = runs[broken]
+    nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
+    for part in (nothing, {"step": slice(0, 1), "snapshot": slice(0, 0), "spot": slice(0, 0)}):
+        short = whole.isel(part).assign_attrs(incomplete="it ends")
+        tree = campaign_tree((runs | {broken: short}).items())
+        assert select_run(tree, broken).attrs["incomplete"] == "it ends"
+        failed = [check for check in check_campaign(tree) if not check.passed]
+        assert [(check.subject, check.name) for check in failed] == [(str(broken), "completed")]
+        np.testing.assert_array_equal(
+            select_run(tree, labels(ASPERITIES))["spot_x"], runs[labels(ASPERITIES)]["spot_x"]
+        )
+
+
+def test_checks_know_how_exact_a_model_is(runs):
+    patched = runs[labels(BOUNDARY_ELEMENTS)]
+    assert all(check.passed for check in check_run(patched))
+    names = {check.name for check in check_run(patched)} - {check.name for check in check_run(runs[labels(ASPERITIES)])}
+    assert names == {"front", "gap", "pressure outside"}
+    for name, value in (("front_residual", 0.5), ("gap_residual", 0.1), ("pressure_residual", 0.1)):
+        worse = patched.assign({name: patched[name] * 0 + value})
+        assert len([check for check in check_run(worse) if not check.passed]) == 1
+    # A residual that is none of boundary elements is one of asperities.
+    loose = {"residual": patched["residual"] * 0 + 1e-6}
+    assert all(check.passed for check in check_run(patched.assign(loose)))
+    assert not all(check.passed for check in check_run(runs[labels(ASPERITIES)].assign(loose)))
+
+
+def test_figures_show_asperities_or_else_what_there_is(runs):
+    tree = campaign_tree(runs.items())
+    assert {each.model for each, _ in study_runs(tree, "one")} == {ASPERITIES}
+    assert pick_run(tree, "one", material="soft")[0] == labels(ASPERITIES)
+    alone = campaign_tree([(labels(BOUNDARY_ELEMENTS), runs[labels(BOUNDARY_ELEMENTS)])])
+    assert pick_run(alone, "one")[0] == labels(BOUNDARY_ELEMENTS)
+    assert len(study_runs(alone, "one")) == 1
+
+
+def test_models_are_compared_side_by_side(runs):
+    comparison = compare_runs(campaign_tree(runs.items())["one"].to_dataset())
+    areas = comparison["contact_area_fraction"].sel(material="soft")
+    np.testing.assert_array_equal(areas.sel(model=ASPERITIES), areas.sel(model=BOUNDARY_ELEMENTS))
+    assert comparison["seed_count"].dims == ("model", "surface", "rms_slope", "material")
+
+
+def test_every_model_has_its_further_variables_and_its_module():
+    import importlib
+
+    assert set(FURTHER) == set(MODELS)
+    for name in MODELS:
+        assert importlib.import_module(f"icha.models.{name}").MODEL.references
