@@ -235,7 +235,7 @@ class Campaign(Section):
         for name in study.surfaces:
             if self.boundary(name) != "periodic":
                 reason = f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or "
-                yield at, BOUNDARY_ELEMENTS, reason + "surfaces with `boundary: periodic`"
+                yield at, BOUNDARY_ELEMENTS, reason + "another `boundary`, which makes a surface periodic"
             cells = self._cells_per_short_wave(name)
             if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
                 reason = (

@@ -59,3 +59,14 @@ def test_what_jobs_took_corrects_what_is_expected_of_others():
 
 
 LOADING_COST = costs.sweep_cost(256, 500, LOADING)
+
+
+def test_boundary_elements_grow_with_their_transforms():
+    def cost(grid=512, **changes):
+        return costs.patch_cost(grid, costs.Sweep(**(vars(LOADING) | changes)))
+
+    work = cost(1024).seconds - costs.JOB_SECONDS, cost(512).seconds - costs.JOB_SECONDS
+    assert 4 < work[0] / work[1] < 4.6
+    assert cost(1024).memory > 1.5 * cost(512).memory
+    assert cost(adhesive=False).seconds < cost().seconds < cost(stops=20).seconds < cost(stops=20, legs=1).seconds
+    assert cost(max_step=0.05).seconds > cost().seconds and cost(snapshots=4).disk > cost().disk

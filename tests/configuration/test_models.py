@@ -1,0 +1,118 @@
+"""Key `models` of a study: by which models of contact its runs are computed."""
+
+import pytest
+from demo_configuration import LONG_RANGE, TRUTH, measured_surface
+
+from icha.configuration.cases import run_cases
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.settings import run_settings, run_sha256
+from icha.planning.costs import PATCH_ARRAYS
+from icha.planning.plan import plan
+from icha.planning.resources import run_memory, run_minutes, run_threads
+from icha.planning.results import campaign_files
+
+BOTH = {"studies.one.models": ["asperities", "boundary_elements"]}
+ALONE = {"studies.one.models": ["boundary_elements"]}
+BAD = {
+    "none": ("studies.one.models", [], "studies.one.models: [] is empty; allowed: at least one"),
+    "no list": ("studies.one.models", "boundary_elements", "studies.one.models: 'boundary_elements' is not a list"),
+    "twice": ("studies.one.models", ["asperities", "asperities"], "'asperities' is given twice; allowed: every entry"),
+    "unknown": (
+        "studies.one.models",
+        ["tamaas"],
+        "studies.one.models[0]: 'tamaas' is not a choice; allowed: 'asperities' or 'boundary_elements'",
+    ),
+    "free square": (
+        None,
+        BOTH | {"surfaces.rough": measured_surface(boundary="free")},
+        "studies.one.models[1]: 'boundary_elements' need a periodic surface, and 'rough' is a square with free edges",
+    ),
+    "grid too coarse": (
+        None,
+        ALONE | {"surfaces.rough.grid": 39},
+        "'boundary_elements' need at least 4 grid cells per shortest wavelength, and 'rough' has 3.9; allowed: "
+        "asperities, or a `grid` of 40 or more for 'rough' (recommended: 80)",
+    ),
+    "nothing to compare with": (
+        None,
+        ALONE | LONG_RANGE | {"boundary_elements": {"truth": TRUTH}},
+        "boundary_elements.truth.study: 'one' has no runs to compare with; allowed: a study with 'asperities' among",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
+def test_mistakes_are_named(case, refused):
+    refused(*BAD[case])
+
+
+def test_grids_of_4_to_8_cells_are_warned_of_only_for_boundary_elements(load):
+    coarse = {"surfaces.rough.grid": 40}
+    assert load(coarse).campaign.warnings() == []
+    (warning,) = load(BOTH | coarse).campaign.warnings()
+    assert "surfaces.rough.grid: 40 gives boundary elements 4 cells" in warning and "recommended: 80 or more" in warning
+    assert load(BOTH).campaign.warnings() == []
+
+
+def test_periodic_measured_surfaces_are_pressed_by_both(load):
+    for boundary in ("mirror", "window"):
+        assert load(BOTH | {"surfaces.rough": measured_surface(boundary=boundary)}).campaign.warnings() == []
+
+
+def test_without_the_key_runs_are_by_asperities_and_as_they_were(load):
+    plain, both = load().campaign, load(BOTH).campaign
+    assert {case.model for case in run_cases(plain)} == {"asperities"}
+    asperities = [case for case in run_cases(both) if case.model == "asperities"]
+    assert asperities == run_cases(plain)
+    for case in asperities:
+        assert run_settings(both, case) == run_settings(plain, case) and "model" not in run_settings(plain, case)
+        assert run_sha256(both, case) == run_sha256(plain, case)
+
+
+def test_other_models_have_a_folder_of_their_own(load):
+    campaign = load(BOTH).campaign
+    assert [case.path for case in run_cases(campaign)] == [
+        "one/rough/seed1/slope0.2/soft",
+        "one/rough/seed1/slope1/soft",
+        "one/rough/seed2/slope0.2/soft",
+        "one/rough/seed2/slope1/soft",
+        "one/rough/seed1/slope0.2/boundary_elements/soft",
+        "one/rough/seed1/slope1/boundary_elements/soft",
+        "one/rough/seed2/slope0.2/boundary_elements/soft",
+        "one/rough/seed2/slope1/boundary_elements/soft",
+    ]
+    assert list(campaign_files(campaign).runs)[-1] == "runs/one/rough/seed2/slope1/boundary_elements/soft.nc"
+    assert len({run_sha256(campaign, case) for case in run_cases(campaign)}) == 8
+
+
+def test_the_rule_of_unions_means_nothing_to_boundary_elements(load):
+    back = BOTH | {"studies.one.unload": True}
+    one, other = (load(back | {"studies.one.united_until": rule}).campaign for rule in ("overlap", "detachment"))
+    for case in run_cases(one):
+        same = run_sha256(one, case) == run_sha256(other, case)
+        assert same == (case.model == "boundary_elements")
+        assert ("united_until" in run_settings(one, case)["path"]) == (case.model == "asperities")
+    assert run_settings(one, run_cases(one)[-1])["model"] == "boundary_elements"
+
+
+def test_known_failures_may_be_of_either_model(load):
+    failure = {"run": "one/rough/seed1/slope1/boundary_elements/soft", "reason": "why"}
+    load(BOTH | {"publication": {"known_failures": [failure]}})
+    with pytest.raises(ConfigurationError, match="is not a run"):
+        load({"publication": {"known_failures": [failure]}})
+
+
+def test_boundary_elements_are_planned_as_a_part_of_their_own_at_their_own_cost(load, tmp_path):
+    campaign = load(BOTH | {"surfaces.rough.grid": 512}).campaign
+    runs = [item for item in plan(campaign, tmp_path) if item.is_run]
+    parts = {"study one": [], "study one, boundary elements": []}
+    for item in runs:
+        parts[item.part].append(item)
+    quick, slow = parts.values()
+    assert len(quick) == len(slow) == 4
+    assert min(item.cost.seconds for item in slow) > 10 * max(item.cost.seconds for item in quick)
+    first, *_, last = run_cases(campaign)
+    assert run_memory(campaign, last) > 600 + PATCH_ARRAYS * 8 * 512**2 / 1e6 > run_memory(campaign, first)
+    assert run_memory(campaign, last) * 1e6 > slow[0].cost.memory
+    assert run_minutes(campaign, last) > run_minutes(campaign, first)
+    assert run_threads(campaign, first) == run_threads(campaign, last) == 1
