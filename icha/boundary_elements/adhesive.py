@@ -1,4 +1,4 @@
-"""Contact with adhesion at a given separation: fronts come to rest, and contact forms within reach of the attraction."""
+"""Contact with adhesion at a given separation: fronts come to rest, contact forms within reach of the attraction."""
 
 from __future__ import annotations
 
