@@ -11,7 +11,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements.adhesionless import pressed
 from icha.boundary_elements.adhesive import Summits, settled
 from icha.boundary_elements.elasticity import Held
-from icha.boundary_elements.front import Front, area_gradient, areas, neighbours
+from icha.boundary_elements.front import Front, areas, contact_area_gradient, contact_areas, neighbours
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import front_residual, tangent
 from icha.boundary_elements.patches import centres, labelled
@@ -126,7 +126,7 @@ class BoundaryElements:
     def area_of_cells(self, state: CellState) -> np.ndarray:
         """Contact area of every cell, (n, n), in cells: less than its fraction along the perimeter."""
         if self.adhesive:
-            return areas(state.fraction, neighbours(state.fraction))
+            return contact_areas(state.fraction, neighbours(state.fraction))
         touching = state.touching
         bare = sum((touching & ~np.roll(touching, way, axis)).astype(float) for axis in (0, 1) for way in (-1, 1))
         return touching - _EDGE * bare
@@ -153,7 +153,7 @@ class BoundaryElements:
             return float(np.mean(pressure)) * self.contact_modulus / self.spacing
         if not self.adhesive:
             return self._slope_of_area(state)
-        return float(np.mean(area_gradient(around) * fraction)) / self.spacing
+        return float(np.mean(contact_area_gradient(state.fraction, around) * fraction)) / self.spacing
 
     def stored_energy(self, state: CellState) -> float:
         """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
@@ -252,7 +252,7 @@ class BoundaryElements:
     def _energy_of_cells(self, state):
         """Elastic energy less that of adhesion of every cell, J/m^2."""
         elastic = 0.5 * state.pressure * (self.heights - state.separation)
-        return elastic - self.law.material.surface_energy * self.area_of_cells(state)
+        return elastic - self.law.material.surface_energy * areas(state.fraction, neighbours(state.fraction))
 
     def _events(self, before, after):
         """What became of the patches: those that are new, gone, joined or split."""
