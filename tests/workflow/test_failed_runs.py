@@ -87,7 +87,7 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     broken = read_run(files["glue"])
     reason = broken.attrs["incomplete"]
     tree = read_campaign(file)
-    study = tree["sticky"].to_dataset().isel(surface=0, seed=0, rms_slope=0)
+    study = tree["sticky"].to_dataset().isel(model=0, surface=0, seed=0, rms_slope=0)
     assert study["status"].values.tolist() == [1, 0] and study["failure"].values.tolist() == [reason, ""]
     assert int(study["step_count"][0]) == broken.sizes["step"] < study.sizes["step"]
     whole, soft = read_run(files["soft"]), select_run(tree, labels[1])
