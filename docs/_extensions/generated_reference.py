@@ -143,7 +143,7 @@ def _small_campaign():
     material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2.071e-9)
     path = icha.Path(reduced_pressures=[5e-4, 1e-3], unload=True, max_step=0.5)
     run = icha.simulate(_small_spectrum().realise(32, 1), material, path, seed=1)
-    return campaign_tree([(("study", "rough", 1, 1.0, "soft"), run)])
+    return campaign_tree([(("study", "asperities", "rough", 1, 1.0, "soft"), run)])
 
 
 def _rows(variables):
