@@ -23,7 +23,7 @@ from icha.surfaces.summits import Asperities, find_summits
 from icha.surfaces.surface import Surface
 
 # Relative error of a held load or area.
-_HELD = 1e-10
+_HELD = 5e-10
 _MAX_TRIALS = 60
 # A trial so near the target, relatively, is gone on from even if it lies beyond. Closer separations, in h_rms, are one.
 _CLOSE = 1e-3

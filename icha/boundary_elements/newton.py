@@ -17,13 +17,15 @@ from icha.boundary_elements.kernel import HalfSpace
 from icha.contact.failures import NotConverged
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
-FRONT_TOLERANCE = 1e-6
+FRONT_TOLERANCE = 1e-9
 # Of the displacement in contact, over the gap at which a cell is free.
-GAP_TOLERANCE = 1e-8
+GAP_TOLERANCE = 1e-11
+# The same on the way, over the error of the front that is to be mended.
+_GAP_TO_FRONT = 1e-5
 _MAX_STEPS = 400
 _MAX_KRYLOV = 60
 # Of the linear equations: never better than needed, and never worse.
-_LOOSE, _TIGHT = 1e-2, 1e-5
+_LOOSE, _TIGHT = 1e-2, 1e-4
 # The rows of the front, in the preconditioner: what is left of a bond beside the half-space.
 _NET = 0.6
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
@@ -63,15 +65,16 @@ def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separatio
     NotConverged
         If it is not found.
     """
-    tolerance = GAP_TOLERANCE * COMPLIANCE * front.strength
+    reach = COMPLIANCE * front.strength
 
-    def at(fraction, pressure):
+    def at(fraction, pressure, error):
+        tolerance = max(GAP_TOLERANCE, _GAP_TO_FRONT * min(error, 1.0)) * reach
         return held(space, heights, separation, fraction, pressure, tolerance)
 
     def energy(state):
         return state.energy - front.adhesion_length * float(np.sum(areas(state.fraction, state.around)))
 
-    state = at(state.fraction, state.pressure)
+    state = at(state.fraction, state.pressure, 1.0)
     level, damping = energy(state), 0.0
     for _ in range(_MAX_STEPS):
         closing, opening, tension = moving(front, state)
@@ -87,10 +90,10 @@ def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separatio
             if np.vdot(tension**2 - 1, change) < 0:
                 break
             damping = _more(damping)
-        step = min(1.0, 1 / np.abs(change).max())
+        step = 1.0
         while step >= _SMALLEST_STEP:
             fraction = np.clip(state.fraction + step * change, 0.0, 1.0)
-            new = at(fraction, state.pressure + step * pressed)
+            new = at(fraction, state.pressure + step * pressed, error)
             new_level = energy(new)
             if new_level <= level + 1e-12 * abs(level):
                 break
