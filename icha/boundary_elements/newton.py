@@ -75,13 +75,18 @@ def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separatio
         return state.energy - front.adhesion_length * float(np.sum(areas(state.fraction, state.around)))
 
     state = at(state.fraction, state.pressure, 1.0)
-    level, damping = energy(state), 0.0
+    level, damping, solved = energy(state), 0.0, 1.0
     for _ in range(_MAX_STEPS):
         closing, opening, tension = moving(front, state)
         free = closing | opening
         error = float(np.max(np.abs(tension - 1)[free], initial=0.0))
         if error <= FRONT_TOLERANCE:
-            return state
+            if solved <= FRONT_TOLERANCE:
+                return state
+            # The pressures may still be those of a coarse beginning.
+            state, solved = at(state.fraction, state.pressure, 0.0), 0.0
+            level = energy(state)
+            continue
         at_front = free | ((state.fraction > 0) & (state.fraction < 1))
         accuracy = min(_LOOSE, max(_TIGHT, 0.1 * error))
         while True:
@@ -103,7 +108,7 @@ def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separatio
             continue
         if step == 1.0:
             damping = damping / 4 if damping > 0.01 else 0.0
-        state, level = new, new_level
+        state, level, solved = new, new_level, error
     raise NotConverged(f"the front did not come to rest (sqrt(G/dgamma) is off by {error:.1e})")
 
 
