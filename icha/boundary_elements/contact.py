@@ -31,6 +31,8 @@ _SAME = 1e-13
 # What a load of zero is held to, over E*; and an area without adhesion, in cells.
 _NO_LOAD = 1e-6
 _CELLS = 2.0
+# Patches are many and their events small: work is known well enough if it is known between steps so short, in h_rms.
+_SHARP = 1 / 512
 # Nodes along an edge overestimate an area by so much of the edges of cells (Yastrebov, Anciaux & Molinari, Tribol. Int.
 # 114 (2017) 161, eq. 9).
 _EDGE = (np.pi - 1 + np.log(2)) / 24
@@ -91,6 +93,16 @@ class BoundaryElements:
         """Nominal contact area A0, m^2."""
         return self.heights.size * self.spacing**2
 
+    @property
+    def largest_area_fraction(self) -> float:
+        """All of it: full contact ends a path by itself."""
+        return 1.0
+
+    @property
+    def shortest_step(self) -> float:
+        """Change of the mean separation, over h_rms, below which events are not told apart."""
+        return _SHARP
+
     def untouched(self) -> CellState:
         """The state at which the first summit is about to make contact."""
         reach = self.summits.reach * self.spacing if self.adhesive else 0.0
@@ -145,15 +157,7 @@ class BoundaryElements:
 
     def slope(self, quantity: str, state: CellState) -> float:
         """Derivative of a quantity that can be held with respect to the mean separation, fronts moving along."""
-        if not state.touching.any():
-            return 0.0
-        around = neighbours(state.fraction)
-        fraction, pressure = tangent(self.space, self.front, self._cells(state, around))
-        if quantity == PRESSURE:
-            return float(np.mean(pressure)) * self.contact_modulus / self.spacing
-        if not self.adhesive:
-            return self._slope_of_area(state)
-        return float(np.mean(contact_area_gradient(state.fraction, around) * fraction)) / self.spacing
+        return state.pressure_slope if quantity == PRESSURE else state.area_slope
 
     def stored_energy(self, state: CellState) -> float:
         """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
@@ -197,12 +201,11 @@ class BoundaryElements:
             fraction,
             pressure * self.contact_modulus,
             gap * h,
-            residual,
-            max(closed, -gap[fraction <= 0].min(initial=0.0)) * h,
-            pending,
-            state.history,
+            front_residual=residual,
+            gap_residual=max(closed, -gap[fraction <= 0].min(initial=0.0)) * h,
+            pending=pending,
         )
-        return replace(new, history=(*state.history, self._events(state, new)))
+        return replace(self._with_slopes(new), history=(*state.history, self._events(state, new)))
 
     def _held(self, state, separation, control):
         """The equilibrium under a load or of an area, from a state not far away.
@@ -244,10 +247,19 @@ class BoundaryElements:
                 separation = 0.5 * (low + high)
         raise NotConverged(f"a {control.quantity.replace('_', ' ')} of {control.target:g} is not met from here")
 
-    def _slope_of_area(self, state):
-        """Without adhesion: of the area as it grows with the load, about in proportion."""
-        pressure = self.pressure(state)
-        return self.area_fraction(state) * self.slope(PRESSURE, state) / pressure if pressure > 0 else 0.0
+    def _with_slopes(self, state):
+        """The state with the derivatives of pressure and area."""
+        if not state.touching.any():
+            return state
+        around = neighbours(state.fraction)
+        fraction, pressure = tangent(self.space, self.front, self._cells(state, around))
+        stiffer = float(np.mean(pressure)) * self.contact_modulus / self.spacing
+        if self.adhesive:
+            wider = float(np.mean(contact_area_gradient(state.fraction, around) * fraction)) / self.spacing
+        else:
+            # Cells come and go as wholes; in the mean the area grows about in proportion to the load.
+            wider = self.area_fraction(state) * stiffer / self.pressure(state)
+        return replace(state, pressure_slope=stiffer, area_slope=wider)
 
     def _energy_of_cells(self, state):
         """Elastic energy less that of adhesion of every cell, J/m^2."""

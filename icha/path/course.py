@@ -8,12 +8,9 @@ from dataclasses import dataclass, replace
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel, State
 from icha.path.bracketing import InsideJump
-from icha.path.limits import MAX_AREA_FRACTION
 from icha.path.stops import Stop
 from icha.path.targets import Target
 
-# How far past the covered area the path looks for a target before it gives up.
-_AREA_MARGIN = 1.5
 # A step that does not converge is halved down to this fraction of the longest one.
 _SMALLEST_STEP = 2.0**-14
 
@@ -54,7 +51,7 @@ class Course:
         contact = self.contact
         what = (stop or waiting[0]).target.named() if stop or waiting else "separation"
         area = contact.area_fraction(after)
-        if area > _AREA_MARGIN * MAX_AREA_FRACTION:
+        if area > contact.largest_area_fraction:
             reason = f"the contact area runs to {area:.2f} of the nominal one, beyond what the model covers,"
             raise self.ended(before, loading, NotConverged(f"{reason} before {what}"))
         if stop is None and contact.mean_gap(after) <= 0:

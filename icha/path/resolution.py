@@ -23,11 +23,11 @@ UNITING_STEP = 1 / 16
 # energy agree within the other one.
 _ROUGH_WORK = 1e-4
 _BALANCED_WORK = 3e-6
+# The first contact is made and the last one broken within this change of separation, in h_rms.
+SHARP = 1e-12
 # Of the largest tension so far, the part by which it may be missed between two equilibria: at an event, and else.
 _MISSED_TENSION = 1e-3
 _MISSED_SMOOTH_TENSION = 1e-8
-# The first contact is made and the last one broken within this change of separation, in h_rms.
-SHARP = 1e-12
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,7 @@ def resolved(
         If an equilibrium is not found even with the shortest step.
     """
     unit = contact.rms_height
+    shortest = contact.shortest_step * unit
     while True:
         collective = direction > 0 and contact.adhesive and width < CLOSE_TO_A_JUMP * unit
         try:
@@ -92,7 +93,8 @@ def resolved(
         passed = step.sudden and direction * start.separation + SHARP * unit >= stride.event_at
         if width <= SHARP * unit or passed:
             return beyond, step, settled
-        if _is_resolved(contact, start, beyond, step, account, longest):
+        work_known = width <= shortest or _is_work_known(contact, beyond, step, account, longest)
+        if work_known and _is_tension_known(contact, start, beyond, step, account):
             weakest = _largest_tension(contact, start, beyond, step, account)
             if weakest is None:
                 return beyond, step, settled
@@ -124,8 +126,8 @@ def _equilibrium(contact, start, separation, collective):
                 raise
 
 
-def _is_resolved(contact, start, beyond, step, account, longest):
-    """Whether the work in a step is known, and with it the largest tension."""
+def _is_work_known(contact, beyond, step, account, longest):
+    """Whether the work in a step is known."""
     effort = account.effort + abs(step.work) + abs(step.lost)
     jumped = UNRESOLVED_LOSS * (account.jumped + step.set_free(contact))
     if step.unresolved > (jumped or UNRESOLVED_WORK * effort):
@@ -137,14 +139,15 @@ def _is_resolved(contact, start, beyond, step, account, longest):
     if step.width > 0 and contact.pressure(beyond) < 0:
         scale = min(effort, 10 * account.jumped)  # there is no way in here that has the same error
     unbalanced = step.roughness > _ROUGH_WORK * scale and abs(step.lost) > _BALANCED_WORK * scale
-    if not step.sudden and unbalanced and abs(step.width) > longest / 256:
-        return False
-    if step.width < 0:
+    return step.sudden or not unbalanced or abs(step.width) <= longest / 256
+
+
+def _is_tension_known(contact, start, beyond, step, account):
+    """Whether the largest tension in a step is known, as far as its events decide it."""
+    if step.width < 0 or not step.pressure_jump:
         return True
     if contact.adhesive and contact.spot_count(start) and not contact.spot_count(beyond):
         return False  # the last contact breaks: seen as sharply as can be
-    if not step.pressure_jump:
-        return True
     # The pressure has fallen on along its tangent until the event.
     p, slope = contact.pressure(start), -contact.stiffness(start)
     lowest, deepest = min(p, p + step.width * slope), min(p, contact.pressure(beyond))
