@@ -27,14 +27,14 @@ from scipy.ndimage import correlate1d
 # Compliance of the last row of a straight contact, with the kernel 2/q, over h/E*. The front's own is larger by a
 # factor at which circular spots, wherever in their cells, follow JKR (docs/short_range.md).
 _ROW = 1.7316
-_SOFTER = 1.6
+_SOFTER = 3.5
 COMPLIANCE = _SOFTER * _ROW
 # The stencil of neighbours, its width in cells, and the weight of the perimeter (as above, from JKR spots).
-_WIDTH = 1.0
-_REACH = 4
-PERIMETER = 0.5
+_WIDTH = 1.5
+_REACH = 5
+PERIMETER = 0.7
 # Weights of the perimeter and of the front's width in the area that is told, from spots between Hertz's and JKR's.
-_EDGE, _WIDE = 0.358, 0.613
+_EDGE, _WIDE = 0.236, 1.115
 _profile = np.exp(-0.5 * (np.arange(-_REACH, _REACH + 1) / _WIDTH) ** 2)
 STENCIL = _profile / _profile.sum()
 
