@@ -23,7 +23,7 @@ from typing import NamedTuple
 import netCDF4
 import numpy as np
 
-from icha.analysis.checks import RESIDUAL_LIMIT
+from icha.analysis.checks import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.publication.deposit_files import COMPUTED
 from icha.support.atomic_files import whole_file
 
@@ -37,7 +37,10 @@ IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (
 TOLERANCE = 1e-6
 FLOOR = 1e-6
 # Differences that are allowed of variables of these names, whatever their values.
-NOISE = {"residual": RESIDUAL_LIMIT}
+NOISE = {
+    **dict.fromkeys(("residual", "gap_residual", "pressure_residual"), RESIDUAL_LIMIT),
+    "front_residual": FRONT_LIMIT,
+}
 _DRAWN = (".png", ".pdf", ".html")
 _BLOCK = 1 << 20
 

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 from conftest import FIGURES, copy_project, snakemake
 
+from icha.contact.models import MODELS
+
 REPOSITORY = Path(__file__).parents[2]
 
 ALL_RULES = {
@@ -110,6 +112,7 @@ SOLVERS = {"solve_boundary_elements", "follow_boundary_elements", "find_error_so
 @pytest.mark.parametrize(
     ("module", "scripts"),
     {
+        "boundary_elements/contact": {"run_sweep"},
         "equilibrium/equilibrium": {"run_sweep", "find_error_sources", "press_one_asperity"},
         "asperity/jkr": {"run_sweep", "make_references", "find_error_sources", "press_one_asperity"},
         "half_space/interaction": {"run_sweep", "find_error_sources", "press_one_asperity"},
@@ -117,7 +120,7 @@ SOLVERS = {"solve_boundary_elements", "follow_boundary_elements", "find_error_so
         "path/loading": {"run_sweep", "find_error_sources"},
         "path/energy_balance": {"run_sweep", "find_error_sources"},
         # Boundary elements know nothing of the model: they are not solved again.
-        "references/boundary_elements": SOLVERS,
+        "references/finite_range": SOLVERS,
         "references/persson": {"make_references"},
         "surfaces/spectrum": {"make_surface", "make_references"},
         "configuration/campaign": {"publish"},
@@ -126,14 +129,28 @@ SOLVERS = {"solve_boundary_elements", "follow_boundary_elements", "find_error_so
 )
 def test_scripts_whose_fingerprint_a_module_is_part_of(module, scripts, fingerprint):
     folder = REPOSITORY / "workflow/scripts"
-    having = {file.stem for file in folder.glob("*.py") if f"icha/{module}.py" in fingerprint.files_of(file)}
+    # A run imports its model by name.
+    told = {"run_sweep": [f"icha.models.{name}" for name in MODELS]}
+    having = {
+        file.stem
+        for file in folder.glob("*.py")
+        if f"icha/{module}.py" in fingerprint.files_of(file, *told.get(file.stem, ()))
+    }
     assert having == scripts
+
+
+def test_models_of_contact_know_nothing_of_each_other(fingerprint):
+    script = REPOSITORY / "workflow/scripts/run_sweep.py"
+    asperities, patches = (set(fingerprint.files_of(script, f"icha.models.{name}")) for name in MODELS)
+    assert "icha/equilibrium/equilibrium.py" in asperities - patches
+    assert "icha/boundary_elements/contact.py" in patches - asperities
+    assert not any("/equilibrium/" in name for name in patches - asperities)
 
 
 def test_the_physics_runs_sweeps_and_what_follows(project):
     add_statement(project / "icha/simulation.py")
     jobs, _ = planned(project)
-    assert jobs["run"] == 12
+    assert jobs["run"] == 14
     assert set(jobs) == WHAT_FOLLOWS_RUNS
 
 
@@ -157,7 +174,7 @@ def test_other_authors_run_the_dataset_which_names_them_and_no_sweep(project):
 def test_another_licence_runs_all_that_names_it(project):
     replace(project / "config/campaigns/smoke.yaml", "license: CC-BY-4.0", "license: CC0-1.0")
     jobs, _ = planned(project)
-    assert jobs["run"] == 12 and jobs["surface"] == 3 and set(jobs) >= BESIDE_RUNS | {"campaign_dataset", "comparison"}
+    assert jobs["run"] == 14 and jobs["surface"] == 3 and set(jobs) >= BESIDE_RUNS | {"campaign_dataset", "comparison"}
 
 
 @pytest.mark.slow
@@ -173,6 +190,16 @@ def test_the_style_runs_all_figures(project):
     add_statement(project / "icha/figures/style.py")
     jobs, _ = planned(project)
     assert jobs == {"figure": len(FIGURES), "report_page": 1}
+
+
+@pytest.mark.slow
+def test_a_model_of_contact_runs_its_own_sweeps(project):
+    add_statement(project / "icha/boundary_elements/contact.py")
+    jobs, messages = planned(project)
+    assert jobs["run"] == 1 and set(jobs) <= WHAT_FOLLOWS_RUNS | {"run"}
+    assert [each for each in messages if "Sweep" in each] == [
+        "Sweep both: mcghee, seed 1, slope 0.5, boundary_elements/pdms_soft"
+    ]
 
 
 @pytest.mark.slow
@@ -241,7 +268,7 @@ def test_another_way_to_write_a_value_runs_no_sweep(project):
 def test_a_value_runs_the_sweeps_that_it_concerns(project):
     replace(project / "config/campaigns/smoke.yaml", "2 mJ/m^2", "3 mJ/m^2")
     jobs, _ = planned(project)
-    assert jobs["run"] == 3
+    assert jobs["run"] == 5
     # A curve of Fuller & Tabor is that of the material.
     assert jobs["reference"] == 1 and not {"surface", "boundary_elements", "error_sources"} & set(jobs)
 
