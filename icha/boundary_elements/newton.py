@@ -18,6 +18,8 @@ from icha.contact.failures import NotConverged
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
 FRONT_TOLERANCE = 1e-9
+# So near to equilibrium Newton's steps need no watching.
+_NEARLY = 1e-7
 # Of the displacement in contact, over the gap at which a cell is free.
 GAP_TOLERANCE = 1e-11
 # The same on the way, over the error of the front that is to be mended.
@@ -80,10 +82,10 @@ def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separatio
         closing, opening, tension = moving(front, state)
         free = closing | opening
         error = float(np.max(np.abs(tension - 1)[free], initial=0.0))
-        if error <= FRONT_TOLERANCE:
-            if solved <= FRONT_TOLERANCE:
-                return state
-            # The pressures may still be those of a coarse beginning.
+        if error <= FRONT_TOLERANCE and solved <= FRONT_TOLERANCE:
+            return state
+        if error <= _NEARLY < solved or error <= FRONT_TOLERANCE:
+            # The pressures may still be those of a coarse beginning, and the error theirs.
             state, solved = at(state.fraction, state.pressure, 0.0), 0.0
             level = energy(state)
             continue
@@ -91,8 +93,8 @@ def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separatio
         accuracy = min(_LOOSE, max(_TIGHT, 0.1 * error))
         while True:
             change, pressed = _step(space, front, state, at_front, damping, accuracy)
-            # Down in energy: G - dgamma against the change of contact.
-            if np.vdot(tension**2 - 1, change) < 0:
+            # Down in energy: G - dgamma against the change of contact; of the smallest changes that is rounding.
+            if np.vdot(tension**2 - 1, change) < 0 or np.abs(change).max() <= _NEARLY:
                 break
             damping = _more(damping)
         step = 1.0
