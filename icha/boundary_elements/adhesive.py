@@ -18,13 +18,26 @@ _NEARLY_ALL = 0.98
 
 @dataclass(frozen=True, eq=False)
 class Summits:
-    """Where contact may form out of nothing: cells (k,), how far above its node each summit rises, and how far its
-    attraction reaches, both in cells.
+    """Where contact may form out of nothing. Arrays of length k; lengths in cells.
+
+    cell: of the grid, counted through. above: how far above its node each summit rises. reach: how far its attraction
+    does. radius: of the contact that it makes there, were it alone; from a smaller one it could not grow.
     """
 
     cell: np.ndarray
     above: np.ndarray
     reach: np.ndarray
+    radius: np.ndarray
+
+    def contacts(self, which: np.ndarray, grid: int) -> np.ndarray:
+        """Cells, (n, n) of bool, that these summits (k,) touch with when they jump into contact."""
+        found = np.zeros((grid, grid), dtype=bool)
+        for cell, radius in zip(self.cell[which], self.radius[which], strict=True):
+            way = np.arange(-int(radius), int(radius) + 1)
+            disc = np.hypot(way[:, None], way) <= radius
+            rows, columns = (np.add.outer(at, way) % grid for at in divmod(int(cell), grid))
+            found[np.ix_(rows, columns)] |= disc
+        return found
 
 
 def settled(
@@ -49,15 +62,14 @@ def settled(
             raise FullContact("the contact runs over the whole surface")
         touching = state.fraction > 0
         inside = state.gap.ravel()[summits.cell] - summits.above - summits.reach < 0
-        within = summits.cell[inside & ~touching.ravel()[summits.cell]]
+        within = inside & ~touching.ravel()[summits.cell]
         seeds = np.zeros(heights.size, dtype=bool)
-        seeds[within] = True
+        seeds[summits.cell[within]] = True
         # Without a summit, surfaces that overlap touch.
         seeds |= ((state.gap < 0) & ~beside(touching)).ravel()
         new = seeds & ~tried
         if not new.any():
             return state, int(np.count_nonzero(seeds))
+        made = summits.contacts(within & ~tried[summits.cell], len(heights)) | new.reshape(heights.shape)
         tried |= new
-        state = Held(
-            np.where(new.reshape(heights.shape), 1.0, state.fraction), state.pressure, state.gap, 0.0, state.around
-        )
+        state = Held(np.where(made, 1.0, state.fraction), state.pressure, state.gap, 0.0, state.around)

@@ -28,7 +28,7 @@ _MAX_TRIALS = 60
 # A trial so near the target, relatively, is gone on from even if it lies beyond. Closer separations, in h_rms, are one.
 _CLOSE = 1e-3
 _SAME = 1e-13
-# What a load of zero is held to, over E*; and an area without adhesion, in cells.
+# What a load of zero is held to over E*, at least (else over the load before); and an area without adhesion, in cells.
 _NO_LOAD = 1e-6
 _CELLS = 2.0
 # Patches are many and their events small: work is known well enough if it is known between steps so short, in h_rms.
@@ -68,10 +68,12 @@ class BoundaryElements:
         law, asperities, h = JKR(material), find_summits(surface), surface.spacing
         column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
         cell = row * surface.grid + column
+        jump_in = law.jump_in_approach(asperities.radius_of_curvature)
         summits = Summits(
             cell,
             (asperities.height - surface.heights.ravel()[cell]) / h,
-            -law.jump_in_approach(asperities.radius_of_curvature) / h,
+            -jump_in / h,
+            law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
         )
         front = Front(material.surface_energy / (material.contact_modulus * h))
         return cls(surface.heights, h, law, surface.rms_height, asperities, HalfSpace.of(surface.grid), front, summits)
@@ -216,7 +218,7 @@ class BoundaryElements:
         def value(state):
             return self.pressure(state) if control.quantity == PRESSURE else self.area_fraction(state)
 
-        scale = abs(control.target) or _NO_LOAD * self.contact_modulus
+        scale = abs(control.target) or max(abs(value(state)), _NO_LOAD * self.contact_modulus)
         # Without adhesion the area changes by whole cells.
         enough = _HELD * scale
         if control.quantity == AREA_FRACTION and not self.adhesive:
