@@ -9,9 +9,11 @@ import numpy as np
 from icha.boundary_elements.elasticity import Held
 from icha.boundary_elements.front import Front
 from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.newton import beside, front_at_rest
+from icha.boundary_elements.newton import FRONT_TOLERANCE, beside, front_at_rest
 from icha.contact.failures import FullContact
 
+# Deviation of sqrt(G/dgamma) at which a front rests well enough to see where new contact forms.
+_NEARLY_AT_REST = 1e-3
 # More of the surface than this in contact, and the rest follows.
 _NEARLY_ALL = 0.98
 
@@ -56,8 +58,9 @@ def settled(
         If an equilibrium is not found.
     """
     tried = np.zeros(heights.size, dtype=bool)
+    rest = False
     while True:
-        state = front_at_rest(space, front, heights, separation, state)
+        state = front_at_rest(space, front, heights, separation, state, FRONT_TOLERANCE if rest else _NEARLY_AT_REST)
         if np.mean(state.fraction) > _NEARLY_ALL:
             raise FullContact("the contact runs over the whole surface")
         touching = state.fraction > 0
@@ -69,7 +72,11 @@ def settled(
         seeds |= ((state.gap < 0) & ~beside(touching)).ravel()
         new = seeds & ~tried
         if not new.any():
-            return state, int(np.count_nonzero(seeds))
+            if rest:
+                return state, int(np.count_nonzero(seeds))
+            rest = True
+            continue
+        rest = False
         made = summits.contacts(within & ~tried[summits.cell], len(heights)) | new.reshape(heights.shape)
         tried |= new
         state = Held(np.where(made, 1.0, state.fraction), state.pressure, state.gap, 0.0, state.around)

@@ -235,7 +235,8 @@ class BoundaryElements:
                 short = new
             else:
                 far = new
-            start = new if abs(error) < _CLOSE * scale else short
+            # Beyond the target an event may have happened that must not.
+            start = new if new is short or not len(new.history[-1]) or abs(error) < _CLOSE * scale else short
             slope = self.slope(control.quantity, new)
             separation = new.separation - error / slope if slope else np.nan
             if far is None:

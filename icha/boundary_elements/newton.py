@@ -59,8 +59,17 @@ def front_residual(front: Front, state: Held) -> float:
     return float(np.max(off, initial=0.0))
 
 
-def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separation: float, state: Held) -> Held:
+def front_at_rest(
+    space: HalfSpace,
+    front: Front,
+    heights: np.ndarray,
+    separation: float,
+    state: Held,
+    tolerance: float = FRONT_TOLERANCE,
+) -> Held:
     """The contact in equilibrium at a separation (cells), down in energy from that of a state.
+
+    tolerance: of sqrt(G/dgamma) along the front.
 
     Raises
     ------
@@ -70,8 +79,8 @@ def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separatio
     reach = COMPLIANCE * front.strength
 
     def at(fraction, pressure, error):
-        tolerance = max(GAP_TOLERANCE, _GAP_TO_FRONT * min(error, 1.0)) * reach
-        return held(space, heights, separation, fraction, pressure, tolerance)
+        off = max(GAP_TOLERANCE, _GAP_TO_FRONT * min(error, 1.0)) * reach
+        return held(space, heights, separation, fraction, pressure, off)
 
     def energy(state):
         return state.energy - front.adhesion_length * float(np.sum(areas(state.fraction, state.around)))
@@ -82,9 +91,9 @@ def front_at_rest(space: HalfSpace, front: Front, heights: np.ndarray, separatio
         closing, opening, tension = moving(front, state)
         free = closing | opening
         error = float(np.max(np.abs(tension - 1)[free], initial=0.0))
-        if error <= FRONT_TOLERANCE and solved <= FRONT_TOLERANCE:
+        if error <= tolerance and solved <= tolerance:
             return state
-        if error <= _NEARLY < solved or error <= FRONT_TOLERANCE:
+        if error <= _NEARLY < solved or error <= tolerance:
             # The pressures may still be those of a coarse beginning, and the error theirs.
             state, solved = at(state.fraction, state.pressure, 0.0), 0.0
             level = energy(state)
