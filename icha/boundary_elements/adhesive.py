@@ -9,7 +9,7 @@ import numpy as np
 from icha.boundary_elements.elasticity import Held
 from icha.boundary_elements.front import Front
 from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.newton import FRONT_TOLERANCE, beside, front_at_rest
+from icha.boundary_elements.newton import beside, front_at_rest
 from icha.contact.failures import FullContact
 
 # Deviation of sqrt(G/dgamma) at which a front rests well enough to see where new contact forms.
@@ -43,9 +43,17 @@ class Summits:
 
 
 def settled(
-    space: HalfSpace, front: Front, heights: np.ndarray, summits: Summits, separation: float, state: Held
+    space: HalfSpace,
+    front: Front,
+    heights: np.ndarray,
+    summits: Summits,
+    separation: float,
+    state: Held,
+    tolerance: float,
 ) -> tuple[Held, int]:
     """The contact in equilibrium at a separation (cells), and how many summits within reach it left open.
+
+    tolerance: of sqrt(G/dgamma) along the fronts.
 
     Fronts come to rest first; then the summit that is deepest in reach, and all that are so among their surroundings,
     make contact, and fronts come to rest again. A summit that loses the contact again stays open.
@@ -60,7 +68,7 @@ def settled(
     tried = np.zeros(heights.size, dtype=bool)
     rest = False
     while True:
-        state = front_at_rest(space, front, heights, separation, state, FRONT_TOLERANCE if rest else _NEARLY_AT_REST)
+        state = front_at_rest(space, front, heights, separation, state, tolerance if rest else _NEARLY_AT_REST)
         if np.mean(state.fraction) > _NEARLY_ALL:
             raise FullContact("the contact runs over the whole surface")
         touching = state.fraction > 0

@@ -13,7 +13,7 @@ from icha.boundary_elements.adhesive import Summits, settled
 from icha.boundary_elements.elasticity import Held
 from icha.boundary_elements.front import Front, areas, contact_area_gradient, contact_areas, neighbours
 from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.newton import front_residual, tangent
+from icha.boundary_elements.newton import FRONT_TOLERANCE, front_residual, tangent
 from icha.boundary_elements.patches import centres, labelled
 from icha.boundary_elements.states import CellState
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
@@ -28,6 +28,9 @@ _MAX_TRIALS = 60
 # A trial so near the target, relatively, is gone on from even if it lies beyond. Closer separations, in h_rms, are one.
 _CLOSE = 1e-3
 _SAME = 1e-13
+# Deviation of sqrt(G/dgamma) along a front that is good enough for a trial; and change of fractions that is small.
+_TRIAL = 1e-5
+_NEAR = 0.25
 # What a load of zero is held to over E*, at least (else over the load before); and an area without adhesion, in cells.
 _NO_LOAD = 1e-6
 _CELLS = 2.0
@@ -184,12 +187,26 @@ class BoundaryElements:
         pressure, gap = state.pressure / self.contact_modulus, state.gap / self.spacing
         return Held(state.fraction, pressure, gap, 0.0, around)
 
-    def _at(self, state, separation):
+    def _on_the_way(self, state, separation):
+        """The state, and if it is not far to a separation (m) what its rates make of it there."""
+        cells = self._cells(state)
+        if state.rates is None:
+            return cells
+        way = (separation - state.separation) / self.spacing
+        change = state.rates[0] * way
+        if np.abs(change).max() > _NEAR:
+            return cells
+        fraction = np.clip(state.fraction + change, 0.0, 1.0)
+        return Held(fraction, cells.pressure + state.rates[1] * way, cells.gap, 0.0, neighbours(fraction))
+
+    def _at(self, state, separation, tolerance=FRONT_TOLERANCE):
         """The equilibrium at a separation, m."""
         h = self.spacing
         heights, u = self.heights / h, separation / h
         if self.adhesive:
-            cells, pending = settled(self.space, self.front, heights, self.summits, u, self._cells(state))
+            cells, pending = settled(
+                self.space, self.front, heights, self.summits, u, self._on_the_way(state, separation), tolerance
+            )
             fraction, pressure, gap = cells.fraction, cells.pressure, cells.gap
             residual = front_residual(self.front, cells)
         else:
@@ -225,12 +242,13 @@ class BoundaryElements:
             enough = max(enough, _CELLS / self.heights.size)
         sign = np.sign(control.target - value(state)) or 1.0
         short, far = state, None
-        start = state
+        start, exact = state, False
         for _ in range(_MAX_TRIALS):
-            new = self._at(start, separation)
+            new = self._at(start, separation, FRONT_TOLERANCE if exact else _TRIAL)
             error = value(new) - control.target
-            if abs(error) <= enough:
+            if exact and abs(error) <= enough:
                 return new
+            exact = abs(error) < _CLOSE * scale
             if sign * error < 0:
                 short = new
             else:
@@ -262,7 +280,7 @@ class BoundaryElements:
         else:
             # Cells come and go as wholes; in the mean the area grows about in proportion to the load.
             wider = self.area_fraction(state) * stiffer / self.pressure(state)
-        return replace(state, pressure_slope=stiffer, area_slope=wider)
+        return replace(state, pressure_slope=stiffer, area_slope=wider, rates=(fraction, pressure))
 
     def _energy_of_cells(self, state):
         """Elastic energy less that of adhesion of every cell, J/m^2."""

@@ -65,7 +65,7 @@ def front_at_rest(
     heights: np.ndarray,
     separation: float,
     state: Held,
-    tolerance: float = FRONT_TOLERANCE,
+    tolerance: float,
 ) -> Held:
     """The contact in equilibrium at a separation (cells), down in energy from that of a state.
 
