@@ -35,6 +35,8 @@ _REACH = 5
 PERIMETER = 0.7
 # Weights of the perimeter and of the front's width in the area that is told, from spots between Hertz's and JKR's.
 _EDGE, _WIDE = 0.236, 1.115
+# Of its fraction, what a cell that hardly touches counts for at least.
+_LEAST = 0.02
 _profile = np.exp(-0.5 * (np.arange(-_REACH, _REACH + 1) / _WIDTH) ** 2)
 STENCIL = _profile / _profile.sum()
 
@@ -62,12 +64,13 @@ def contact_areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
     on how wide the front is, which cells partly in contact say. With both terms the radius of spots of 4 to 16 cells
     is right to some hundredths of a cell whether adhesion is strong or next to nothing (docs/short_range.md).
     """
-    return fraction * (1 - _EDGE * (1 - around) - _WIDE * (1 - fraction))
+    return fraction * np.maximum(1 - _EDGE * (1 - around) - _WIDE * (1 - fraction), _LEAST)
 
 
 def contact_area_gradient(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
     """Change of the whole area, as it is told, with the fraction of every cell."""
-    return 1 - _EDGE - _WIDE + 2 * _EDGE * around + 2 * _WIDE * fraction
+    whole = 1 - _EDGE - _WIDE + 2 * _EDGE * around + 2 * _WIDE * fraction
+    return np.where(1 - _EDGE * (1 - around) - _WIDE * (1 - fraction) > _LEAST, whole, _LEAST)
 
 
 @dataclass(frozen=True)

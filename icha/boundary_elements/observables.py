@@ -89,8 +89,9 @@ class PatchObservables:
         """Density of the pressure over the nominal area, and its mean in every bin; the pressure is the patches'."""
         edges_of_bins = PRESSURE_BINS * (self.contact.contact_modulus * self.surface.rms_slope)
         inside = state.touching
-        weight = cells[inside]
-        # The force of a cell on the part of it that touches.
+        # The force of a cell acts on the part of it that touches; what that is beside its area is the same everywhere.
+        weight = state.fraction[inside]
+        weight = weight * (np.sum(cells) / (np.sum(weight) or 1.0))
         pressure = state.pressure[inside] / weight
         if len(pressure) and np.abs(pressure).max() > edges_of_bins[-1]:
             raise ValueError(f"pressure: {np.abs(pressure).max():.3e} Pa exceeds the bins, {edges_of_bins[-1]:.3e} Pa")
