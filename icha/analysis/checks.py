@@ -28,7 +28,7 @@ TARGET_LIMIT = 1e-8
 # Fronts of boundary elements come to rest to some 1e-6; where they are within their cells is known less well, so that
 # the area may seem to fall by a little where they enter others.
 FRONT_LIMIT = 1e-5
-CELL_LIMIT = 1e-2
+CELL_LIMIT = 1e-3
 # The mean gap that carries a load is searched for to 2e-4 of the load.
 LOAD_LIMIT = 1e-3
 # Where spots unite, the same load or area may need the surfaces further apart by a little, in units of h_rms. Where

@@ -39,7 +39,8 @@ def pressed(
             raise FullContact("every cell touches")
         pressure, displaced = solve_bonds(space, touching, bonds, overlap, pressure, tolerance)
         gap = displaced - overlap
-        leaving, joining = touching & (pressure < 0), ~touching & (gap < -tolerance)
+        # Less pressure than makes up for the error of a gap is none.
+        leaving, joining = touching & (pressure < tolerance), ~touching & (gap < -tolerance)
         if not leaving.any() and not joining.any():
             return touching, pressure, gap
         touching = (touching & ~leaving) | joining
