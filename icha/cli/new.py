@@ -12,6 +12,11 @@ import typer
 from icha.cli.project import CAMPAIGNS, Mistake, project, shown
 
 TEMPLATES = Path(__file__).parent / "templates"
+# Whether boundary elements stand beside the model.
+_MODELS = {
+    False: "# models: [asperities, boundary_elements]",
+    True: "models: [asperities, boundary_elements]",
+}
 
 
 def new(
@@ -68,7 +73,7 @@ def new(
         slopes=slopes,
         vary="hurst: [0.6, 0.8]" if measured is None else "contact_modulus: [1 MPa, 2 MPa]",
         pull_off=_part("pull_off", surface=surface, slopes=slopes) if pull_off else "",
-        boundary_elements=_part("boundary_elements") if boundary_elements else "",
+        models=_MODELS[boundary_elements],
         figures="".join(
             f"  {figure}\n"
             for figure, wanted in (

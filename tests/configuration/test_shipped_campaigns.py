@@ -13,7 +13,9 @@ from icha.configuration.load import load_configuration
 from icha.configuration.settings import (
     run_settings,
 )
-from icha.figures.fig4_contact_map import finest_solution
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.planning.results import campaign_files
+from icha.planning.software import further_software
 from icha.references.literature import literature
 
 SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])
@@ -31,27 +33,33 @@ def test_the_papers_campaign():
     campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
     assert campaign.name == "paper"
     cases = run_cases(campaign)
-    assert len(cases) == 3 + 9
-    assert len({case.path for case in cases}) == 12
+    assert len([case for case in cases if case.model == ASPERITIES]) == 2 + 9
+    assert len({case.path for case in cases}) == len(cases)
     assert surface_cases(campaign) == [("challenge", 1), ("mcghee", 1)]
     challenge, mcghee = campaign.surfaces["challenge"], campaign.surfaces["mcghee"]
     assert mcghee.period == 1000 * challenge.period == 0.1
     assert challenge.cells_per_short_wave == pytest.approx(8)
-    ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][3:]
+    ratios = [m.surface_energy / m.contact_modulus for m in campaign.materials.values()][2:]
     assert ratios == pytest.approx([8.333e-9, 4.0e-9, 1.905e-9], rel=1e-3)
 
 
 def test_boundary_elements_stand_beside_the_papers_runs():
     campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
-    cases = solution_cases(campaign)
-    assert {case.run for case in cases} <= set(run_cases(campaign))
-    assert len({case.path for case in cases}) == len(cases)
-    energies = {campaign.materials[case.material].surface_energy for case in cases}
-    assert energies == {0.0, 0.05}  # with and without adhesion
-    for case in cases:
-        assert ("reduced_pressure", case.reduced_pressure) in run_settings(campaign, case.run)["path"]["snapshots"]
-    drawn = campaign.figures.fig4_contact_map
-    assert finest_solution(campaign, drawn).material == drawn.material
+    assert further_software(campaign) == ()
+    compared = list(campaign_files(campaign).compared.values())
+    # The paper's own material at its range, and none, at all loads: areas, distributions and maps.
+    materials = [campaign.materials[case.material] for case in compared]
+    assert {(each.surface_energy, each.interaction_range) for each in materials} == {(0.05, 2.071e-9), (0.0, 2.071e-9)}
+    for case in compared:
+        own, truth = (
+            run_settings(campaign, case._replace(model=model))["path"] for model in (ASPERITIES, BOUNDARY_ELEMENTS)
+        )
+        assert own == truth
+        assert own["snapshots"] == [("reduced_pressure", p) for p in own["reduced_pressures"]]
+    beside = [case for case in run_cases(campaign) if case.study == campaign.figures.fig5_multi_slope.boundary_elements]
+    assert {case.rms_slope for case in beside} == set(campaign.studies["multi_slope"].rms_slopes)
+    assert {case.material for case in beside} <= set(campaign.studies["multi_slope"].materials)
+    assert {case.model for case in beside} == {BOUNDARY_ELEMENTS}
 
 
 def test_the_validation_varies_what_makes_a_surface():

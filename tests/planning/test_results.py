@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from conftest import smoke_at_finite_ranges
 
 from icha.configuration.load import load_configuration
 from icha.datasets import results
@@ -14,8 +15,10 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def campaign():
-    return load_configuration(ROOT / "config/campaigns/smoke.yaml").campaign
+def campaign(tmp_path_factory):
+    file = tmp_path_factory.mktemp("campaign") / "smoke.yaml"
+    file.write_text(smoke_at_finite_ranges(), encoding="utf-8")
+    return load_configuration(file).campaign
 
 
 @pytest.mark.parametrize(
@@ -57,7 +60,7 @@ def test_logs_of_jobs_lie_apart_from_their_files(path, expected):
 
 def test_runs_of_both_models_at_given_loads_are_compared(tmp_path):
     content = yaml.safe_load((ROOT / "config/campaigns/smoke.yaml").read_text(encoding="utf-8"))
-    del content["boundary_elements"], content["figures"]
+    del content["figures"]
     for study in ("challenge", "multi_slope"):  # at given loads, and at given areas
         content["studies"][study]["models"] = ["asperities", "boundary_elements"]
     (tmp_path / "both.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
