@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from icha.contact.models import BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels
+from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, band_handle, draw_band
 from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.hysteresis import (
@@ -19,8 +21,8 @@ from icha.figures.hysteresis import (
     pull_off_step,
     unloaded_runs,
 )
-from icha.figures.options import StudyFigure, not_unloaded
-from icha.figures.select import branches, pick
+from icha.figures.options import TruthFigure, not_unloaded
+from icha.figures.select import branches, pick, runs_by_boundary_elements, ways_back
 from icha.figures.style import GREY, TWO_COLUMNS, legend_handle, new_figure, panel_label, slope_label, styled
 from icha.support.statistics import Ensemble
 from icha.support.values import Label, Problem, Seed
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class LoopsFigure(StudyFigure):
+class LoopsFigure(TruthFigure):
     """A figure of the runs of a study both ways, for one topography."""
 
     surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
@@ -43,7 +45,7 @@ class LoopsFigure(StudyFigure):
 
 
 def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, and boundary elements both ways beside them, if there are any."""
+    """The runs, and boundary elements both ways at a finite range beside them, if there are any."""
     loops = [
         files.path(results.LOOP, ContactLabels(label, *contact))
         for label, entry in campaign.boundary_element_loops.items()
@@ -64,9 +66,10 @@ DECLARATION = Declaration(
         "area is the area between the ways, of the pressure against the mean separation. Where several seeds are drawn "
         "the lines are means at common displacements from the turning point, with the 95 % band of confidence of the "
         "mean (Student's t), and the marks means over the seeds. Steps are jumps of single spots or of several. Dots "
-        "and rings, where given: boundary elements, an independent code, at some of their states, of the same "
-        "topography, half-space and range of attraction, dots on the way in and rings on the way back, with the area "
-        "corrected by the perimeter of the contact."
+        "and rings, where given: boundary elements at some of their states, of the same topography and half-space, "
+        "dots on the way in and rings on the way back: those in the limit of a short range of attraction or, where the "
+        "legend says so, an independent code at the finite range of the material, with the area corrected by the "
+        "perimeter of the contact."
     ),
     options=LoopsFigure,
     inputs=inputs,
@@ -132,6 +135,7 @@ def figure(
     loops: Sequence[xr.Dataset] | None = None,
     *,
     study: str,
+    boundary_elements: str | None = None,
     surface: str | None = None,
     seed: int | None = None,
 ) -> Figure:
@@ -140,9 +144,10 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    loops : boundary elements both ways of runs of the study, if there are any; those of other surfaces or seeds than
-        the one drawn are left out.
+    loops : boundary elements both ways of runs of the study at finite ranges, if there are any; those of other surfaces
+        or seeds than the one drawn are left out.
     study : name of the study; its runs are unloaded, at least in part.
+    boundary_elements : name of a study whose runs by boundary elements are drawn beside; left out, the study itself.
     surface : which surface; the study's first, if left out.
     seed : which seed; if left out the first that has boundary elements, or else the mean over all.
 
@@ -156,7 +161,8 @@ def figure(
 
     runs = unloaded_runs(campaign, study)
     surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
-    truths = _truths(study, runs, loops or ())
+    others = [run for _, run in runs_by_boundary_elements(campaign, boundary_elements or study) if ways_back(run)]
+    truths = _truths(study, runs, [*others, *(loops or ())])
     seeds = list(dict.fromkeys(labels.seed for labels, _ in runs if labels.surface == surface))
     if seed is None:
         seed = next((labels.seed for labels, _ in runs if labels.surface == surface and labels in truths), None)
@@ -282,9 +288,12 @@ def _handles(lines, rows, runs, truths):
         handles[band.get_label()] = band
     if any(pull_off_step(run) is not None for members in runs.values() for run in members):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
-    if any(labels in truths for labels in runs):
+    if shown := [truth for labels in runs for truth in truths.get(labels, [])]:
+        # A run says by which model it is, a solution at a finite range does not.
+        runs_alone = all(truth.attrs.get("contact_model") == BOUNDARY_ELEMENTS for truth in shown)
+        name = SHORT_RANGE if runs_alone else FINITE_RANGE
         for branch, face, size in (("loading", GREY, _DOT), ("unloading", "none", _RING)):
-            handles[f"boundary elements, {branch}"] = legend_handle(mec=GREY, mfc=face, ms=size, **_TRUTH)
+            handles[f"{name}, {branch}"] = legend_handle(mec=GREY, mfc=face, ms=size, **_TRUTH)
     return handles
 
 

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pydantic import Field
-
-from icha.contact.models import BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.measured_table import read_columns
 from icha.figures.curves import (
@@ -22,8 +19,8 @@ from icha.figures.curves import (
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.options import StudyFigure
-from icha.figures.select import NothingToDraw, name_of_place, path_steps, study_runs
+from icha.figures.options import TruthFigure
+from icha.figures.select import name_of_place, path_steps, runs_by_boundary_elements
 from icha.figures.style import (
     BLACK,
     COLOURS,
@@ -39,45 +36,19 @@ from icha.figures.style import (
     slope_label,
     styled,
 )
-from icha.support.values import Name, Problem, unknown
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 
-class MultiSlopeFigure(StudyFigure):
-    """A figure of all runs of a study, and of others beside them."""
-
-    boundary_elements: Name | None = Field(
-        default=None,
-        description="Name of a study whose runs by boundary elements are drawn beside. Left out: the study itself, if "
-        "it has some.",
-    )
-
-    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """The study, and the one beside it."""
-        return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """A study beside it that is not there, or has no runs by boundary elements."""
-        yield from super().problems(campaign)
-        beside = self.boundary_elements
-        if beside is None:
-            return
-        yield from unknown(("boundary_elements",), beside, campaign.studies)
-        if beside in campaign.studies and BOUNDARY_ELEMENTS not in campaign.studies[beside].models:
-            reason = f"has no runs by boundary elements; allowed: a study with {BOUNDARY_ELEMENTS!r} among its `models`"
-            yield ("boundary_elements",), beside, reason
-
-
-def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
+def inputs(campaign: Campaign, options: TruthFigure, files: results.ResultFiles) -> Inputs:
     """The runs, and tables of measurements that belong to the study, if there are any."""
     tables = [measurement.path for measurement in _measurements(campaign, options)]
     return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
 
 
-def arguments(campaign: Campaign, options: StudyFigure) -> dict[str, Any]:
+def arguments(campaign: Campaign, options: TruthFigure) -> dict[str, Any]:
     """What is to be known of each table."""
     known = [
         {
@@ -116,7 +87,7 @@ DECLARATION = Declaration(
         "material. Thin dashed lines, where there are any: the way back, unloading, while the load is compressive. "
         "Measurements, where given, are drawn as lines."
     ),
-    options=MultiSlopeFigure,
+    options=TruthFigure,
     inputs=inputs,
     arguments=arguments,
 )
@@ -203,10 +174,7 @@ class _Looks(NamedTuple):
 
 def _draw_boundary_elements(panels, campaign, study, colour):
     """Mark the runs of a study by boundary elements, means over their seeds; returns their entries of the legend."""
-    try:
-        runs = study_runs(campaign, study, ragged=False, model=BOUNDARY_ELEMENTS)
-    except NothingToDraw:
-        return []
+    runs = runs_by_boundary_elements(campaign, study)
     lines: dict[tuple, list] = {}
     for labels, run in runs:
         lines.setdefault((labels.surface, labels.rms_slope, labels.material), []).append((labels, run))
@@ -216,7 +184,7 @@ def _draw_boundary_elements(panels, campaign, study, colour):
         line = Line(first, [path_steps(run) for run in own], [], look)
         for ax, points in zip(panels, (_points, _points_at_load), strict=True):
             draw_line(ax, line, points, logarithmic=True, lines=len(lines))
-    return [legend_handle(**_CROSS, mec=GREY, label="boundary elements")]
+    return runs and [legend_handle(**_CROSS, mec=GREY, label="boundary elements")]
 
 
 _CROSS = {"ls": "none", "marker": "+", "ms": 8, "mew": 1.0, "zorder": 6}

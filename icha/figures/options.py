@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from icha.contact.models import first_of
+from icha.contact.models import BOUNDARY_ELEMENTS, first_of
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.declaration import Campaign, FigureOptions, Inputs
@@ -41,6 +41,31 @@ class StudyFigure(FigureOptions):
             value = getattr(self, key, None)
             if value is not None and value not in there:
                 yield (key,), value, f"is not in study {self.study!r}; allowed: {', '.join(map(str, there))}"
+
+
+class TruthFigure(StudyFigure):
+    """A figure of all runs of a study, and of those by boundary elements beside them."""
+
+    boundary_elements: Name | None = Field(
+        default=None,
+        description="Name of a study whose runs by boundary elements are drawn beside. Left out: the study itself, if "
+        "it has some.",
+    )
+
+    def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
+        """The study, and the one beside it."""
+        return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
+
+    def problems(self, campaign: Campaign) -> Iterator[Problem]:
+        """A study beside it that is not there, or has no runs by boundary elements."""
+        yield from super().problems(campaign)
+        beside = self.boundary_elements
+        if beside is None:
+            return
+        yield from unknown(("boundary_elements",), beside, campaign.studies)
+        if beside in campaign.studies and BOUNDARY_ELEMENTS not in campaign.studies[beside].models:
+            reason = f"has no runs by boundary elements; allowed: a study with {BOUNDARY_ELEMENTS!r} among its `models`"
+            yield ("boundary_elements",), beside, reason
 
 
 class SnapshotFigure(StudyFigure):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import first_of
+from icha.contact.models import BOUNDARY_ELEMENTS, first_of
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.style import number, slope_label
@@ -55,6 +55,20 @@ def study_runs(
     found = (RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True))) for index in complete.tolist())
     runs = [(labels, select_run(campaign, labels)) for labels in found]
     return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
+
+
+def runs_by_boundary_elements(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
+    """All complete runs of a study by boundary elements, without spots and events; none if there are none.
+
+    Raises
+    ------
+    ValueError
+        If the campaign has no such study.
+    """
+    try:
+        return study_runs(campaign, study, ragged=False, model=BOUNDARY_ELEMENTS)
+    except NothingToDraw:
+        return []
 
 
 def shown_model(study: xr.Dataset) -> str:

@@ -10,6 +10,7 @@ from matplotlib.colors import to_hex
 
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import read_dataset
+from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.fig15_loss import PARTS, linear_fit, shares
@@ -187,7 +188,8 @@ def test_fig13_lays_boundary_elements_over_the_run_they_belong_to(tree):
             np.testing.assert_array_equal(line.get_ydata(), part[y].values)
             assert line.get_markeredgecolor() == colour
         assert [line.get_markerfacecolor() for line in own] == [colour, "none"]
-    assert {"boundary elements, loading", "boundary elements, unloading"} <= set(legend(figure))
+    name = "boundary elements at finite range"
+    assert {f"{name}, loading", f"{name}, unloading"} <= set(legend(figure))
     assert not any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard", seed=1)))
     # Without a seed asked for it is one with boundary elements, and without any the mean over the seeds.
     assert any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard")))
@@ -195,6 +197,20 @@ def test_fig13_lays_boundary_elements_over_the_run_they_belong_to(tree):
     stranger = shown.assign(surface_energy=0.06)
     with pytest.raises(ValueError, match=r"study hard: no run is of the same contact .* surface_energy 0\.06"):
         fig13_loops.figure(tree, [stranger], study="hard")
+
+
+def test_fig13_lays_runs_by_boundary_elements_over_those_of_the_same_contact():
+    sticky = RunLabels("hard", "asperities", "rough", 1, 0.5, "sticky")
+    run = separate.run("sticky", 0.5, seed=1, depth=0.5)
+    truth = run.assign_attrs(contact_model="boundary_elements").assign(reduced_pressure=1.1 * run["reduced_pressure"])
+    for study, options in (("hard", {}), ("truth", {"boundary_elements": "truth"})):
+        beside = sticky._replace(study=study, model="boundary_elements")
+        figure = fig13_loops.figure(campaign_tree([(sticky, run), (beside, truth)]), study="hard", **options)
+        own = [line for line in marks(figure.axes[0]) if line.get_markersize() < 4]
+        for line, branch in zip(own, ("loading", "unloading"), strict=True):
+            part = truth.isel(step=truth["branch"].values == branch)
+            np.testing.assert_array_equal(line.get_ydata(), part["reduced_pressure"].values)
+        assert {"boundary elements, loading", "boundary elements, unloading"} <= set(legend(figure))
 
 
 # --- figure 14 --------------------------------------------------------------------------------------------------

@@ -97,10 +97,11 @@ def test_boundary_elements_say_whether_the_grid_resolves_the_attraction_before_t
 def test_the_dataset_tells_where_it_comes_from(smoke):
     campaign = load_configuration(smoke / "results/smoke/config.used.yaml").campaign
     with xr.open_datatree(smoke / "results/smoke/dataset/smoke.nc") as tree:
-        assert set(tree.children) == {"challenge", "multi_slope", "pull", "pull_far", "both"}
-        assert tree["challenge"]["model"].values.tolist() == ["asperities"]
-        assert tree["both"]["model"].values.tolist() == ["asperities", "boundary_elements"]
-        assert tree["both"]["status"].values.ravel().tolist() == [0, 0]
+        assert set(tree.children) == {"challenge", "multi_slope", "multi_slope_truth", "pull", "pull_far"}
+        assert tree["multi_slope"]["model"].values.tolist() == ["asperities"]
+        assert tree["multi_slope_truth"]["model"].values.tolist() == ["boundary_elements"]
+        assert tree["challenge"]["model"].values.tolist() == ["asperities", "boundary_elements"]
+        assert not tree["challenge"]["status"].values.any()
         assert tree.attrs["config_sha256"] == campaign_sha256(campaign)
         assert tree.attrs["license"] == "CC-BY-4.0"
         assert tree["multi_slope"]["rms_slope"].values.tolist() == [0.2, 0.5, 1.0]
