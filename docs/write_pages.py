@@ -46,8 +46,16 @@ def validation_pages(campaign, results):
         name: read_dataset(results / f"references/one_asperity/{name}.nc") for name in asperity_cases(campaign)
     }
     errors = read_campaign(results / "aggregated/model_error.nc")
+    ways = loop_cases(campaign)
     return {
         "validation": {
+            "campaign": read_campaign(results / f"dataset/{campaign.name}.nc"),
+            "loops": {
+                entry.study: [
+                    read_dataset(results / f"references/loops/{case.path}.nc") for case in ways if case.entry == name
+                ]
+                for name, entry in campaign.boundary_element_loops.items()
+            },
             "model_error": {name: entry.to_dataset() for name, entry in errors.children.items()},
             "hertz": asperities.pop("hertz"),
             "adhesive": list(asperities.values()),
@@ -58,7 +66,6 @@ def validation_pages(campaign, results):
 
 def hysteresis_pages(campaign, results):
     """Pull-off and what is lost on the way back."""
-    cases = loop_cases(campaign)
     tree = read_campaign(results / f"dataset/{campaign.name}.nc")
     studies = {name: study.to_dataset() for name, study in tree.children.items()}
     return {
@@ -66,12 +73,6 @@ def hysteresis_pages(campaign, results):
             "campaign": tree,
             "studies": studies,
             "load_studies": [studies[name] for name in campaign.figures.fig14_pull_off.load_studies],
-            "loops": {
-                entry.study: [
-                    read_dataset(results / f"references/loops/{case.path}.nc") for case in cases if case.entry == name
-                ]
-                for name, entry in campaign.boundary_element_loops.items()
-            },
         }
     }
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
-from icha.analysis.model_error import run_of_same_contact
-from icha.contact.models import ASPERITIES
-from icha.datasets.campaign import run_labels, select_run
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from pages.tables import Table, means
 
 
@@ -165,30 +164,56 @@ def controls(separation: xr.Dataset, load: xr.Dataset) -> Table:
     return Table(head, rows)
 
 
-def elements(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) -> Table:
-    """Boundary elements both ways, and the study's run of the same contact."""
-    head = ["", "A/A₀ at the largest load", "pull-off, Pa", "at ū/h_rms", "loss, µJ/m²", "loss/Δγ"]
+def cases(truth: xr.Dataset) -> str:
+    """Surfaces, seeds and slopes of a study in words."""
+    surfaces = ", ".join(f"`{name}`" for name in truth["surface"].values)
+    seeds, slopes = (", ".join(f"{value:g}" for value in truth[label].values) for label in ("seed", "rms_slope"))
+    return f"surface {surfaces}, seed {seeds}, slope {slopes}"
+
+
+_RULES = ("overlap", "detachment")
+
+
+def truth(overlap: xr.Dataset, detachment: xr.Dataset, truth: xr.Dataset) -> Table:
+    """Pull-off and loss by boundary elements, and by asperities with either rule, for the runs that all three have."""
+    head = ["Δγ, mJ/m²", "", "boundary elements", *(f"{rule}" for rule in _RULES), *(f"{rule}, %" for rule in _RULES)]
     rows = []
-    shown = [labels for labels in run_labels(campaign) if (labels.study, labels.model) == (study, ASPERITIES)]
-    runs = {labels: select_run(campaign, labels) for labels in shown}
-    for solved in loops:
-        run = runs[run_of_same_contact(runs.items(), solved)]
-        gamma = float(solved["surface_energy"])
-        for name, one in (("boundary elements", solved), ("ICHA", run)):
-            loss = float(one["hysteresis_loss"])
-            rows.append(
-                [
-                    f"{name}, Δγ = {1e3 * gamma:g} mJ/m²",
-                    f"{float(one['largest_contact_area_fraction']):.3g}",
-                    f"{float(one['pull_off_pressure']):.3g}",
-                    f"{float(one['pull_off_separation']) / float(one['rms_height']):.2f}",
-                    f"{1e6 * loss:.3g}",
-                    f"{loss / gamma:.4f}" if gamma else "–",
-                ]
-            )
+    for energy, true, others in _beside_truth(overlap, detachment, truth):
+        first = f"{1e3 * energy:g}"
+        for name, what, scale in _COMPARED:
+            value, *by_rule = (scale * float(one[name]) for one in (true, *others))
+            errors = [f"{100 * (each / value - 1):+.0f}" for each in by_rule]
+            rows.append([first, what, f"{value:.3g}", *(f"{each:.3g}" for each in by_rule), *errors])
+            first = ""
     return Table(head, rows)
 
 
-def tabor_parameters(loops: Sequence[xr.Dataset]) -> str:
-    """Tabor parameters of boundary elements both ways."""
-    return ", ".join(f"μ = {float(one['tabor_parameter']):.2g}" for one in loops)
+_COMPARED = (
+    ("largest_contact_area_fraction", "A/A₀ at the largest load", 1.0),
+    ("pull_off_pressure", "pull-off, Pa", 1.0),
+    ("hysteresis_loss", "loss, µJ/m²", 1e6),
+)
+
+
+def nearer_rule(overlap: xr.Dataset, detachment: xr.Dataset, truth: xr.Dataset) -> str:
+    """Which rule is nearer to boundary elements in pull-off and in loss, and in how many of the cases."""
+    cases = list(_beside_truth(overlap, detachment, truth))
+    words = []
+    for name, what in (("pull_off_pressure", "pull-off"), ("hysteresis_loss", "loss")):
+        away = [[abs(float(one[name]) - float(true[name])) for one in others] for _, true, others in cases]
+        nearer = [_RULES[int(np.argmin(each))] for each in away]
+        for rule in _RULES:
+            if count := nearer.count(rule):
+                words.append(f"in {what} `{rule}` is nearer in {count} of {len(cases)}")
+    return "; ".join(words)
+
+
+def _beside_truth(overlap, detachment, truth):
+    """Surface energy, J/m^2, run by boundary elements and runs by asperities under either rule, case by case."""
+    one = truth.sel(model=BOUNDARY_ELEMENTS)
+    for surface, seed, slope, material in itertools.product(
+        *(truth[label].values.tolist() for label in ("surface", "seed", "rms_slope", "material"))
+    ):
+        at = {"surface": surface, "seed": seed, "rms_slope": slope, "material": material}
+        others = [study.sel(model=ASPERITIES, **at) for study in (overlap, detachment)]
+        yield float(truth["surface_energy"].sel(material=material)), one.sel(at), others

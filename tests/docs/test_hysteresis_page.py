@@ -17,10 +17,25 @@ def described(runs):
     return [(labels, run.assign(stickiness=((), 0.5, attrs))) for labels, run in runs]
 
 
+def by_boundary_elements(runs, pull_off, loss):
+    """Runs of seed 1 with adhesion as if by boundary elements, with other pull-off and loss by given factors."""
+    return [
+        (
+            labels._replace(study="truth", model="boundary_elements"),
+            run.assign(
+                pull_off_pressure=pull_off * run.pull_off_pressure, hysteresis_loss=loss * run.hysteresis_loss
+            ).assign_attrs(contact_model="boundary_elements"),
+        )
+        for labels, run in runs
+        if labels.seed == 1 and labels.material == "sticky"
+    ]
+
+
 @pytest.fixture(scope="module")
 def campaign():
     studies = [described(separate.study(name, depth=depth, slopes=(1.0,))) for name, depth in DEPTHS.items()]
-    tree = separate.tree(*studies, described(separate.study("other", depth=0.0, slopes=(1.0,))))
+    truth = by_boundary_elements(described(separate.study("slopes", depth=0.0, slopes=(1.0,))), 1.25, 0.8)
+    tree = separate.tree(*studies, described(separate.study("other", depth=0.0, slopes=(1.0,))), truth)
     tree.attrs["campaign"] = "test"
     return tree
 
@@ -67,10 +82,26 @@ def test_dependence_on_the_largest_load_is_fitted(campaign):
     assert pull[-1] == f"varies by {100 * (z.max() / z.min() - 1):.0f} %"
 
 
+def test_rules_are_beside_the_truth_and_the_nearer_one_is_named(campaign):
+    overlap, truth = (campaign[name].to_dataset() for name in ("slopes", "truth"))
+    # Pull-off is 1.25 of that under one rule and just that under the other; the loss 0.8, or 0.8/0.4 of the other's.
+    detachment = overlap.assign(
+        pull_off_pressure=1.25 * overlap["pull_off_pressure"], hysteresis_loss=0.4 * overlap["hysteresis_loss"]
+    )
+    head, (area, pull, loss) = hysteresis.truth(overlap, detachment, truth)
+    own = float(separate.run("sticky", 1.0, 1, 0.0)["pull_off_pressure"])
+    assert area[0] == "50" and pull[head.index("boundary elements")] == f"{1.25 * own:.3g}"
+    assert area[-2:] == ["+0", "+0"] and pull[-2:] == ["-20", "+0"] and loss[-2:] == ["+25", "-50"]
+    assert hysteresis.nearer_rule(overlap, detachment, truth) == (
+        "in pull-off `detachment` is nearer in 1 of 1; in loss `overlap` is nearer in 1 of 1"
+    )
+
+
 def test_the_page_can_be_written(campaign):
     studies = {name: study.to_dataset() for name, study in campaign.children.items()}
     studies |= {"detachment": studies["other"], "load_control": studies["other"]}
     loads = [studies[name] for name in DEPTHS]
-    text = render("hysteresis", campaign=campaign, studies=studies, load_studies=loads, loops={}, command="make it")
+    text = render("hysteresis", campaign=campaign, studies=studies, load_studies=loads, command="make it")
+    assert "Of the two rules in pull-off `overlap` is nearer in 1 of 1" in text
     assert text.startswith("# Pull-off") and "`make it`" in text and "](images/fig13_loops.png)" in text
     assert "nan" not in text.lower() and "{" not in text

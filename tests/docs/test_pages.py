@@ -76,6 +76,27 @@ def test_a_summary_has_the_median_and_the_range_of_the_means():
     assert float(adhesive["area"].split()[0]) == pytest.approx(np.mean(each), abs=0.05)
 
 
+def test_what_is_known_stands_below_what_bounded_it():
+    errors = compared.short_range_errors()
+    _, rows = validation.known_now(
+        validation.of_energy(errors["one"].to_dataset(), True), errors["adhesive"].to_dataset()
+    )
+    each = np.array([100 * (1 / factor - 1) for factor in compared.AREA_FACTORS.values()])
+    energetic = (each + 100) / 1.2 - 100
+    known = 100 * (1 / 1.5 - 1)
+    for row, values in zip(rows, (each, energetic, np.full(3, known)), strict=True):
+        assert row[2:] == [f"{np.mean(values):+.1f} ± {np.std(values, ddof=1):.1f}"] * 2
+
+
+def test_both_kinds_of_boundary_elements_are_compared_without_adhesion():
+    errors = compared.short_range_errors()
+    bare = validation.of_energy(errors["one"].to_dataset(), False)
+    assert bare["material"].values.tolist() == ["hertz"]
+    _, (areas, gaps) = validation.both_truths(bare, errors["bare"].to_dataset())
+    # 1.5 over 1.25 of the runs' area, 0.9 over 0.8 of their gap.
+    assert areas[2:] == ["+20.00 ± 0.00"] * 2 and gaps[2:] == ["+12.50 ± 0.00"] * 2
+
+
 # Sources of the error.
 
 PRESSURES = [2e-3, 1e-2]
@@ -162,9 +183,11 @@ def test_pages_can_be_written_of_their_datasets(sources, long_ranges, hertzian):
 
     grids = [*truth("adhesionless", "hertz"), *truth("coarse", "hertz", (2,)), *truth("fine", "hertz", (2,))]
     ranges = [*truth("adhesive", "soft"), *truth("ranges", "soft"), *truth("shortest_range", "soft", (1,))]
-    errors = datasets(model_error(compared.tree(), [*grids, *ranges]))
+    errors = datasets(model_error(compared.tree(), [*grids, *ranges], runs=compared.patches()))
+    errors["short_range"] = errors.pop("one")
+    ways = {"campaign": compared.tree(), "loops": {}}
     pages = {
-        "validation": {"model_error": errors, "hertz": hertzian, "adhesive": long_ranges},
+        "validation": {"model_error": errors, "hertz": hertzian, "adhesive": long_ranges, **ways},
         "error_sources": {"adhesionless": [sources], "adhesive": [sources.assign(surface_energy=1.0)]},
     }
     for page, given in pages.items():

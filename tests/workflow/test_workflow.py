@@ -297,7 +297,7 @@ def test_a_surface_that_is_too_coarse_is_a_warning(smoke, tmp_path):
     (tmp_path / "coarse.yaml").write_text((REPOSITORY / SMOKE).read_text().replace("grid: 64", "grid: 32"))
     plan = snakemake(smoke, "-n", "-d", str(tmp_path), configuration=tmp_path / "coarse.yaml")
     assert plan.returncode == 0
-    assert "Warning: surfaces.challenge.grid: 32 gives 3.2 grid cells" in plan.stdout
+    assert "Warning: surfaces.challenge.grid: 32 gives boundary elements 4 cells per shortest wavelength" in plan.stdout
 
 
 def test_a_failing_job_says_why(project):
