@@ -188,6 +188,8 @@ def truth(overlap: xr.Dataset, detachment: xr.Dataset, truth: xr.Dataset) -> Tab
     return Table(head, rows)
 
 
+# Rules whose distances differ by less than this part are as near.
+_TIE = 1e-3
 _COMPARED = (
     ("largest_contact_area_fraction", "A/A₀ at the largest load", 1.0),
     ("pull_off_pressure", "pull-off, Pa", 1.0),
@@ -201,10 +203,12 @@ def nearer_rule(overlap: xr.Dataset, detachment: xr.Dataset, truth: xr.Dataset) 
     words = []
     for name, what in (("pull_off_pressure", "pull-off"), ("hysteresis_loss", "loss")):
         away = [[abs(float(one[name]) - float(true[name])) for one in others] for _, true, others in cases]
-        nearer = [_RULES[int(np.argmin(each))] for each in away]
+        nearer = ["both" if np.isclose(*each, rtol=_TIE) else _RULES[int(np.argmin(each))] for each in away]
         for rule in _RULES:
             if count := nearer.count(rule):
                 words.append(f"in {what} `{rule}` is nearer in {count} of {len(cases)}")
+        if count := nearer.count("both"):
+            words.append(f"in {what} both are as near in {count} of {len(cases)}")
     return "; ".join(words)
 
 

@@ -95,6 +95,9 @@ def test_rules_are_beside_the_truth_and_the_nearer_one_is_named(campaign):
     assert hysteresis.nearer_rule(overlap, detachment, truth) == (
         "in pull-off `detachment` is nearer in 1 of 1; in loss `overlap` is nearer in 1 of 1"
     )
+    assert hysteresis.nearer_rule(overlap, overlap, truth) == (
+        "in pull-off both are as near in 1 of 1; in loss both are as near in 1 of 1"
+    )
 
 
 def test_the_page_can_be_written(campaign):
@@ -102,6 +105,6 @@ def test_the_page_can_be_written(campaign):
     studies |= {"detachment": studies["other"], "load_control": studies["other"]}
     loads = [studies[name] for name in DEPTHS]
     text = render("hysteresis", campaign=campaign, studies=studies, load_studies=loads, command="make it")
-    assert "Of the two rules in pull-off `overlap` is nearer in 1 of 1" in text
+    assert "Of the two rules in pull-off both are as near in 1 of 1" in text
     assert text.startswith("# Pull-off") and "`make it`" in text and "](images/fig13_loops.png)" in text
     assert "nan" not in text.lower() and "{" not in text
