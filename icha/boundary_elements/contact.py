@@ -248,8 +248,11 @@ class BoundaryElements:
             error = value(new) - control.target
             if exact and abs(error) <= enough:
                 return new
-            exact = abs(error) < _CLOSE * scale
-            if sign * error < 0:
+            was_exact, exact = exact, abs(error) < _CLOSE * scale
+            if exact and not was_exact:
+                # As near as this the trials so far, which were not exact, bound nothing.
+                short, far = state, None
+            elif sign * error < 0:
                 short = new
             else:
                 far = new
