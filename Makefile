@@ -14,7 +14,7 @@ export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all lint format schema docs linkcheck benchmarks benchmarks-page faults validators-environment validate clean
+.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all lint format schema docs linkcheck benchmarks benchmarks-page short-range faults validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -31,6 +31,7 @@ help:
 	@echo "make linkcheck  check the documentation's links to other sites"
 	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
+	@echo "make short-range  hold boundary elements in the limit of short range against what is known (an hour); docs/short_range.md"
 	@echo "make faults  kill, damage and starve a small campaign (most of an hour, as root); docs/faults.md"
 	@echo "make slurm-environment  install Snakemake with its executor for Slurm in .venv-slurm; docs/howto/cluster.md"
 	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  put a deposit to the validators of others, without network"
@@ -116,6 +117,10 @@ benchmarks: tamaas .venv-benchmarks/.installed
 
 benchmarks-page: environment
 	python benchmarks/page.py
+
+short-range: tamaas
+	python benchmarks/short_range.py $(OPTIONS)
+	python docs/write_pages.py short_range
 
 faults: tamaas
 	python benchmarks/faults.py $(OPTIONS)

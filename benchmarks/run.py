@@ -28,6 +28,8 @@ SWEEPS = (
     ("icha", 1, False, "load"),
     ("icha", 1, True, "load"),
     ("icha", 1, True, "gap"),
+    ("icha-boundary-elements", 1, False, "load"),
+    ("icha-boundary-elements", 1, True, "load"),
     ("aspher", 1, False, "load"),
     ("aspher", 2, False, "load"),
     ("tamaas", 1, False, "load"),
@@ -44,7 +46,7 @@ PATCHES = (1, 2, 3, 5, 8, 15)
 
 
 def interpreter(code: str) -> str:
-    return sys.executable if code == "icha" else str(OTHERS)
+    return sys.executable if code.startswith("icha") else str(OTHERS)
 
 
 def script(name: str) -> str:
@@ -65,7 +67,8 @@ def run(name: str, command: list[str], answer: Path, threads: int, limit: float,
     print(f"{name} ...", end=" ", flush=True)
     measured = measure([*command, str(answer), str(threads)], threads, limit)
     found = json.loads(answer.read_text()) if answer.exists() else {}
-    record = about | {"threads": threads, "limit": limit} | asdict(measured) | found
+    about = about | {"threads": threads, "limit": limit, "machine": machine()["processor"]}
+    record = about | asdict(measured) | found
     keep(name, record)
     spent = f"{measured.wall:.1f} s ({measured.processor:.1f} s of processor), {measured.peak / 2**20:.0f} MiB"
     print(f"{measured.outcome}, {spent}", measured.last_words, flush=True)
@@ -91,7 +94,7 @@ def sweep(scratch: Path, grid: int, codes: set[str], most_threads: int, limit: f
         (folder / "task.json").write_text(json.dumps(settings))
         name = f"sweep-{code}-{'adhesion' if adhesion else 'hard'}-{control}-{grid}-{threads}"
         about = {"code": code, "grid": grid, "adhesion": adhesion, "control": control}
-        command = [interpreter(code), script(f"solve_{code}"), str(folder)]
+        command = [interpreter(code), script(f"solve_{code.replace('-', '_')}"), str(folder)]
         record = run(name, command, folder / f"{name}.json", threads, limit, about)
         if (code, adhesion, control) == ("icha", True, "load") and (gaps is None or codes == set(CODES)):
             # Rounded, and kept, so that one code can be measured again at the same stops.

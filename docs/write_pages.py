@@ -1,15 +1,17 @@
-"""Write the pages of the documentation that are made of the results of the campaigns `validation` or `hysteresis`.
+"""Write the pages of the documentation whose numbers are results.
 
+They are those of the campaigns `validation` or `hysteresis`, or what benchmarks/short_range.py kept (`short_range`).
 Their words are in docs/templates, the numbers in them computed by the functions of docs/pages.
 """
 
 import argparse
+import json
 import re
 import shutil
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from pages import error_sources, hysteresis, one_asperity, validation
+from pages import error_sources, hysteresis, one_asperity, short_range, validation
 
 from icha.configuration.cases import asperity_cases, loop_cases, source_cases
 from icha.configuration.load import load_configuration
@@ -24,7 +26,7 @@ TEMPLATES = Environment(
     lstrip_blocks=True,
     autoescape=False,  # Markdown, of our own results
 )
-for functions in (error_sources, hysteresis, one_asperity, validation):
+for functions in (error_sources, hysteresis, one_asperity, short_range, validation):
     TEMPLATES.globals[functions.__name__.rpartition(".")[2]] = functions
 
 
@@ -92,7 +94,18 @@ def write_pages(name):
             temporary.write_text(text, encoding="utf-8")
 
 
+def write_short_range(results=DOCS.parent / "benchmarks/results/short_range", page=DOCS / "short_range.md"):
+    """Write the page of the proof of the boundary elements from what was measured."""
+    parts = {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in sorted(results.glob("*.json"))}
+    with whole_file(page) as temporary:
+        temporary.write_text(render("short_range", measured=parts), encoding="utf-8")
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("campaign", choices=PAGES)
-    write_pages(parser.parse_args().campaign)
+    parser.add_argument("results", choices=[*PAGES, "short_range"])
+    chosen = parser.parse_args().results
+    if chosen == "short_range":
+        write_short_range()
+    else:
+        write_pages(chosen)

@@ -158,3 +158,17 @@ def test_a_campaign_spends_its_time_in_the_solver_or_not(page):
     (planned,) = [row for row in rows if row[0].startswith("plan of a campaign")]
     assert share[1:] == ["40% at 128²", "reached"]
     assert planned[1] == "61 s, 0.5 GiB" and planned[2] != "reached"
+
+
+def test_own_boundary_elements_are_no_other_code_and_have_targets_of_their_own(page, results):
+    results["sweep-icha-boundary-elements-adhesion-load-1024-1"] = sweep(
+        "icha-boundary-elements", adhesion=True, processor=3.0
+    )
+    assert page.fastest(results, 1024, True)[1] != "icha-boundary-elements"
+    assert page.rival(results, results["sweep-icha-boundary-elements-adhesion-load-1024-1"])["code"] == "icha"
+    targets = {verdict.target: verdict for verdict in page.verdicts(results)}
+    own = "20 loads at 1024² by ICHA's boundary elements, with adhesion: at most 300 s on one core"
+    assert targets[own].reached and targets[own].measured == "3.00 s"
+    slow = sweep("icha-boundary-elements", adhesion=True, processor=301.0)
+    results["sweep-icha-boundary-elements-adhesion-load-1024-1"] = slow
+    assert {verdict.target: verdict for verdict in page.verdicts(results)}[own].reached is False

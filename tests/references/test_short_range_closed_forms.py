@@ -9,6 +9,7 @@ from icha.asperity.jkr import JKR
 from icha.half_space.interaction import displacement_at
 from icha.references.short_range.closed_forms import (
     IMAGES_CUBED,
+    CrackInTrough,
     PennyCrack,
     RoundPunch,
     Sinusoid,
@@ -175,6 +176,42 @@ def test_opening_of_the_crack_has_its_volume_and_its_stress_intensity():
     s = 1e-9
     intensity = crack.opening(c - s, p, c) * SOFT.contact_modulus / 2 * np.sqrt(2 * np.pi / s) / 2
     assert intensity**2 / (2 * SOFT.contact_modulus) == pytest.approx(crack.energy_release_rate(p, c), rel=1e-6)
+
+
+def test_crack_in_a_trough_by_quadrature():
+    crack, c = CrackInTrough(SOFT, 0.03, 5.0), 0.4
+    q, p = 2 * np.pi / 5.0, crack.pressure(0.4)
+
+    def tension(r):  # azimuthal mean of minus the pressure in full contact
+        around = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+        return crack.tearing * np.mean(np.cos(q * r * np.cos(around)) + np.cos(q * r * np.sin(around))) / 2 - p
+
+    assert crack.tearing == pytest.approx(SOFT.contact_modulus * q / 2 * 0.03)
+    # r = c sin t
+    root = quad(lambda t: tension(c * np.sin(t)) * c * np.sin(t), 0, np.pi / 2)[0]
+    assert 2 / np.sqrt(np.pi * c) * root == pytest.approx(intensity_at_equilibrium(SOFT))
+    volume = 8 / SOFT.contact_modulus * quad(lambda r: tension(r) * r * np.sqrt(c**2 - r**2), 0, c)[0]
+    assert volume / 25 == pytest.approx(crack.separation(c))
+    assert crack.radius(crack.separation(c)) == pytest.approx(c)
+
+
+def test_crack_in_a_shallow_trough_is_that_of_a_flat():
+    flat, c = CrackInTrough(SOFT, 1e-12, 5.0), 0.4
+    alone = PennyCrack(SOFT)
+    assert flat.pressure(c) == pytest.approx(-alone.tension(c))
+    assert flat.separation(c) * 25 == pytest.approx(alone.volume(alone.tension(c), c))
+
+
+def test_volume_and_stress_intensity_of_the_cracked_trough_belong_together():
+    """At given tensions the energy grows with the crack by 2 pi c G; of both the derivative by the mean tension."""
+    crack, c = CrackInTrough(SOFT, 0.03, 5.0), 0.4
+    p, E = crack.pressure(c), SOFT.contact_modulus
+
+    def volume(radius):
+        return 8 / E * (crack.tearing * crack._moments(radius)[1] - p * radius**3 / 3)
+
+    by_mean_tension = intensity_at_equilibrium(SOFT) / E * 2 * np.sqrt(c / np.pi)
+    assert slope(volume, c) == pytest.approx(2 * np.pi * c * by_mean_tension, rel=1e-6)
 
 
 # --- the sphere in its cell --------------------------------------------------------------------------------------

@@ -204,6 +204,55 @@ class PennyCrack:
 
 
 @dataclass(frozen=True)
+class CrackInTrough:
+    """The round gap in the trough of h = amplitude (cos qx + cos qy)/2, q = 2 pi/L, left before contact is full.
+
+    In full contact the pressure is p + p0 (cos qx + cos qy)/2 with p0 = E* q amplitude/2, which tears at the trough;
+    its mean around it is p - p0 J0(qr). A crack under such a tension t(r) has K = 2/sqrt(pi c) int t r/sqrt(c^2 - r^2)
+    dr (I. N. Sneddon, Proc. R. Soc. Lond. A 187 (1946) 229) and, by reciprocity with an even tension, the volume
+    8/E* int t r sqrt(c^2 - r^2) dr. Cracks of neighbouring cells, and what tension has no symmetry about the trough,
+    are left out: both are of the order of (c/L)^3 or less.
+
+    amplitude : of the wave from its mean, m. period : L, m.
+    """
+
+    material: Material
+    amplitude: float
+    period: float
+
+    def _moments(self, c):
+        """Integrals of J0(qr) r/sqrt(c^2 - r^2) and J0(qr) r sqrt(c^2 - r^2) up to c."""
+        q = 2 * math.pi / self.period
+        return math.sin(q * c) / q, (math.sin(q * c) - q * c * math.cos(q * c)) / q**3
+
+    @property
+    def tearing(self) -> float:
+        """p0 = pi E* amplitude/L, Pa."""
+        return math.pi * self.material.contact_modulus * self.amplitude / self.period
+
+    def pressure(self, c: float) -> float:
+        """Mean pressure that holds a crack of radius c (m) open, Pa; negative in tension."""
+        root, _ = self._moments(c)
+        return (self.tearing * root - intensity_at_equilibrium(self.material) * math.sqrt(math.pi * c) / 2) / c
+
+    def separation(self, c: float) -> float:
+        """Mean gap, m, the volume of the crack over the cell."""
+        _, cubed = self._moments(c)
+        volume = 8 / self.material.contact_modulus * (self.tearing * cubed - self.pressure(c) * c**3 / 3)
+        return volume / self.period**2
+
+    def radius(self, separation: float) -> float:
+        """Radius (m) of the crack at a mean gap (m).
+
+        Raises
+        ------
+        ValueError
+            If it is not within a quarter of the period.
+        """
+        return brentq(lambda c: self.separation(c) - separation, 1e-6 * self.period, self.period / 4, xtol=1e-15)
+
+
+@dataclass(frozen=True)
 class SphereInCell:
     """A paraboloid under Johnson, Kendall & Roberts' law in the middle of a square cell that is repeated periodically.
 
