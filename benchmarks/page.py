@@ -430,7 +430,7 @@ def _settings(results) -> str:
     }
     lines += [f"- `{code}` was measured on another machine: {name}." for name, code in sorted(elsewhere)]
     limits = sorted({r["limit"] for r in chosen(results, "sweep-")})
-    lines += [f"- Time limit of a process: {', '.join(f'{limit / MINUTE:g}' for limit in limits)} min."]
+    lines += [f"- Time limit of a process: {', '.join(f'{limit / MINUTE:.2g}' for limit in limits)} min."]
     return "\n".join(lines)
 
 
