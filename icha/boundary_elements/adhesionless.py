@@ -8,8 +8,8 @@ from icha.boundary_elements.elasticity import solve_bonds
 from icha.boundary_elements.kernel import HalfSpace
 from icha.contact.failures import FullContact, NotConverged
 
-# Error of the displacement in contact, over the surface's largest height.
-_TOLERANCE = 1e-9
+# Error of the displacement in contact, over the surface's largest height: while cells still come and go, and at last.
+_COARSE, _EXACT = 1e-7, 1e-12
 _MAX_CHANGES = 200
 
 
@@ -29,7 +29,8 @@ def pressed(
         If the contact does not settle.
     """
     overlap = heights - separation
-    tolerance = _TOLERANCE * np.abs(heights).max()
+    coarse, exact = (part * np.abs(heights).max() for part in (_COARSE, _EXACT))
+    tolerance = coarse
     bonds = np.zeros_like(overlap)
     touching = touching | (overlap > 0) if not touching.any() else touching
     for _ in range(_MAX_CHANGES):
@@ -41,7 +42,10 @@ def pressed(
         gap = displaced - overlap
         # Less pressure than makes up for the error of a gap is none.
         leaving, joining = touching & (pressure < tolerance), ~touching & (gap < -tolerance)
-        if not leaving.any() and not joining.any():
-            return touching, pressure, gap
         touching = (touching & ~leaving) | joining
+        if leaving.any() or joining.any():
+            continue
+        if tolerance == exact:
+            return touching, pressure, gap
+        tolerance = exact
     raise NotConverged("the contact did not settle")
