@@ -34,8 +34,6 @@ _NEAR = 0.25
 # What a load of zero is held to over E*, at least (else over the load before); and an area without adhesion, in cells.
 _NO_LOAD = 1e-6
 _CELLS = 2.0
-# Patches are many and their events small: work is known well enough if it is known between steps so short, in h_rms.
-_SHARP = 1 / 512
 # Nodes along an edge overestimate an area by so much of the edges of cells (Yastrebov, Anciaux & Molinari, Tribol. Int.
 # 114 (2017) 161, eq. 9).
 _EDGE = (np.pi - 1 + np.log(2)) / 24
@@ -102,11 +100,6 @@ class BoundaryElements:
     def largest_area_fraction(self) -> float:
         """All of it: full contact ends a path by itself."""
         return 1.0
-
-    @property
-    def shortest_step(self) -> float:
-        """Change of the mean separation, over h_rms, below which events are not told apart."""
-        return _SHARP
 
     def untouched(self) -> CellState:
         """The state at which the first summit is about to make contact."""

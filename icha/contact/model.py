@@ -51,10 +51,6 @@ class ContactModel(Protocol[S]):
     def largest_area_fraction(self) -> float:
         """Contact area over nominal area beyond which the model covers no state."""
 
-    @property
-    def shortest_step(self) -> float:
-        """Change of the mean separation, over h_rms, below which events are not told apart."""
-
     def untouched(self) -> S:
         """The state at which contact is about to be made first."""
 

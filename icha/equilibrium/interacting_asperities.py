@@ -15,8 +15,6 @@ from icha.half_space.free_square import mean_displacement
 
 # How much of the surface contact may cover: targets are met up to a quarter of it, looked for somewhat beyond.
 _LARGEST_AREA = 1.5 * 0.25
-# The first contact is made and the last one broken within this change of separation, in h_rms.
-_SHARP = 1e-12
 # At such a rate to the separation the approach of a spot rises, as the surfaces part, on an unstable branch only.
 _RUNAWAY = 10.0
 
@@ -32,11 +30,6 @@ class InteractingAsperities(Problem):
     def largest_area_fraction(self) -> float:
         """Contact area over nominal area beyond which spots have lost their identity."""
         return _LARGEST_AREA
-
-    @property
-    def shortest_step(self) -> float:
-        """Change of the mean separation, over h_rms, below which events are not told apart."""
-        return _SHARP
 
     def untouched(self) -> ContactState:
         """The state at which the first asperity is about to make contact."""

@@ -78,7 +78,6 @@ def resolved(
         If an equilibrium is not found even with the shortest step.
     """
     unit = contact.rms_height
-    shortest = contact.shortest_step * unit
     while True:
         collective = direction > 0 and contact.adhesive and width < CLOSE_TO_A_JUMP * unit
         try:
@@ -93,7 +92,7 @@ def resolved(
         passed = step.sudden and direction * start.separation + SHARP * unit >= stride.event_at
         if width <= SHARP * unit or passed:
             return beyond, step, settled
-        work_known = width <= shortest or _is_work_known(contact, beyond, step, account, longest)
+        work_known = _is_work_known(contact, beyond, step, account, longest)
         if work_known and _is_tension_known(contact, start, beyond, step, account):
             weakest = _largest_tension(contact, start, beyond, step, account)
             if weakest is None:

@@ -40,7 +40,7 @@ def test_loop_without_adhesion_gives_all_work_back():
 
 @pytest.mark.slow
 def test_loop_with_adhesion_loses_what_its_events_lose_whatever_the_step():
-    coarse, fine = (loop(rough(64, 8), 1e-2, step) for step in (0.2, 0.1))
+    coarse, fine = (loop(rough(96, 12), 1e-2, step) for step in (0.2, 0.1))
     for row in (coarse, fine):
         assert row["work"] > 0
         assert abs(row["not_closed"]) <= 1e-6 * row["largest_work"]
@@ -55,7 +55,7 @@ def test_load_and_area_hardly_depend_on_the_grid():
 
 @pytest.mark.slow
 def test_attraction_of_shorter_and_shorter_range_tends_to_the_limit():
-    rows = towards_short_range(rough(64, 4, 16), (1.5,), ((800e-9, 1), (400e-9, 1)), 0.5)
+    rows = towards_short_range(rough(96, 6, 16), (1.5,), ((800e-9, 1), (400e-9, 1)), 0.5)
     *finite, limit = rows
     for name in ("pressure", "energetic_area"):
         far, near = (abs(row[name] - limit[name]) for row in finite)

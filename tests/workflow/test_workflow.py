@@ -333,7 +333,6 @@ def test_surface_files_and_measurements(smoke, tmp_path):
     content["boundary_elements"] = {
         "truth": {"study": "multi_slope", "materials": ["bare"], "reduced_pressures": [3e-3], "refinement": 2}
     }
-    del content["error_sources"], content["one_asperity"], content["boundary_element_loops"]
     content["studies"] = {"multi_slope": study}
     content["figures"] = {"fig5_multi_slope": {"study": "multi_slope"}}
     content["measurements"] = {
