@@ -303,7 +303,9 @@ class BoundaryElements:
         count = int(labels.max())
         if not len(which):
             return Events.joined(())
-        energy = np.bincount(labels.ravel(), self._energy_of_cells(state).ravel(), count + 1)[1:]
+        energy = np.zeros(count)
+        if self.adhesive:
+            energy = np.bincount(labels.ravel(), self._energy_of_cells(state).ravel(), count + 1)[1:]
         position = centres(labels, count, state.fraction) * self.spacing
         summits = np.bincount(labels.ravel()[self.summits.cell], minlength=count + 1)[1:]
         return Events(
