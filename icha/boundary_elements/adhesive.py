@@ -55,8 +55,8 @@ def settled(
 
     tolerance: of sqrt(G/dgamma) along the fronts.
 
-    Fronts come to rest first; then the summit that is deepest in reach, and all that are so among their surroundings,
-    make contact, and fronts come to rest again. A summit that loses the contact again stays open.
+    Fronts come nearly to rest first; then all summits within reach make contact, until there is none, and fronts come
+    to rest. A summit that loses the contact again stays open.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from icha.boundary_elements.elasticity import Held
 from icha.boundary_elements.front import Front, areas, contact_area_gradient, contact_areas, neighbours
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import FRONT_TOLERANCE, front_residual, tangent
-from icha.boundary_elements.patches import centres, labelled
+from icha.boundary_elements.patches import BEYOND_EDGES, centres, edges, labelled
 from icha.boundary_elements.states import CellState
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 from icha.contact.failures import NotConverged
@@ -34,9 +34,6 @@ _NEAR = 0.25
 # What a load of zero is held to over E*, at least (else over the load before); and an area without adhesion, in cells.
 _NO_LOAD = 1e-6
 _CELLS = 2.0
-# Nodes along an edge overestimate an area by so much of the edges of cells (Yastrebov, Anciaux & Molinari, Tribol. Int.
-# 114 (2017) 161, eq. 9).
-_EDGE = (np.pi - 1 + np.log(2)) / 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +135,7 @@ class BoundaryElements:
         if self.adhesive:
             return contact_areas(state.fraction, neighbours(state.fraction))
         touching = state.touching
-        bare = sum((touching & ~np.roll(touching, way, axis)).astype(float) for axis in (0, 1) for way in (-1, 1))
-        return touching - _EDGE * bare
+        return touching - BEYOND_EDGES * edges(touching)
 
     def mean_gap(self, state: CellState) -> float:
         """Mean gap over the nominal area, m: the mean separation, for pressures displace no mean plane."""
@@ -171,14 +167,10 @@ class BoundaryElements:
 
     # --- on the way -----------------------------------------------------------------------------------------------
 
-    def gap(self, state: CellState) -> np.ndarray:
-        """Gap at every node, (n, n), m."""
-        return state.gap
-
-    def _cells(self, state, around=None):
-        around = neighbours(state.fraction) if around is None else around
+    def _cells(self, state):
+        """The state in the units of the solver; the energy is not needed."""
         pressure, gap = state.pressure / self.contact_modulus, state.gap / self.spacing
-        return Held(state.fraction, pressure, gap, 0.0, around)
+        return Held(state.fraction, pressure, gap, 0.0, neighbours(state.fraction))
 
     def _on_the_way(self, state, separation):
         """The state, and if it is not far to a separation (m) what its rates make of it there."""
@@ -268,11 +260,11 @@ class BoundaryElements:
         """The state with the derivatives of pressure and area."""
         if not state.touching.any():
             return state
-        around = neighbours(state.fraction)
-        fraction, pressure = tangent(self.space, self.front, self._cells(state, around))
+        cells = self._cells(state)
+        fraction, pressure = tangent(self.space, self.front, cells)
         stiffer = float(np.mean(pressure)) * self.contact_modulus / self.spacing
         if self.adhesive:
-            wider = float(np.mean(contact_area_gradient(state.fraction, around) * fraction)) / self.spacing
+            wider = float(np.mean(contact_area_gradient(state.fraction, cells.around) * fraction)) / self.spacing
         else:
             # Cells come and go as wholes; in the mean the area grows about in proportion to the load.
             wider = self.area_fraction(state) * stiffer / self.pressure(state)

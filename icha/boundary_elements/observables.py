@@ -120,7 +120,7 @@ class PatchObservables:
             "spot_y": centre[:, 1],
             "spot_radius": np.sqrt(area / np.pi),
             "spot_area": area,
-            "spot_perimeter": np.pi / 4 * edges(state.touching, labels, count) * h,
+            "spot_perimeter": np.pi / 4 * sums(edges(state.touching)) * h,
             "spot_force": sums(state.pressure) * h**2,
             "spot_curvature_radius": radius[1:],
             "spot_members": np.bincount(of_summit, minlength=count + 1)[1:],

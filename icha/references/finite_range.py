@@ -29,6 +29,7 @@ import xarray as xr
 
 from icha.asperity.cohesive_zone import longest_spacing, resolution_problem, strength_number
 from icha.asperity.material import Material
+from icha.boundary_elements.patches import BEYOND_EDGES
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.datasets.bins import bin_values
@@ -384,7 +385,7 @@ def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
     Anciaux & Molinari 2017, eq. 9 there).
     """
     edges = sum(int(np.count_nonzero(contact != np.roll(contact, 1, axis))) for axis in (0, 1))
-    return (np.count_nonzero(contact) - (math.pi - 1 + math.log(2)) / 24 * edges) / contact.size, float(edges)
+    return (np.count_nonzero(contact) - BEYOND_EDGES * edges) / contact.size, float(edges)
 
 
 def _dataset(surface, material, state, target, tolerance, seed):

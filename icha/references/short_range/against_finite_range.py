@@ -24,7 +24,7 @@ def without_adhesion(surface: Surface, reduced_pressures: Sequence[float]) -> li
         load = p * surface.rms_slope * HARD.contact_modulus
         state = contact.equilibrium(contact.untouched(), theirs.mean_separation)
         state = contact.equilibrium(state, state.separation, Control(PRESSURE, load))
-        gap = contact.gap(state)
+        gap = state.gap
         rows.append(
             {
                 "grid": surface.grid,

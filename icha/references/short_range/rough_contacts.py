@@ -159,7 +159,7 @@ def digest(grid: int = 64, separation: float = 2.2) -> str:
     with threadpool_limits(1):
         contact = BoundaryElements.of(rough(grid, waves=grid // 8), SOFT)
         (state,) = followed(contact, [separation])
-    parts = (state.fraction, state.pressure, contact.gap(state))
+    parts = (state.fraction, state.pressure, state.gap)
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 
 
