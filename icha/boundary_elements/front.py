@@ -20,6 +20,7 @@ In units of the grid: lengths in cells, pressures in E*.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.ndimage import correlate1d
@@ -45,6 +46,14 @@ def neighbours(fraction: np.ndarray) -> np.ndarray:
     """w*f: mean fraction of contact around every cell, (n, n), periodic."""
     along = correlate1d(fraction, STENCIL, axis=1, mode="wrap")
     return correlate1d(along, STENCIL, axis=0, mode="wrap")
+
+
+@cache
+def neighbour_modes(grid: int) -> np.ndarray:
+    """Factors, (n, n//2 + 1), of Fourier modes that make `neighbours`, in single precision."""
+    way = np.arange(-_REACH, _REACH + 1)
+    along = np.cos(2 * np.pi * np.outer(np.fft.fftfreq(grid), way)) @ STENCIL
+    return np.outer(along, along[: grid // 2 + 1]).astype(np.float32)
 
 
 def areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:

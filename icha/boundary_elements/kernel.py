@@ -17,11 +17,14 @@ _MEAN = 0.3
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace:
-    """Fourier kernel of a periodic half-space on an n x n grid. compliance, stiffness: (n, n//2 + 1)."""
+    """Fourier kernel of a periodic half-space on an n x n grid, for fields in double or single precision.
+
+    Arrays are (n, n//2 + 1), in a dict by precision. compliance: of the half-space. stiffness: its approximate inverse.
+    """
 
     grid: int
-    compliance: np.ndarray
-    stiffness: np.ndarray
+    compliance: dict[np.dtype, np.ndarray]
+    stiffness: dict[np.dtype, np.ndarray]
 
     @classmethod
     def of(cls, grid: int) -> HalfSpace:
@@ -34,17 +37,23 @@ class HalfSpace:
         with np.errstate(divide="ignore"):
             compliance = 2 / q
         compliance[0, 0] = 0.0
-        return cls(grid, compliance, stiffness)
+        return cls(grid, _by_precision(compliance), _by_precision(stiffness))
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
         """Displacement away from the load, in cells, of zero mean, under pressures (n, n) in E*."""
-        return self._filtered(pressure, self.compliance)
+        return filtered(pressure, self.compliance[pressure.dtype])
 
     def pressure(self, displacement: np.ndarray) -> np.ndarray:
         """The pressure, (n, n) in E*, that makes a displacement; its mean is made up, for conditioning alone."""
-        return self._filtered(displacement, self.stiffness)
+        return filtered(displacement, self.stiffness[displacement.dtype])
 
-    def _filtered(self, field, factor):
-        modes = scipy.fft.rfft2(field, workers=1)
-        modes *= factor
-        return scipy.fft.irfft2(modes, s=field.shape, overwrite_x=True, workers=1)
+
+def filtered(field: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """A periodic field, (n, n), with its Fourier modes times factors (n, n//2 + 1), in the precision of both."""
+    modes = scipy.fft.rfft2(field, workers=1)
+    modes *= factor
+    return scipy.fft.irfft2(modes, s=field.shape, overwrite_x=True, workers=1)
+
+
+def _by_precision(factor):
+    return {np.dtype(kind): factor.astype(kind) for kind in (np.float64, np.float32)}

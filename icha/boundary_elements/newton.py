@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.boundary_elements.elasticity import Held, front_tension, held
-from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbours
-from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_modes
+from icha.boundary_elements.kernel import HalfSpace, filtered
 from icha.contact.failures import NotConverged
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
@@ -136,7 +136,7 @@ def _step(space, front, state, at_front, damping, accuracy):
     # To the tension that the law wants at the present fraction, and from there with the law.
     strengths = linear.strengths
     missing = strengths * linear.fraction + state.pressure.ravel()[linear.front_cells]
-    moved = space.displacement(linear.on_grid(None, missing)).ravel()
+    moved = space.displacement(linear.on_grid(None, missing, float)).ravel()
     gap = state.gap.ravel()[linear.front_cells]
     right = np.concatenate(
         [moved[linear.closed_cells], moved[linear.front_cells] + COMPLIANCE * strengths * (1 - linear.fraction) - gap]
@@ -154,7 +154,7 @@ def tangent(space: HalfSpace, front: Front, state: Held) -> tuple[np.ndarray, np
 
 
 class Linearised:
-    """The equations of contact and front, linearised at a state.
+    """The equations of contact and front, linearised at a state; solved in single precision.
 
     Unknowns are the pressures of closed cells and, times the strength, the fractions of those at the front.
     """
@@ -162,21 +162,11 @@ class Linearised:
     def __init__(self, space: HalfSpace, front: Front, state: Held, at_front: np.ndarray, damping: float):
         """Note which cells are closed and which are at the front, (n, n) of bool; damping: softer bonds."""
         self.space, self.front, self.damping = space, front, damping
-        self.shape = at_front.shape
         self.closed_cells = np.flatnonzero((state.fraction >= 1) & ~at_front)
         self.front_cells = np.flatnonzero(at_front)
         self.size = len(self.closed_cells) + len(self.front_cells)
         self.strengths = front.strengths(state.around).ravel()[self.front_cells]
         self.fraction = state.fraction.ravel()[self.front_cells]
-
-    def on_grid(self, closed: np.ndarray | None, at_front: np.ndarray | None) -> np.ndarray:
-        """A field, (n, n), of given values on closed cells and at the front."""
-        field = np.zeros(self.shape)
-        if closed is not None:
-            field.ravel()[self.closed_cells] = closed
-        if at_front is not None:
-            field.ravel()[self.front_cells] = at_front
-        return field
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
         """Changes of fraction and pressure, (n, n), for given right-hand sides, to a relative accuracy."""
@@ -189,23 +179,32 @@ class Linearised:
             restart=_MAX_KRYLOV,
             maxiter=1,
         )
-        change, pressure, _, _ = self._spread(solution)
-        return change, pressure
+        fraction, pressure, _, _ = self._spread(solution)
+        return self.on_grid(None, fraction, float), self.on_grid(*pressure, float)
+
+    def on_grid(self, closed: np.ndarray | None, at_front: np.ndarray | None, kind: type = np.float32) -> np.ndarray:
+        """A field, (n, n), of given values on closed cells and at the front."""
+        field = np.zeros((self.space.grid, self.space.grid), kind)
+        if closed is not None:
+            field.ravel()[self.closed_cells] = closed
+        if at_front is not None:
+            field.ravel()[self.front_cells] = at_front
+        return field
 
     def _spread(self, unknowns):
-        """Changes of fraction and pressure on the grid, and of strength and tension at the front."""
+        """Changes of fraction at the front; of pressure on closed cells and at the front; of strength and tension."""
         closed = len(self.closed_cells)
         fraction = unknowns[closed:] / (self.front.strength or 1.0)
-        change = self.on_grid(None, fraction)
         stronger = np.zeros(len(fraction))
         if len(fraction):
-            stronger = self.front.strength_change(self.strengths, neighbours(change).ravel()[self.front_cells])
+            around = filtered(self.on_grid(None, fraction), neighbour_modes(self.space.grid))
+            stronger = self.front.strength_change(self.strengths, around.ravel()[self.front_cells])
         pull = self.strengths * fraction + self.fraction * stronger
-        return change, self.on_grid(unknowns[:closed], -pull), stronger, pull
+        return fraction, (unknowns[:closed], -pull), stronger, pull
 
     def _displaced(self, unknowns):
         _, pressure, stronger, pull = self._spread(unknowns)
-        moved = self.space.displacement(pressure).ravel()
+        moved = self.space.displacement(self.on_grid(*pressure)).ravel()
         held = COMPLIANCE * ((1 + self.damping) * pull - stronger)
         return np.concatenate([moved[self.closed_cells], moved[self.front_cells] + held])
 
