@@ -12,28 +12,19 @@ from icha.boundary_elements.adhesionless import pressed
 from icha.boundary_elements.adhesive import Summits, settled
 from icha.boundary_elements.elasticity import Held
 from icha.boundary_elements.front import Front, areas, contact_area_gradient, contact_areas, neighbours
+from icha.boundary_elements.held_load import held
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import FRONT_TOLERANCE, front_residual, tangent
-from icha.boundary_elements.patches import BEYOND_EDGES, centres, edges, labelled
+from icha.boundary_elements.patch_events import patch_events
+from icha.boundary_elements.patches import BEYOND_EDGES, edges, labelled
 from icha.boundary_elements.states import CellState
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
-from icha.contact.failures import NotConverged
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control
+from icha.contact.events import Events
+from icha.contact.model import PRESSURE, Control
 from icha.surfaces.summits import Asperities, find_summits
 from icha.surfaces.surface import Surface
 
-# Relative error of a held load or area.
-_HELD = 5e-10
-_MAX_TRIALS = 60
-# A trial so near the target, relatively, is gone on from even if it lies beyond. Closer separations, in h_rms, are one.
-_CLOSE = 1e-3
-_SAME = 1e-13
-# Deviation of sqrt(G/dgamma) along a front that is good enough for a trial; and change of fractions that is small.
-_TRIAL = 1e-5
+# Change of fractions that is small.
 _NEAR = 0.25
-# What a load of zero is held to over E*, at least (else over the load before); and an area without adhesion, in cells.
-_NO_LOAD = 1e-6
-_CELLS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +105,7 @@ class BoundaryElements:
         """
         if control is None:
             return self._at(state, separation)
-        return self._held(state, separation, control)
+        return held(self, state, separation, control, self._at)
 
     def released(self, region: np.ndarray, separation: float) -> CellState:
         """The equilibrium at a separation (m) that a contact of a given region, (n, n) of bool, falls into."""
@@ -209,52 +200,8 @@ class BoundaryElements:
             gap_residual=max(closed, -gap[fraction <= 0].min(initial=0.0)) * h,
             pending=pending,
         )
-        return replace(self._with_slopes(new), history=(*state.history, self._events(state, new)))
-
-    def _held(self, state, separation, control):
-        """The equilibrium under a load or of an area, from a state not far away.
-
-        Where events may happen on the way nothing is passed: a trial that goes too far is taken back.
-        """
-
-        def value(state):
-            return self.pressure(state) if control.quantity == PRESSURE else self.area_fraction(state)
-
-        scale = abs(control.target) or max(abs(value(state)), _NO_LOAD * self.contact_modulus)
-        # Without adhesion the area changes by whole cells.
-        enough = _HELD * scale
-        if control.quantity == AREA_FRACTION and not self.adhesive:
-            enough = max(enough, _CELLS / self.heights.size)
-        sign = np.sign(control.target - value(state)) or 1.0
-        short, far = state, None
-        start, exact = state, False
-        for _ in range(_MAX_TRIALS):
-            new = self._at(start, separation, FRONT_TOLERANCE if exact else _TRIAL)
-            error = value(new) - control.target
-            if exact and abs(error) <= enough:
-                return new
-            was_exact, exact = exact, abs(error) < _CLOSE * scale
-            if exact and not was_exact:
-                # As near as this the trials so far, which were not exact, bound nothing.
-                short, far = state, None
-            elif sign * error < 0:
-                short = new
-            else:
-                far = new
-            # Beyond the target an event may have happened that must not.
-            start = new if new is short or not len(new.history[-1]) or abs(error) < _CLOSE * scale else short
-            slope = self.slope(control.quantity, new)
-            separation = new.separation - error / slope if slope else np.nan
-            if far is None:
-                if not np.isfinite(separation):
-                    break
-                continue
-            low, high = sorted((short.separation, far.separation))
-            if high - low < _SAME * self.rms_height:
-                break
-            if not low < separation < high:
-                separation = 0.5 * (low + high)
-        raise NotConverged(f"a {control.quantity.replace('_', ' ')} of {control.target:g} is not met from here")
+        events = patch_events(state, new, self._set_free, self.summits.cell, h)
+        return replace(self._with_slopes(new), history=(*state.history, events))
 
     def _with_slopes(self, state):
         """The state with the derivatives of pressure and area."""
@@ -275,34 +222,6 @@ class BoundaryElements:
         elastic = 0.5 * state.pressure * (self.heights - state.separation)
         return elastic - self.law.material.surface_energy * areas(state.fraction, neighbours(state.fraction))
 
-    def _events(self, before, after):
-        """What became of the patches: those that are new, gone, joined or split."""
-        (old, old_count), (new, new_count) = labelled(before.touching), labelled(after.touching)
-        both = (old > 0) & (new > 0)
-        pairs = np.unique(np.stack([old[both], new[both]]), axis=1)
-        parts_of_old = np.bincount(pairs[0], minlength=old_count + 1)[1:]
-        parts_of_new = np.bincount(pairs[1], minlength=new_count + 1)[1:]
-        events = [
-            self._event(JUMP_IN, after, new, np.flatnonzero(parts_of_new == 0), -1.0),
-            self._event(JUMP_OFF, before, old, np.flatnonzero(parts_of_old == 0), 1.0),
-            self._event(COALESCENCE, after, new, np.repeat(np.arange(new_count), np.maximum(parts_of_new - 1, 0)), 0.0),
-            self._event(SPLIT, before, old, np.repeat(np.arange(old_count), np.maximum(parts_of_old - 1, 0)), 0.0),
-        ]
-        return Events.joined(events)
-
-    def _event(self, kind, state, labels, which, sign):
-        """Events of one kind to patches `which`, (k,), of a state; of a jump the energy of its patch is set free."""
-        count = int(labels.max())
-        if not len(which):
-            return Events.joined(())
-        energy = np.zeros(count)
-        if self.adhesive:
-            energy = np.bincount(labels.ravel(), self._energy_of_cells(state).ravel(), count + 1)[1:]
-        position = centres(labels, count, state.fraction) * self.spacing
-        summits = np.bincount(labels.ravel()[self.summits.cell], minlength=count + 1)[1:]
-        return Events(
-            np.full(len(which), kind, np.int8),
-            position[which],
-            summits[which],
-            np.maximum(sign * energy[which], 0.0) * self.spacing**2,
-        )
+    def _set_free(self, state):
+        """What every cell would set free if its patch jumped, J/m^2: without adhesion nothing jumps."""
+        return self._energy_of_cells(state) if self.adhesive else np.zeros(state.fraction.shape)

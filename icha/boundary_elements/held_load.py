@@ -1,0 +1,79 @@
+"""Loads and areas that are held: the mean separation at which a contact has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from icha.boundary_elements.newton import FRONT_TOLERANCE
+from icha.boundary_elements.states import CellState
+from icha.contact.failures import NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control
+
+# Relative error of a held load or area.
+_HELD = 5e-10
+_MAX_TRIALS = 60
+# A trial so near the target, relatively, is gone on from even if it lies beyond. Closer separations, in h_rms, are one.
+_CLOSE = 1e-3
+_SAME = 1e-13
+# Deviation of sqrt(G/dgamma) along a front that is good enough for a trial.
+_TRIAL = 1e-5
+# What a load of zero is held to over E*, at least (else over the load before); and an area without adhesion, in cells.
+_NO_LOAD = 1e-6
+_CELLS = 2.0
+
+
+def held(
+    contact: ContactModel[CellState],
+    state: CellState,
+    separation: float,
+    control: Control,
+    settle: Callable[[CellState, float, float], CellState],
+) -> CellState:
+    """The equilibrium under a load or of an area, from a state not far away.
+
+    separation: a first guess, m. settle: the equilibrium at a separation, from a state, to a tolerance of the front.
+    Where events may happen on the way nothing is passed: a trial that goes too far is taken back.
+
+    Raises
+    ------
+    NotConverged
+        If it is not met.
+    """
+    value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
+    scale = abs(control.target) or max(abs(value(state)), _NO_LOAD * contact.contact_modulus)
+    # Without adhesion the area changes by whole cells.
+    enough = _HELD * scale
+    if control.quantity == AREA_FRACTION and not contact.adhesive:
+        enough = max(enough, _CELLS / state.fraction.size)
+    sign = np.sign(control.target - value(state)) or 1.0
+    short, far = state, None
+    start, exact = state, False
+    for _ in range(_MAX_TRIALS):
+        new = settle(start, separation, FRONT_TOLERANCE if exact else _TRIAL)
+        error = value(new) - control.target
+        if exact and abs(error) <= enough:
+            return new
+        was_exact, exact = exact, abs(error) < _CLOSE * scale
+        if exact and not was_exact:
+            # As near as this the trials so far, which were not exact, bound nothing.
+            short, far = state, None
+        elif sign * error < 0:
+            short = new
+        else:
+            far = new
+        # Beyond the target an event may have happened that must not.
+        start = new if new is short or not len(new.history[-1]) or exact else short
+        slope = contact.slope(control.quantity, new)
+        separation = new.separation - error / slope if slope else np.nan
+        if far is None:
+            if not np.isfinite(separation):
+                break
+            continue
+        low, high = sorted((short.separation, far.separation))
+        if high - low < _SAME * contact.rms_height:
+            break
+        if not low < separation < high:
+            separation = 0.5 * (low + high)
+    raise NotConverged(f"a {control.quantity.replace('_', ' ')} of {control.target:g} is not met from here")
