@@ -110,3 +110,14 @@ def errors():
 def short_range_errors():
     """The error against `solutions_of_errors` and, in the limit of a short range, runs with half as much area again."""
     return model_error(tree(), solutions_of_errors(), runs=patches(area=1.5, separation=0.9))
+
+
+def errors_at_own_slopes():
+    """The errors of two surfaces, each at a slope of its own, as measured ones are."""
+    parts = {}
+    for name, node in errors().children.items():
+        one = node.to_dataset()
+        other = one.assign_coords(surface=["other"], rms_slope=[0.5])
+        parts[f"/{name}"] = xr.merge([one, other], join="outer", compat="no_conflicts")
+        parts[f"/{name}"].attrs = node.attrs
+    return xr.DataTree.from_dict(parts)

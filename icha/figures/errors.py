@@ -156,7 +156,7 @@ def _curves(model_error, study, quantities):
     if not entries:
         there = sorted({str(node.attrs["study"]) for node in model_error.children.values()})
         raise ValueError(f"no boundary elements beside study {study!r}; there are some for {', '.join(there)}")
-    if not any(np.isfinite(errors[each.name].values).any() for errors in entries.values() for each in quantities):
+    if not any(_compared(errors, quantities) for errors in entries.values()):
         raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
     keys = [
         (entry, surface, slope, material)
@@ -164,6 +164,8 @@ def _curves(model_error, study, quantities):
         for material, surface, slope in itertools.product(
             *(errors[label].values.tolist() for label in ("material", "surface", "rms_slope"))
         )
+        # Of measured surfaces each has its own slope alone.
+        if _compared(errors, quantities, material=material, surface=surface, rms_slope=slope)
     ]
     places = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in keys))
     materials = list(dict.fromkeys(material for *_, material in keys))
@@ -171,6 +173,11 @@ def _curves(model_error, study, quantities):
     return _Curves(
         entries, keys, places, materials, interfaces_of(entries, materials), len(places) > _MOST_LINES, scale
     )
+
+
+def _compared(errors, quantities, **at):
+    """Whether there is a state of a quantity at given labels."""
+    return any(np.isfinite(errors[each.name].sel(at).values).any() for each in quantities)
 
 
 def _draw_curve(row, errors, quantities, look, apart, counts):

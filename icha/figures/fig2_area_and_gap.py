@@ -155,6 +155,8 @@ def _draw_solutions(left, right, colours, entries):
                 for name in ("contact_area_fraction", "reduced_separation")
             )
             p = np.broadcast_to(own["reduced_pressure"].values, area.shape)
+            # Of measured surfaces each has its own slope, and no states at those of others.
+            there = np.isfinite(area)
             look = {
                 "ls": "none",
                 "marker": _CROSS if is_short_range(errors) else _FINITE_RANGE[again % len(_FINITE_RANGE)],
@@ -164,7 +166,7 @@ def _draw_solutions(left, right, colours, entries):
                 "ms": 8 if float(own["surface_energy"]) > 0 else 11,
                 "zorder": 6,
             }
-            states.append((p.ravel(), area.ravel(), gap.ravel()))
+            states.append((p[there], area[there], gap[there]))
             for ax, values in ((left, states[-1][1]), (right, states[-1][2])):
                 ax.plot(states[-1][0], values, **look)
             label = f"{name}, {entry}" if again else name

@@ -51,7 +51,7 @@ def provenance(studies, surfaces, figures, model_error, files, dataset):
     arrows += [("surfaces", study) for study in middle] if surfaces else []
     arrows += [(study, "dataset") for study in middle]
     if model_error is not None:
-        states = sum(int(node["area_error"].size) for node in model_error.children.values())
+        states = sum(int(node["area_error"].count()) for node in model_error.children.values())
         columns[2]["boundary elements"] = Node("Boundary elements", counted(states, "state", "states"), "#error")
         made["error"] = Node("Error of the model", "against them", "#error")
         arrows += [("surfaces", "boundary elements")] if surfaces else []

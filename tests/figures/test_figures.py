@@ -649,6 +649,17 @@ def test_errors_of_runs_that_all_failed_are_nothing_to_draw(module):
         module.figure(xr.DataTree.from_dict(empty), study="one")
 
 
+def test_surfaces_of_different_slopes_are_compared_at_their_own_alone():
+    errors = compared.errors_at_own_slopes()
+    assert errors["adhesive"].sizes["surface"] == errors["adhesive"].sizes["rms_slope"] == 2
+    figure = fig10_model_error.figure(errors, study="one")
+    assert len(figure.axes[0].containers) == 4
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert sum("other" in name for name in names) == sum("rough" in name for name in names) == 2
+    left = fig2_area_and_gap.figure(compared.tree(), model_error=errors, study="one").axes[0]
+    assert np.all(np.isfinite(left.get_xlim() + left.get_ylim()))
+
+
 def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
     def many(node):
         names = [f"s{k}" for k in range(9)]

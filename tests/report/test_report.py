@@ -140,6 +140,14 @@ def test_error_of_the_model_has_a_section_where_it_is_known(write):
     assert f"{float(run['nayak_parameter']):.3g}" in text
 
 
+def test_error_of_surfaces_with_slopes_of_their_own_has_no_empty_rows(write):
+    errors = compared.errors_at_own_slopes()
+    text = write(campaign=compared.tree(), comparison=None, checks=[], model_error=errors)
+    section = text[text.index('<h2 id="error">') : text.index('<h2 id="surfaces">')]
+    assert section.count("In 12 states") == 2 and "nan" not in section
+    assert len(re.findall(r"<td>other</td>|<th[^>]*>other</th>", section)) == 4
+
+
 def test_error_of_one_seed_has_no_scatter_and_sources_are_cited(write):
     pairs = compared.solutions("one", lambda labels: labels.seed == 2)
     cited = [(labels, own.assign_attrs(references="B. Elements, J. Tests 1 (2020) 1; PAPER")) for labels, own in pairs]

@@ -82,6 +82,23 @@ def test_the_campaign_as_shipped_needs_no_tamaas_and_has_every_figure_but_that_o
     assert {file.stem for file in (project / "results/smoke/figures").iterdir()} == figures
 
 
+@pytest.mark.slow
+def test_three_measured_surfaces_go_through_both_models(tmp_path):
+    project = copy_project(REPOSITORY, tmp_path / "project")
+    run = snakemake(project, configuration="config/campaigns/measured.yaml")
+    assert run.returncode == 0, run.stdout
+    with xr.open_datatree(project / "results/measured/dataset/measured.nc") as tree:
+        for study, surfaces in (("microscopes", 2), ("millimetres", 1)):
+            runs = tree[study].to_dataset()
+            assert runs["model"].values.tolist() == ["asperities", "boundary_elements"]
+            assert runs.sizes["surface"] == surfaces
+            area = runs["contact_area_fraction"]
+            for surface in range(surfaces):
+                own = area.isel(surface=surface).dropna("rms_slope", how="all")
+                assert own.sizes["rms_slope"] == 1 and np.all(own > 0) and np.all(own.diff("step") > 0)
+    assert len(list((project / "results/measured/figures").glob("*.png"))) == 3
+
+
 def test_sweeps_report_progress(smoke):
     log = smoke / "results/smoke/logs/runs/challenge/challenge/seed1/slope1/cmc.log"
     assert len(log.read_text().splitlines()) >= 4
