@@ -11,7 +11,7 @@ import shutil
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from pages import error_sources, hysteresis, one_asperity, short_range, validation
+from pages import error_sources, hysteresis, one_asperity, rules, short_range, validation
 
 from icha.configuration.cases import asperity_cases, loop_cases, source_cases
 from icha.configuration.load import load_configuration
@@ -26,7 +26,7 @@ TEMPLATES = Environment(
     lstrip_blocks=True,
     autoescape=False,  # Markdown, of our own results
 )
-for functions in (error_sources, hysteresis, one_asperity, short_range, validation):
+for functions in (error_sources, hysteresis, one_asperity, rules, short_range, validation):
     TEMPLATES.globals[functions.__name__.rpartition(".")[2]] = functions
 
 

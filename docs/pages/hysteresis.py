@@ -1,14 +1,13 @@
-"""Numbers of the page on pull-off and hysteresis, from studies of the campaign dataset."""
+"""Numbers of the page on pull-off and hysteresis: loops by asperities, from studies of the campaign dataset."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.models import ASPERITIES
 from pages.tables import Table, means
 
 
@@ -162,62 +161,3 @@ def controls(separation: xr.Dataset, load: xr.Dataset) -> Table:
             row += [form.format(float(each[name])) for each in (other, one)]
         rows.append(row)
     return Table(head, rows)
-
-
-def cases(truth: xr.Dataset) -> str:
-    """Surfaces, seeds and slopes of a study in words."""
-    surfaces = ", ".join(f"`{name}`" for name in truth["surface"].values)
-    seeds, slopes = (", ".join(f"{value:g}" for value in truth[label].values) for label in ("seed", "rms_slope"))
-    return f"surface {surfaces}, seed {seeds}, slope {slopes}"
-
-
-_RULES = ("overlap", "detachment")
-
-
-def truth(overlap: xr.Dataset, detachment: xr.Dataset, truth: xr.Dataset) -> Table:
-    """Pull-off and loss by boundary elements, and by asperities with either rule, for the runs that all three have."""
-    head = ["Δγ, mJ/m²", "", "boundary elements", *(f"{rule}" for rule in _RULES), *(f"{rule}, %" for rule in _RULES)]
-    rows = []
-    for energy, true, others in _beside_truth(overlap, detachment, truth):
-        first = f"{1e3 * energy:g}"
-        for name, what, scale in _COMPARED:
-            value, *by_rule = (scale * float(one[name]) for one in (true, *others))
-            errors = [f"{100 * (each / value - 1):+.0f}" for each in by_rule]
-            rows.append([first, what, f"{value:.3g}", *(f"{each:.3g}" for each in by_rule), *errors])
-            first = ""
-    return Table(head, rows)
-
-
-# Rules whose distances differ by less than this part are as near.
-_TIE = 1e-3
-_COMPARED = (
-    ("largest_contact_area_fraction", "A/A₀ at the largest load", 1.0),
-    ("pull_off_pressure", "pull-off, Pa", 1.0),
-    ("hysteresis_loss", "loss, µJ/m²", 1e6),
-)
-
-
-def nearer_rule(overlap: xr.Dataset, detachment: xr.Dataset, truth: xr.Dataset) -> str:
-    """Which rule is nearer to boundary elements in pull-off and in loss, and in how many of the cases."""
-    cases = list(_beside_truth(overlap, detachment, truth))
-    words = []
-    for name, what in (("pull_off_pressure", "pull-off"), ("hysteresis_loss", "loss")):
-        away = [[abs(float(one[name]) - float(true[name])) for one in others] for _, true, others in cases]
-        nearer = ["both" if np.isclose(*each, rtol=_TIE) else _RULES[int(np.argmin(each))] for each in away]
-        for rule in _RULES:
-            if count := nearer.count(rule):
-                words.append(f"in {what} `{rule}` is nearer in {count} of {len(cases)}")
-        if count := nearer.count("both"):
-            words.append(f"in {what} both are as near in {count} of {len(cases)}")
-    return "; ".join(words)
-
-
-def _beside_truth(overlap, detachment, truth):
-    """Surface energy, J/m^2, run by boundary elements and runs by asperities under either rule, case by case."""
-    one = truth.sel(model=BOUNDARY_ELEMENTS)
-    for surface, seed, slope, material in itertools.product(
-        *(truth[label].values.tolist() for label in ("surface", "seed", "rms_slope", "material"))
-    ):
-        at = {"surface": surface, "seed": seed, "rms_slope": slope, "material": material}
-        others = [study.sel(model=ASPERITIES, **at) for study in (overlap, detachment)]
-        yield float(truth["surface_energy"].sel(material=material)), one.sel(at), others
