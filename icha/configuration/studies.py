@@ -170,10 +170,10 @@ class Study(Section):
         description="What is imposed: the mean separation, or the load, under which the state jumps where the curve "
         "turns back; then all targets and turning points are loads.",
     )
-    united_until: Literal["detachment", "overlap"] = Field(
-        default="detachment",
-        description="Until when coalesced spots stay one on the way back: until they detach as a whole and fall back "
-        "into their asperities, or until the two spots that they were made of would no longer overlap. Of model "
+    united_until: Literal["overlap", "detachment"] = Field(
+        default="overlap",
+        description="Until when coalesced spots stay one on the way back: until the two spots that they were made of "
+        "would no longer overlap, or until they detach as a whole and fall back into their asperities. Of model "
         "`asperities`; patches of boundary elements part by themselves.",
     )
     max_step: number(STEP) = Field(

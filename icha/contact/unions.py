@@ -1,4 +1,4 @@
-"""Until when united spots stay united: until they let go as a whole, or until their two parts would just touch."""
+"""Until when united spots stay united: until their two parts would just touch, or until they let go as a whole."""
 
-DETACHMENT, OVERLAP = "detachment", "overlap"
-UNITED_UNTIL = (DETACHMENT, OVERLAP)
+OVERLAP, DETACHMENT = "overlap", "detachment"
+UNITED_UNTIL = (OVERLAP, DETACHMENT)

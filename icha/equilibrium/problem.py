@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from icha.asperity.law import SpotLaw
-from icha.contact.unions import DETACHMENT
+from icha.contact.unions import OVERLAP
 from icha.surfaces.summits import Asperities
 
 
@@ -14,14 +14,14 @@ class Problem:
     """Asperities in contact with a half-space.
 
     law: of one spot. rms_height: the length that makes errors of an equilibrium dimensionless, m. united_until:
-    DETACHMENT, where united spots let go as a whole, or OVERLAP, where the two they were made of would just touch.
+    OVERLAP, where the two that united spots were made of would just touch, or DETACHMENT, where they let go as a whole.
     jump_in: the asperities' jump-in approaches (n,), m.
     """
 
     law: SpotLaw
     asperities: Asperities
     rms_height: float
-    united_until: str = DETACHMENT
+    united_until: str = OVERLAP
     jump_in: np.ndarray = field(init=False)
 
     def __post_init__(self):

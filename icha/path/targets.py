@@ -3,7 +3,7 @@
 import itertools
 from dataclasses import dataclass
 
-from icha.contact.unions import DETACHMENT, UNITED_UNTIL
+from icha.contact.unions import OVERLAP, UNITED_UNTIL
 from icha.path.limits import DEFAULT_STEP, STATES, STEP
 from icha.support.rules import NUMBER
 
@@ -57,8 +57,8 @@ class Path:
     unload : whether the path ends with complete separation, met by the stops once more on the way.
     control : "separation": the mean separation is imposed. "load": the load is; the state runs along the same curve
         and jumps, at constant load, where it would have to turn back. Then all stops and turning points are loads.
-    united_until : until when united spots stay united on the way back: "detachment", where they let go as a whole and
-        fall back into their asperities, or "overlap", where the two spots that they were made of would just touch.
+    united_until : until when united spots stay united on the way back: "overlap", where the two spots that they were
+        made of would just touch, or "detachment", where they let go as a whole and fall back into their asperities.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in (0, 0.5].
 
     Raises
@@ -84,7 +84,7 @@ class Path:
         turning_points=(),
         unload=False,
         control=SEPARATION_CONTROL,
-        united_until=DETACHMENT,
+        united_until=OVERLAP,
         max_step=DEFAULT_STEP,
     ):
         """Check the values and build the list of stops."""

@@ -57,7 +57,7 @@ BAD = {
         "load",
         "studies.one.control: 'load' with the stop area_fraction = 0.02; allowed: stops and turning points that are",
     ),
-    "unknown end of unions": ("studies.one.united_until", "ever", "'detachment' or 'overlap'"),
+    "unknown end of unions": ("studies.one.united_until", "ever", "'overlap' or 'detachment'"),
     "turning point of two kinds": (
         "studies.one.turning_points",
         [{"area_fraction": 0.1, "relative_load": 0.1}],

@@ -324,7 +324,7 @@ def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
         ({"control": "force", "unload": True}, "^control: 'force' must be one of separation, load"),
         ({"control": None}, "^control: None"),
         ({"control": "load"}, "^control: 'load'"),
-        ({"united_until": "x"}, "^united_until: 'x' must be one of detachment, overlap"),
+        ({"united_until": "x"}, "^united_until: 'x' must be one of overlap, detachment"),
         ({"turning_points": 0.1}, "^turning_points: 0.1 is not a list"),
         ({"turning_points": [0.1]}, r"^turning_points\[0\]: 0.1 is not a pair"),
         ({"turning_points": [("pressure", 0.01)]}, r"^turning_points\[0\]: kind 'pressure' must be one of"),
