@@ -27,6 +27,7 @@ import numpy as np
 
 import icha
 from icha.asperity.cohesive_zone import shortest_range
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning import costs
@@ -52,7 +53,7 @@ def surface(grid):
     return f"surface {grid}²", costs.surface_cost(grid), work
 
 
-def sweep(grid, material, pressures, slope=1.0, seed=1, unload=False, **shape):
+def sweep(grid, material, pressures, slope=1.0, seed=1, unload=False, model=ASPERITIES, **shape):
     form = spectrum(grid, **shape)
     path = icha.Path(reduced_pressures=list(pressures), unload=unload)
     described = costs.Sweep(len(pressures), 1, pressures[-1], material[1] > 0, int(unload), path.max_step)
@@ -60,12 +61,14 @@ def sweep(grid, material, pressures, slope=1.0, seed=1, unload=False, **shape):
 
     def work(file):
         scaled = form.realise(grid, seed).scaled_to_rms_slope(slope)
-        write_dataset(simulate(scaled, icha.Material(*material), path, seed=seed), file)
+        write_dataset(simulate(scaled, icha.Material(*material), path, model=model, seed=seed), file)
 
     ways = "both ways" if unload else "loading"
     about = "".join(f", {name} {value:g}" for name, value in shape.items())
     adhesion = "adhesive" if material[1] else "bare"
     title = f"{ways} {grid}², {adhesion}, {len(pressures)} stops to p* = {pressures[-1]:.3g}, slope {slope:g}{about}"
+    if model == BOUNDARY_ELEMENTS:
+        return f"boundary elements {title}", costs.patch_cost(grid, summits, described), work
     return title, costs.sweep_cost(grid, summits, described), work
 
 
@@ -77,7 +80,7 @@ def solution(grid, refinement, pressure, adhesive, hurst=0.8):
         rough = spectrum(grid, hurst=hurst).realise(grid, 1)
         write_dataset(finite_range_solution(rough, icha.Material(*material), pressure, refinement=refinement), file)
 
-    title = f"boundary elements {nodes}², {'adhesive' if adhesive else 'bare'}, p* = {pressure:g}"
+    title = f"finite range {nodes}², {'adhesive' if adhesive else 'bare'}, p* = {pressure:g}"
     return title, costs.solution_cost(nodes, pressure, adhesive=adhesive), work
 
 
@@ -90,7 +93,7 @@ def loop(grid, refinement, step, adhesive=True):
         settings = {"largest_reduced_pressure": 0.01, "separation_step": step, "refinement": refinement}
         write_dataset(finite_range_loop(rough, icha.Material(*material), tolerance=1e-6, **settings), file)
 
-    return f"boundary elements both ways {nodes}², steps {step}", costs.loop_cost(nodes, step, adhesive=adhesive), work
+    return f"finite range both ways {nodes}², steps {step}", costs.loop_cost(nodes, step, adhesive=adhesive), work
 
 
 def sources(grid, pressures):
@@ -118,6 +121,8 @@ def cases(quick):
         sweep(128, STICKY, some, slope=0.5, unload=True),
         solution(128, 2, 0.01, False),
         solution(128, 1, 0.01, True),
+        *(sweep(grid, material, many, model=BOUNDARY_ELEMENTS) for grid in (64, 256) for material in (HARD, SOFT)),
+        sweep(64, PDMS, some, unload=True, model=BOUNDARY_ELEMENTS),
     ]
     others = [
         surface(1280),
@@ -129,6 +134,10 @@ def cases(quick):
         sweep(128, HARD, [2e-2], seed=26, unload=True, hurst=0.4),
         solution(80, 2, 0.02, False, hurst=0.6),
         solution(160, 1, 5e-3, True, hurst=0.6),
+        sweep(160, SOFT, some, seed=21, slope=0.7, hurst=0.4, model=BOUNDARY_ELEMENTS),
+        sweep(320, HARD, [2e-4, 5e-3], seed=23, hurst=0.6, rolloff=PERIOD / 6, model=BOUNDARY_ELEMENTS),
+        sweep(80, SOFT, [2e-2], seed=24, slope=1.2, unload=True, hurst=0.7, model=BOUNDARY_ELEMENTS),
+        sweep(96, HARD, [2e-2], seed=26, unload=True, hurst=0.4, model=BOUNDARY_ELEMENTS),
         loop(24, 4, 0.25),
         sources(80, [2e-3, 2e-2]),
     ]

@@ -113,9 +113,8 @@ def surface_cost(grid: int) -> Cost:
 
 def sweep_cost(grid: int, summits: float, sweep: Sweep) -> Cost:
     """A run of `icha.simulate` on a surface of `grid` nodes a side with so many summits."""
-    # Spots grow with the load up to about half of the summits, where the model ends; small surfaces have more.
-    loaded = min(1.0, (sweep.largest_load / 0.08) ** 0.55)
-    spots = max(1.0, min(summits, (summits + 40) * loaded / 2))
+    loaded = _loaded(sweep)
+    spots = _spots(summits, sweep)
     fields = (1e-7 + 2e-7 * sweep.snapshots) * grid**2
     # Loading solves at jumps and unions, whose number is that of the spots, more than at the stops that are asked for.
     effort = 1 + 0.008 * (sweep.stops + 2 / sweep.max_step)
@@ -129,6 +128,16 @@ def sweep_cost(grid: int, summits: float, sweep: Sweep) -> Cost:
     return Cost(seconds, _PROGRAM + _DOUBLE * grid**2 + 9 * 1024 * summits, disk)
 
 
+def _loaded(sweep):
+    """How far a path goes, of the largest loads that the model covers."""
+    return min(1.0, (sweep.largest_load / 0.08) ** 0.55)
+
+
+def _spots(summits, sweep):
+    """Spots at the largest load: up to about half of the summits, where the model ends; small surfaces have more."""
+    return max(1.0, min(summits, (summits + 40) * _loaded(sweep) / 2))
+
+
 # Boundary elements in the limit of a short range: seconds of a pair of transforms over n^2 log2 n; pairs for a state
 # with adhesion and without; states for a stop, and the way in from first contact, in h_rms, along which steps are long.
 _TRANSFORMS = 2.9e-9
@@ -139,14 +148,15 @@ PATCH_ARRAYS = 30
 _MAPS = 1.5
 
 
-def patch_states(sweep: Sweep) -> float:
-    """Equilibria of a run by boundary elements: at its stops, between them, and as many on every further leg."""
-    return (1 + sweep.legs) * (_STATES_AT_STOP * sweep.stops + _WAY_IN / sweep.max_step)
+def patch_states(summits: float, sweep: Sweep) -> float:
+    """Equilibria of a run by boundary elements: at its stops, between them, and on ways back at every jump."""
+    states = (1 + sweep.legs) * (_STATES_AT_STOP * sweep.stops + _WAY_IN / sweep.max_step)
+    return states + (cyclic_steps(_spots(summits, sweep), sweep) if sweep.legs else 0)
 
 
-def patch_cost(grid: int, sweep: Sweep) -> Cost:
-    """A run of `icha.simulate` by boundary elements on a surface of `grid` nodes a side."""
-    cells, states = grid**2, patch_states(sweep)
+def patch_cost(grid: int, summits: float, sweep: Sweep) -> Cost:
+    """A run of `icha.simulate` by boundary elements on a surface of `grid` nodes a side with so many summits."""
+    cells, states = grid**2, patch_states(summits, sweep)
     pairs = _PAIRS if sweep.adhesive else _PAIRS_WITHOUT_ADHESION
     seconds = JOB_SECONDS + _DATASET + states * pairs * _TRANSFORMS * cells * math.log2(grid)
     disk = 80e3 + 160 * states + _MAPS * cells * (sweep.snapshots + bool(sweep.legs))

@@ -96,7 +96,8 @@ def _items(campaign, results) -> Iterator[Item]:
         if case.model == ASPERITIES:
             cost = sweep_cost(grid(case.surface), asperities(case.surface), settings)
         else:
-            part, cost = f"{part}, boundary elements", patch_cost(grid(case.surface), settings)
+            cost = patch_cost(grid(case.surface), asperities(case.surface), settings)
+            part = f"{part}, boundary elements"
         yield Item(part, path, state, cost, cores, reason)
     yield from beside(
         "boundary elements",

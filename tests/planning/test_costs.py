@@ -63,7 +63,7 @@ LOADING_COST = costs.sweep_cost(256, 500, LOADING)
 
 def test_boundary_elements_grow_with_their_transforms():
     def cost(grid=512, **changes):
-        return costs.patch_cost(grid, costs.Sweep(**(vars(LOADING) | changes)))
+        return costs.patch_cost(grid, 500, costs.Sweep(**(vars(LOADING) | changes)))
 
     work = cost(1024).seconds - costs.JOB_SECONDS, cost(512).seconds - costs.JOB_SECONDS
     assert 4 < work[0] / work[1] < 4.6
