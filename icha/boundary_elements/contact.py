@@ -11,7 +11,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements.adhesionless import pressed
 from icha.boundary_elements.adhesive import Summits, settled
 from icha.boundary_elements.elasticity import Held
-from icha.boundary_elements.front import Front, areas, contact_area_gradient, contact_areas, neighbours
+from icha.boundary_elements.front import COMPLIANCE, Front, areas, contact_area_gradient, contact_areas, neighbours
 from icha.boundary_elements.held_load import held
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import FRONT_TOLERANCE, front_residual, tangent
@@ -23,6 +23,8 @@ from icha.contact.model import PRESSURE, Control
 from icha.surfaces.summits import Asperities, find_summits
 from icha.surfaces.surface import Surface
 
+# The gap at which a cell lets go, over the largest height, below which it is lost in the rounding of heights.
+_LEAST_REACH = 1e-4
 # Change of fractions that is small.
 _NEAR = 0.25
 
@@ -51,7 +53,7 @@ class BoundaryElements:
         Raises
         ------
         ValueError
-            If the surface is a free square or has no summits.
+            If the surface is a free square or has no summits, or adhesion is lost in the rounding of its heights.
         """
         surface.require_periodic("a model of boundary elements")
         law, asperities, h = JKR(material), find_summits(surface), surface.spacing
@@ -65,6 +67,11 @@ class BoundaryElements:
             law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
         )
         front = Front(material.surface_energy / (material.contact_modulus * h))
+        if 0 < COMPLIANCE * front.strength < _LEAST_REACH * np.abs(surface.heights).max() / h:
+            raise ValueError(
+                f"surface_energy: {material.surface_energy:g} J/m^2 cannot be told from none at heights like these; "
+                "needed: none at all, or more"
+            )
         return cls(surface.heights, h, law, surface.rms_height, asperities, HalfSpace.of(surface.grid), front, summits)
 
     # --- what a path asks of every model --------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import numpy as np
 
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace
-from icha.contact.failures import NotConverged
+from icha.contact.failures import FullContact, NotConverged
 
 # Compliance of a lone cell, h/E*, for the conditioning of bonds.
 _CELL = 1.12
@@ -116,11 +116,20 @@ def held(
     Parameters
     ----------
     heights : (n, n), cells. fraction, pressure : (n, n), the latter to start from. tolerance : as of `solve_bonds`.
+
+    Raises
+    ------
+    FullContact
+        If there is contact everywhere.
+    NotConverged
+        If pressures or the contact under pressure are not found.
     """
     overlap = heights - separation
     open_before = fraction <= 0
     for _ in range(_MAX_CHANGES):
         touching = fraction > 0
+        if touching.all():
+            raise FullContact("the contact runs over the whole surface")
         bonds = COMPLIANCE * (1 / np.where(touching, fraction, 1.0) - 1)
         pressure, displaced = solve_bonds(space, touching, bonds, overlap, pressure, tolerance)
         closing = np.where(touching, (pressure > 0) & (fraction < 1), displaced - overlap < -tolerance)

@@ -102,8 +102,8 @@ def front_at_rest(
         accuracy = min(_LOOSE, max(_TIGHT, 0.1 * error))
         while True:
             change, pressed = _step(space, front, state, at_front, damping, accuracy)
-            # Down in energy: G - dgamma against the change of contact; of the smallest changes that is rounding.
-            if np.vdot(tension**2 - 1, change) < 0 or np.abs(change).max() <= _NEARLY:
+            # Down in energy, as far as tensions tell: G - dgamma against the change of contact.
+            if np.vdot(tension**2 - 1, change) <= GAP_TOLERANCE * np.abs(change).sum():
                 break
             damping = _more(damping)
         step = 1.0

@@ -1,12 +1,15 @@
 """Boundary elements on rough surfaces: against Tamaas, their symmetries, steps, energy, threads."""
 
+import dataclasses
 import json
 import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
+import icha
 from icha.references.short_range.against_finite_range import towards_short_range, without_adhesion
 from icha.references.short_range.rough_contacts import HARD, SOFT, by_cells_per_wave, by_steps, loop, rough, symmetries
 
@@ -70,3 +73,31 @@ def test_threads_change_no_byte():
         run = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True)
         digests.add(json.loads(run.stdout))
     assert len(digests) == 1
+
+
+def sphere(grid, centre):
+    """A paraboloid of R = 200 um in a cell of 100 um, its centre (x, y) off a node, in cells."""
+    x, y = ((np.arange(grid) - each + grid / 2) % grid - grid / 2 for each in centre)
+    return icha.Surface(-(np.add.outer(y**2, x**2)) * (1e-4 / grid) ** 2 / 4e-4, 1e-4)
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (0.5, 0.5)], ids=["at a node", "between four"])
+def test_sphere_in_the_middle_of_a_cell_can_be_pulled_off(centre):
+    """Symmetric cells come to their limits together: the front must be let run when its equilibrium is lost."""
+    material = icha.Material(contact_modulus=1e6, surface_energy=1e-2, interaction_range=20e-9)
+    path = icha.Path(reduced_pressures=[1e-3, 1e-2], unload=True)
+    run = icha.simulate(sphere(64, centre), material, path, model="boundary_elements")
+    pull_off = float(run.pull_off_pressure) * 1e-8
+    assert pull_off == pytest.approx(1.5 * np.pi * 1e-2 * 200e-6, rel=0.01)
+    assert float(run.loss_by_jump_off) > 0 and run.contact_area_fraction.values[-1] == 0
+
+
+def test_full_contact_and_adhesion_within_rounding_are_told():
+    surface = rough(64, 8)
+    with pytest.raises(icha.ConvergenceError, match="the contact runs over the whole surface"):
+        icha.simulate(surface, SOFT, icha.Path(mean_separations=[1e-9]), model="boundary_elements")
+    faint = dataclasses.replace(SOFT, surface_energy=1e-15)
+    with pytest.raises(
+        ValueError, match="surface_energy: 1e-15 J/m\\^2 cannot be told from none at heights like these"
+    ):
+        icha.simulate(surface, faint, icha.Path([1e-3]), model="boundary_elements")

@@ -107,6 +107,6 @@ def test_the_page_can_be_written(campaign):
     studies |= {"detachment": studies["other"], "load_control": studies["other"]}
     loads = [studies[name] for name in DEPTHS]
     text = render("hysteresis", campaign=campaign, studies=studies, load_studies=loads, command="make it")
-    assert "Of the two rules in pull-off both are as near in 2 of 2" in text
+    assert "of the two rules in pull-off both are as near in 2 of 2" in text
     assert text.startswith("# Pull-off") and "`make it`" in text and "](images/fig13_loops.png)" in text
     assert "nan" not in text.lower() and "{" not in text
