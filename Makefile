@@ -19,8 +19,8 @@ unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
 	@echo "make publish make the deposit of that campaign, and before it what is missing; docs/howto/publish.md"
-	@echo "make validation  run campaign validation (hours) and write docs/validation.md and docs/error_sources.md from it"
-	@echo "make hysteresis  run campaign hysteresis (an hour) and write docs/hysteresis.md from it"
+	@echo "make validation  run campaign validation (two hours) and write docs/validation.md and docs/error_sources.md from it"
+	@echo "make hysteresis  run campaign hysteresis (forty minutes) and write docs/hysteresis.md from it"
 	@echo "make tamaas  install Tamaas as well, for boundary elements at finite ranges (campaign validation, tests)"
 	@echo "make test    run the tests that one waits for (four minutes): physics, every rule, wrong input"
 	@echo "make test-all  run them and all others: thousands of random cases, kills, resumption, Slurm, browser, deposits"

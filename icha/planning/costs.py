@@ -140,8 +140,8 @@ def _spots(summits, sweep):
 
 # Boundary elements in the limit of a short range: seconds of a pair of transforms over n^2 log2 n; pairs for a state
 # with adhesion and without; states for a stop, and the way in from first contact, in h_rms, along which steps are long.
-_TRANSFORMS = 2.9e-9
-_PAIRS, _PAIRS_WITHOUT_ADHESION = 300, 130
+_TRANSFORMS = 6.5e-10
+_PAIRS, _PAIRS_WITHOUT_ADHESION = 300, 65
 _STATES_AT_STOP, _WAY_IN = 3, 3.0
 # Arrays of the grid that they hold at a time; bytes of a cell that a snapshot's maps take, compressed.
 PATCH_ARRAYS = 30
