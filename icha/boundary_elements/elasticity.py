@@ -65,7 +65,7 @@ def solve_bonds(
         error = np.abs(r).max(initial=0.0)
         if error <= tolerance:
             return p, displaced
-        if error > _LEAST_GAIN * before:
+        if not error <= _LEAST_GAIN * before:
             raise NotConverged(f"pressures at a given contact were not found (displacement off by {error:.1e} cells)")
         before = error
         accuracy = max(_GAIN, _MARGIN * tolerance / error)

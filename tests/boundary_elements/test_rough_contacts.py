@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 import icha
+from icha.boundary_elements.elasticity import solve_bonds
+from icha.boundary_elements.kernel import HalfSpace
+from icha.contact.failures import NotConverged
 from icha.references.short_range.against_finite_range import towards_short_range, without_adhesion
 from icha.references.short_range.rough_contacts import HARD, SOFT, by_cells_per_wave, by_steps, loop, rough, symmetries
 
@@ -101,3 +104,11 @@ def test_full_contact_and_adhesion_within_rounding_are_told():
         ValueError, match="surface_energy: 1e-15 J/m\\^2 cannot be told from none at heights like these"
     ):
         icha.simulate(surface, faint, icha.Path([1e-3]), model="boundary_elements")
+
+
+def test_pressures_that_are_no_numbers_end_in_a_failure():
+    """Conjugate gradients that break down must not go on for ever."""
+    space, everywhere = HalfSpace.of(8), np.ones((8, 8), dtype=bool)
+    wanted = np.where(everywhere, np.nan, 0.0)
+    with pytest.raises(NotConverged, match="pressures at a given contact were not found"):
+        solve_bonds(space, everywhere, np.zeros((8, 8)), wanted, np.zeros((8, 8)), 1e-9)
