@@ -24,7 +24,6 @@ def show(
     """Show what is in a file: a run, a surface or a campaign dataset; --plot draws it."""
     if plot is not None and plot.suffix not in (".png", ".pdf", ".svg"):
         raise Mistake(f"--plot {plot}: ends in {plot.suffix!r}; allowed: .png, .pdf, .svg")
-    from icha.cli.quick_plot import draw
     from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, kind_of
 
     try:
@@ -43,6 +42,8 @@ def show(
     else:
         _show_campaign(data, file)
     if plot is not None:
+        from icha.cli.quick_plot import draw
+
         draw(kind, data, plot)
         typer.echo(f"drawn:   {plot}")
 

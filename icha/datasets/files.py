@@ -126,6 +126,12 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
         return xr.load_dataset(path, engine="netcdf4")
 
 
+def has_groups(path: str | os.PathLike) -> bool:
+    """Whether a netCDF file has groups, as a campaign dataset has; errors as `read_dataset`."""
+    with readable(path), netCDF4.Dataset(path) as file:
+        return bool(file.groups)
+
+
 def read_campaign(path: str | os.PathLike) -> xr.DataTree:
     """Read a campaign dataset into memory, but for large arrays; errors as `read_dataset`.
 

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
-from icha.datasets.files import read_campaign, read_dataset
+from icha.datasets.files import has_groups, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
 from icha.datasets.variables import run as variables_of_run
 from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
@@ -105,9 +105,8 @@ def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
         If it is none of them, or cannot be read.
     """
     try:
-        tree = read_campaign(path)
-        if tree.children:
-            return CAMPAIGN, tree
+        if has_groups(path):
+            return CAMPAIGN, read_campaign(path)
         data = read_dataset(path)
     except ValueError as error:
         raise UnknownFile(str(error)) from None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel, State
@@ -164,6 +163,8 @@ def _largest_tension(contact, start, beyond, step, account):
     lowest = p + slope * meet
     if lowest >= account.lowest or min(p, q) - lowest <= _MISSED_SMOOTH_TENSION * abs(lowest):
         return None
+    from scipy.interpolate import CubicHermiteSpline  # here, for it takes long to import and no way in needs it
+
     curve = CubicHermiteSpline([0.0, step.width], [p, q], [slope, end_slope])
     turns = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < step.width]
     return start.separation + (min(turns, key=curve) if turns else meet)

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -23,6 +25,8 @@ from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
 from icha.support.checksums import damaged, write_checksum
+
+HEAVY = ["scipy", "pandas", "xarray", "matplotlib", "netCDF4", "snakemake"]
 
 
 def icha(*arguments):
@@ -52,6 +56,23 @@ def test_every_command_explains_itself():
         assert told.exit_code == 0 and "Usage:" in told.output and len(told.output.splitlines()) > 6
     assert icha("--version").output.startswith("icha ")
     assert icha("nonsense").exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "without"),
+    [
+        (["--help"], ["numpy", "pydantic", "yaml", "rich", "pint", *HEAVY]),
+        (["describe"], ["pint", *HEAVY]),
+        (["show", "run.nc"], ["matplotlib", "scipy.special"]),
+        (["check", "run.nc"], ["matplotlib", "scipy.special"]),
+    ],
+)
+def test_commands_wait_for_no_library_that_they_do_not_use(project, arguments, without):
+    write_dataset(small.run(), project / "run.nc")
+    script = f"from icha.cli import app\nimport sys\napp({arguments}, standalone_mode=False)\n"
+    script += f"print([name for name in {without} if name in sys.modules])\n"
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    assert said.splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize("options", [[], ["--pull-off"], ["--boundary-elements", "--pull-off"]])
