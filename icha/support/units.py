@@ -13,12 +13,27 @@ _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*"
 # The quantities of a configuration, by the SI unit in which the model gets them.
 PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "1": "ratio"}
 
+# What most configurations are written in, for pint takes longer to get ready than all else takes to read one. These are
+# its own factors, which tests/support/test_units.py sees to.
+USUAL = {
+    ("m", "m"): "1",
+    ("mm", "m"): "1e-3",
+    ("um", "m"): "1e-6",
+    ("µm", "m"): "1e-6",
+    ("nm", "m"): "1e-9",
+    ("Pa", "Pa"): "1",
+    ("kPa", "Pa"): "1e3",
+    ("MPa", "Pa"): "1e6",
+    ("GPa", "Pa"): "1e9",
+    ("J/m^2", "J/m^2"): "1",
+    ("mJ/m^2", "J/m^2"): "1e-3",
+}
+
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
 
 
 @cache
 def _registry():
-    # Imported late and kept: building the registry takes longer than reading a whole configuration.
     # Decimals keep `100 um` exactly 1e-4 m, whatever way it is written.
     import pint
 
@@ -34,10 +49,16 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
     ValueError
         If `unit` is no unit that pint knows, or one of another dimension.
     """
-    import pint
-
     if unit == si_unit == "1":
         return Decimal(1)
+    if (unit, si_unit) in USUAL:
+        return Decimal(USUAL[unit, si_unit])
+    return _by_pint(unit, si_unit)
+
+
+def _by_pint(unit, si_unit):
+    import pint
+
     registry = _registry()
     if not _UNIT.fullmatch(unit):
         raise ValueError(f"{unit!r} is not a unit")
