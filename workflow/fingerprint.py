@@ -8,11 +8,12 @@ edit of a module changes exactly the jobs that use it.
 trees are read for the fingerprints in any case.)
 """
 
-import ast
 import hashlib
 import importlib.util
 from functools import cache
 from pathlib import Path
+
+from syntax import syntax_of
 
 PACKAGE = "icha"
 
@@ -22,7 +23,9 @@ def code_fingerprint(script: str | Path, *modules: str) -> str:
     files = files_of(script, *modules)
     digest = hashlib.sha256("".join(files).encode())
     for file in files.values():
-        digest.update(_digest(file))
+        digest.update(bytes.fromhex(syntax_of(file).digest))
+        for data in _data_files(file):
+            digest.update(data.name.encode() + hashlib.sha256(data.read_bytes()).digest())
     return digest.hexdigest()[:16]
 
 
@@ -54,51 +57,16 @@ def _name(file: Path) -> str:
 
 
 @cache
-def _tree(file: Path) -> ast.Module:
-    return ast.parse(file.read_bytes(), file.name)
-
-
-@cache
-def _digest(file: Path) -> bytes:
-    digest = hashlib.sha256(repr(_canonical(_tree(file))).encode())
-    for data in _data_files(file):
-        digest.update(data.name.encode() + hashlib.sha256(data.read_bytes()).digest())
-    return digest.digest()
-
-
-def _canonical(node):
-    """A syntax tree without positions, docstrings and empty fields (which differ between versions of Python)."""
-    if isinstance(node, ast.AST):
-        fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
-        if ast.get_docstring(node, clean=False) is not None if isinstance(node, _DOCUMENTED) else False:
-            fields = ((name, value[1:] if name == "body" else value) for name, value in fields)
-        return type(node).__name__, *((name, _canonical(value)) for name, value in fields if name != "kind")
-    if isinstance(node, list):
-        return [_canonical(item) for item in node]
-    return repr(node)
-
-
-_DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
-
-
-@cache
 def _imports(file: Path) -> list[Path]:
-    files = []
-    for node in ast.walk(_tree(file)):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                files.append(_resolve(file, alias.name, None))
-        elif isinstance(node, ast.ImportFrom):
-            module = _absolute(file, node)
-            files += [_resolve(file, module, alias.name) for alias in node.names]
-    return sorted({found for found in files if found is not None})
+    found = (_resolve(file, _absolute(file, level, module), name) for level, module, name in syntax_of(file).imports)
+    return sorted({each for each in found if each is not None})
 
 
-def _absolute(file: Path, node: ast.ImportFrom) -> str:
-    if not node.level:
-        return node.module
-    package = file.relative_to(_package_folder().parent).parts[: -node.level]
-    return ".".join([*package, *([node.module] if node.module else [])])
+def _absolute(file: Path, level: int, module: str) -> str:
+    if not level:
+        return module
+    package = file.relative_to(_package_folder().parent).parts[:-level]
+    return ".".join([*package, *([module] if module else [])])
 
 
 def _resolve(file: Path, module: str, name: str | None) -> Path | None:
@@ -126,16 +94,14 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
     raise ValueError(f"no module {name!r} in {_package_folder()}")
 
 
+@cache
 def _data_files(file: Path) -> list[Path]:
     """Files in the module's folder that its text names by their path from there, or by that of their folder."""
     found = set()
-    for node in ast.walk(_tree(file)):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and 0 < len(node.value) < 80:
-            if not all(c.isalnum() or c in "._-/" for c in node.value):
-                continue
-            place = file.parent / node.value
-            if place.is_file() and place.suffix != ".py":
-                found.add(place)
-            elif place.is_dir() and place.parent == file.parent and not node.value.startswith((".", "_")):
-                found |= {data for data in place.iterdir() if data.is_file() and data.suffix not in (".py", ".pyc")}
+    for name in syntax_of(file).names:
+        place = file.parent / name
+        if place.is_file() and place.suffix != ".py":
+            found.add(place)
+        elif place.is_dir() and place.parent == file.parent and not name.startswith((".", "_")):
+            found |= {data for data in place.iterdir() if data.is_file() and data.suffix not in (".py", ".pyc")}
     return sorted(found)

@@ -7,6 +7,7 @@ import ast
 import os
 import re
 import shutil
+import sys
 import time
 from pathlib import Path
 
@@ -297,3 +298,68 @@ def test_fingerprints_refuse_imports_that_they_cannot_follow(tmp_path, fingerpri
     script.write_text("from icha.simulation import simulate\n")
     publish = REPOSITORY / "workflow/scripts/publish.py"
     assert fingerprint.code_fingerprint(script) != fingerprint.code_fingerprint(publish)
+
+
+@pytest.fixture
+def syntax(monkeypatch, tmp_path):
+    """The module of the workflow, as a process begins with it, which keeps what it has read in `tmp_path`."""
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import syntax
+
+    monkeypatch.setattr(syntax, "_KEPT", tmp_path / "kept/syntax.json")
+
+    def begun():
+        for function in (syntax.syntax_of, syntax._kept, syntax._reader):
+            function.cache_clear()
+        syntax._new.clear()
+        return syntax
+
+    yield begun
+    begun()
+
+
+def _kept(syntax):
+    syntax._keep()
+    return syntax._KEPT.read_text(encoding="ascii")
+
+
+def test_what_a_module_says_is_read_once_and_again_when_it_says_something_else(tmp_path, syntax, monkeypatch):
+    module = tmp_path / "module.py"
+    module.write_text('from os import path, sep\n\nNAME = "data.csv"\n')
+    read = syntax().syntax_of(module)
+    assert [tuple(each) for each in read.imports] == [(0, "os", "path"), (0, "os", "sep")]
+    assert read.names == ["data.csv"]
+    _kept(syntax_module := sys.modules["syntax"])
+    with monkeypatch.context() as without:
+        without.setattr(syntax_module, "_read", None)
+        again = syntax().syntax_of(module)
+    assert (again.digest, again.names) == (read.digest, read.names)
+    assert [tuple(each) for each in again.imports] == [tuple(each) for each in read.imports]
+    module.write_text('from os import path, sep\n\nNAME = "data.txt"\n')
+    other = syntax().syntax_of(module)
+    assert other.names == ["data.txt"] and other.digest != read.digest
+
+
+@pytest.mark.parametrize("spoil", ["damaged", "cut off", "by another version"])
+def test_what_was_kept_of_modules_is_believed_only_if_it_is_what_was_written(tmp_path, syntax, spoil, monkeypatch):
+    module = tmp_path / "module.py"
+    module.write_text("from os import path\n")
+    read = syntax().syntax_of(module)
+    text = _kept(sys.modules["syntax"])
+    file = sys.modules["syntax"]._KEPT
+    if spoil == "by another version":
+        monkeypatch.setattr(sys, "version", "3.99")
+    else:
+        assert '"path"' in text
+        file.write_text(text.replace('"path"', '"sep"') if spoil == "damaged" else text[:-30], encoding="ascii")
+    assert syntax()._kept() == {}
+    assert syntax().syntax_of(module) == read
+
+
+def test_what_cannot_be_kept_of_modules_is_read_all_the_same(tmp_path, syntax, monkeypatch):
+    module = tmp_path / "module.py"
+    module.write_text("import os\n")
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(syntax(), "_KEPT", tmp_path / "file/syntax.json")
+    assert syntax().syntax_of(module).imports == [(0, "os", None)]
+    sys.modules["syntax"]._keep()
