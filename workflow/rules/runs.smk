@@ -14,6 +14,15 @@ wildcard_constraints:
 CODE_OF_RUN = {model: code_of("run_sweep.py", f"icha.models.{model}") for model in MODELS}
 
 
+def by_case(value):
+    """What `value` says of the case of a run, as a function of its wildcards.
+
+    Where it is the same for all runs, it itself: Snakemake calls no function for each of ten thousand runs.
+    """
+    found = {value(case) for case in FILES.runs.values()}
+    return found.pop() if len(found) == 1 else lambda wildcards: value(case_of(wildcards))
+
+
 rule run:
     input:
         surface="<results>/surfaces/{surface}/seed{seed}.nc",
@@ -25,10 +34,10 @@ rule run:
         "<benchmarks>/runs/<run>.jsonl"
     conda:
         "../envs/icha.yaml"
-    threads: lambda wildcards: run_threads(CAMPAIGN, case_of(wildcards))
+    threads: by_case(lambda case: run_threads(CAMPAIGN, case))
     resources:
-        mem_mb=lambda wildcards: run_memory(CAMPAIGN, case_of(wildcards)),
-        runtime=lambda wildcards: run_minutes(CAMPAIGN, case_of(wildcards)),
+        mem_mb=by_case(lambda case: run_memory(CAMPAIGN, case)),
+        runtime=by_case(lambda case: run_minutes(CAMPAIGN, case)),
     params:
         settings=lambda wildcards: run_settings(CAMPAIGN, case_of(wildcards)),
         attributes=lambda wildcards: ATTRIBUTES
@@ -36,7 +45,7 @@ rule run:
             "study": wildcards.study,
             "config_sha256": run_sha256(CAMPAIGN, case_of(wildcards)),
         },
-        code=lambda wildcards: CODE_OF_RUN[case_of(wildcards).model],
+        code=by_case(lambda case: CODE_OF_RUN[case.model]),
     message:
         "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
         "{wildcards.model_folder}{wildcards.material}"
