@@ -6,7 +6,7 @@ They are identities and bounds of the physics, evaluated on the dataset alone.
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import xarray as xr
 
 from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.contact.models import BOUNDARY_ELEMENTS
-from icha.datasets.campaign import loading_stops, run_labels, select_run
+from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.datasets.variables.run import PATCHES
@@ -62,18 +62,40 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
     run : a dataset as `icha.simulate` returns it.
     subject : name of the run in the findings.
     """
-    return tuple(_at_most(*finding, subject) for finding in _findings(run))
+    return _checked(run.variables, run.attrs, subject)
 
 
-def _findings(run: xr.Dataset) -> Iterator[Finding]:
-    yield "finite", _not_finite(run), 0, "number of values that are not finite"
+@dataclass(frozen=True)
+class _Run:
+    """A run as bare arrays: of thousands of small runs, labels take many times as long as the checks."""
+
+    values: dict[str, np.ndarray]
+    sizes: dict[str, int]
+    attrs: Mapping[str, str]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.values
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.values[name]
+
+
+def _checked(variables: Mapping[Hashable, xr.Variable], attrs: Mapping[str, str], subject: str) -> tuple[Check, ...]:
+    """The checks of a run of these variables and attributes."""
+    values = {str(name): variable.values for name, variable in variables.items()}
+    sizes = {str(dim): size for variable in variables.values() for dim, size in variable.sizes.items()}
+    return tuple(_at_most(*finding, subject) for finding in _findings(_Run(values, sizes, attrs)))
+
+
+def _findings(run: _Run) -> Iterator[Finding]:
+    yield "finite", _not_finite(run.values.values()), 0, "number of values that are not finite"
     steps = run.sizes["step"]
     yield "steps", int(steps == 0), 0, "1 if the run has no step at all"
     if steps == 0:
         return
-    yield "residual", np.max(run["residual"].values), RESIDUAL_LIMIT, "largest equilibrium error over h_rms"
+    yield "residual", np.max(run["residual"]), RESIDUAL_LIMIT, "largest equilibrium error over h_rms"
     yield from _fronts(run)
-    yield "converged", int((run["converged"] != 1).sum()), 0, "number of steps that did not converge"
+    yield "converged", np.count_nonzero(run["converged"] != 1), 0, "number of steps that did not converge"
     yield "targets", _miss(run), TARGET_LIMIT, "largest relative distance of a step from its target"
     yield from _loading(run)
     if run.sizes.get("snapshot", 0):
@@ -93,18 +115,25 @@ def _fronts(run) -> Iterator[Finding]:
         ("pressure_residual", "pressure outside", RESIDUAL_LIMIT),
     ):
         if name in run:
-            yield short, np.max(run[name].values), limit, PATCHES[name].long_name
+            yield short, np.max(run[name]), limit, PATCHES[name].long_name
 
 
-def _not_finite(data):
-    """Number of values of a dataset that are not finite."""
-    numbers = [v.values for v in data.variables.values() if v.dtype.kind in "fiu"]
-    return sum(int(np.count_nonzero(~np.isfinite(values))) for values in numbers)
+def _not_finite(arrays):
+    """Number of values that are not finite."""
+    return sum(int(np.count_nonzero(~np.isfinite(values))) for values in arrays if values.dtype.kind in "fiu")
+
+
+# What the findings on the first loading are made of.
+_OF_LOADING = (
+    *("contact_area_fraction", "nominal_pressure", "mean_separation", "step_kind"),
+    *("jump_in_count", "coalescence_count"),
+)
 
 
 def _loading(run) -> Iterator[Finding]:
     """Findings on the first loading: the way back is another curve, and so is loading again."""
-    loading = run.isel(step=run["leg"].values == 0)
+    first = run["leg"] == 0
+    loading = {name: run[name][first] for name in _OF_LOADING}
     adhesive, height = float(run["surface_energy"]) > 0, float(run["rms_height"])
     by_cells = run.attrs.get("contact_model") == BOUNDARY_ELEMENTS
     # Two targets of different kinds may be one state but for the accuracy to which it is reached.
@@ -139,7 +168,7 @@ def _loading(run) -> Iterator[Finding]:
         )
         yield (
             "stiffness",
-            int((run["contact_stiffness"] < 0).sum()),
+            np.count_nonzero(run["contact_stiffness"] < 0),
             0,
             "number of steps with a negative contact stiffness, without adhesion",
         )
@@ -156,16 +185,16 @@ def _fall_in_loading(loading, name):
     Where two spots unite in one, it may carry less than both did at the same separation: a step may fall there, but no
     stop may.
     """
-    values, stops = loading[name].values, loading_stops(loading).values
-    united = np.cumsum(np.diff(loading["coalescence_count"].values, prepend=0) != 0)
+    values, stops = loading[name], loading["step_kind"] != BETWEEN
+    united = np.cumsum(np.diff(loading["coalescence_count"], prepend=0) != 0)
     parts = [values[stops], *(values[united == part] for part in np.unique(united))]
     return max(map(_fall, parts)) / (float(np.max(np.abs(values))) or 1.0)
 
 
 def _rises_of_separation(loading):
     """Largest rise of the mean separation from step to step, m: where nothing jumps in or unites, and elsewhere."""
-    rise = np.diff(loading["mean_separation"].values)
-    happened = np.diff(loading["jump_in_count"].values) + np.diff(loading["coalescence_count"].values) != 0
+    rise = np.diff(loading["mean_separation"])
+    happened = np.diff(loading["jump_in_count"]) + np.diff(loading["coalescence_count"]) != 0
     return tuple(float(np.max(rise[where], initial=0.0)) for where in (~happened, happened))
 
 
@@ -173,13 +202,13 @@ def _miss(run):
     """Largest relative distance between what was asked of a step and what it has."""
     scale = float(run["contact_modulus"])
     reached = {
-        "reduced_pressure": run["reduced_pressure"].values,
-        "relative_load": run["nominal_pressure"].values / scale,
-        "area_fraction": run["contact_area_fraction"].values,
-        "mean_separation": run["mean_separation"].values,
-        BETWEEN: run["mean_separation"].values,
+        "reduced_pressure": run["reduced_pressure"],
+        "relative_load": run["nominal_pressure"] / scale,
+        "area_fraction": run["contact_area_fraction"],
+        "mean_separation": run["mean_separation"],
+        BETWEEN: run["mean_separation"],
     }
-    target, kinds = run["step_target"].values, [str(kind) for kind in run["step_kind"].values]
+    target, kinds = run["step_target"], [str(kind) for kind in run["step_kind"]]
     value = np.array([reached[kind][k] for k, kind in enumerate(kinds)])
     # A path may turn back at no load, of which no part can be taken: then it is one of the run's largest load.
     whole = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
@@ -188,23 +217,23 @@ def _miss(run):
 
 def _identities(run):
     """Largest errors of the identities between a snapshot's distributions and spots, and its step."""
-    at = run["snapshot_step"].values.astype(int)
-    area = run["contact_area_fraction"].values[at]
-    pressure = run["nominal_pressure"].values[at]
+    at = run["snapshot_step"].astype(int)
+    area = run["contact_area_fraction"][at]
+    pressure = run["nominal_pressure"][at]
 
     # Before first contact there is no area to compare with, and both sides are zero.
     area_scale = np.maximum(area, np.finfo(float).tiny)
 
-    pressure_content = run["pressure_density"].values * np.diff(run["pressure_bin_edges"].values)
-    load = pressure_content * run["pressure_bin_mean"].values
-    gap_content = run["gap_density"].values * np.diff(run["gap_bin_edges"].values)
+    pressure_content = run["pressure_density"] * np.diff(run["pressure_bin_edges"])
+    load = pressure_content * run["pressure_bin_mean"]
+    gap_content = run["gap_density"] * np.diff(run["gap_bin_edges"])
     # With adhesion tension and compression nearly cancel: errors are measured against the sum of both.
     load_scale = np.maximum(np.abs(load).sum(axis=1), np.finfo(float).tiny)
 
     cell = float(run["period"]) ** 2
-    snapshot = run["spot_snapshot"].values.astype(int)
-    spot_area = np.bincount(snapshot, run["spot_area"].values / cell, len(at))
-    spot_load = np.bincount(snapshot, run["spot_force"].values / cell, len(at))
+    snapshot = run["spot_snapshot"].astype(int)
+    spot_area = np.bincount(snapshot, run["spot_area"] / cell, len(at))
+    spot_load = np.bincount(snapshot, run["spot_force"] / cell, len(at))
 
     yield (
         "area from P(p)",
@@ -216,10 +245,10 @@ def _identities(run):
         np.max(np.abs(load.sum(axis=1) - pressure) / load_scale),
         "integral of p P(p) over p against F/A0, over the sum of compression and tension",
     )
-    overlap = run["overlap_fraction"].values
+    overlap = run["overlap_fraction"]
     yield (
         "P(u) complete",
-        np.max(np.abs(gap_content.sum(axis=1) + area - run["area_beyond_edges"].values + overlap - 1)),
+        np.max(np.abs(gap_content.sum(axis=1) + area - run["area_beyond_edges"] + overlap - 1)),
         "integral of P(u) over u, plus A/A0 within the edges, plus overlap, against 1",
     )
     yield "area of spots", np.max(np.abs(spot_area - area) / area_scale), "sum of the spots' areas against A/A0"
@@ -238,14 +267,14 @@ EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_c
 
 def _largest_work(run):
     """The scale of energies of a run: as differences of works they are as accurate as the largest of those."""
-    return float(np.max(np.abs(run["work"].values))) or 1.0
+    return float(np.max(np.abs(run["work"]))) or 1.0
 
 
 def _cycle(run) -> Iterator[Finding]:
     """Findings on the events and jumps of a run that goes on after its first loading."""
-    scale, last = _largest_work(run), run.isel(step=-1)
-    logged = np.bincount(run["event_kind"].values, minlength=len(EVENT_COUNTS))
-    counted = np.array([int(last[name]) for name in EVENT_COUNTS])
+    scale = _largest_work(run)
+    logged = np.bincount(run["event_kind"], minlength=len(EVENT_COUNTS))
+    counted = np.array([int(run[name][-1]) for name in EVENT_COUNTS])
     yield (
         "events",
         np.abs(logged - counted).sum(),
@@ -253,7 +282,7 @@ def _cycle(run) -> Iterator[Finding]:
         "number of events that are counted and not logged, or logged only",
     )
     # A single jump into contact may be a little uphill: Wu's distance is that of a lone asperity, its images are not.
-    jumps = float(last["dissipated_by_jump_in"] + last["dissipated_by_jump_off"])
+    jumps = float(run["dissipated_by_jump_in"][-1] + run["dissipated_by_jump_off"][-1])
     yield (
         "jumps lose energy",
         -min(jumps, 0.0) / scale,
@@ -264,7 +293,7 @@ def _cycle(run) -> Iterator[Finding]:
 
 def _loop(run) -> Iterator[Finding]:
     """Findings on a run that ends in separation: its loss, and that nothing is left in contact."""
-    scale, last = _largest_work(run), run.isel(step=-1)
+    scale = _largest_work(run)
     loss = float(run["hysteresis_loss"])
     parts = sum(float(run[name]) for name in LOSSES if name in run)
     yield (
@@ -275,18 +304,18 @@ def _loop(run) -> Iterator[Finding]:
     )
     yield (
         "loss is the work",
-        abs(loss - float(last["work"])) / scale,
+        abs(loss - float(run["work"][-1])) / scale,
         IDENTITY_LIMIT,
         "hysteresis loss against the work done up to complete separation, over the largest work",
     )
-    yield "separated: spots", float(last["spot_count"]), 0, "number of spots left in contact at the end of unloading"
+    yield "separated: spots", float(run["spot_count"][-1]), 0, "number of spots left in contact at the end of unloading"
     yield (
         "separated: pressure",
-        abs(float(last["nominal_pressure"])),
+        abs(float(run["nominal_pressure"][-1])),
         0,
         "nominal pressure left at the end of unloading, in Pa",
     )
-    back = run["nominal_pressure"].values[run["leg"].values == int(last["leg"])]
+    back = run["nominal_pressure"][run["leg"] == int(run["leg"][-1])]
     yield (
         "pull-off pressure",
         abs(float(run["pull_off_pressure"]) + back.min()) / (np.abs(back).max() or 1.0),
@@ -294,7 +323,7 @@ def _loop(run) -> Iterator[Finding]:
         "pull-off pressure against the largest tension of the last unloading, over the largest pressure there",
     )
     # What asperities unite by a rule patches do by themselves, and as they came.
-    united = run.attrs.get("contact_model") != BOUNDARY_ELEMENTS and int(last["coalescence_count"]) > 0
+    united = run.attrs.get("contact_model") != BOUNDARY_ELEMENTS and int(run["coalescence_count"][-1]) > 0
     if float(run["surface_energy"]) == 0 and not united:
         yield (
             "loop closes",
@@ -333,13 +362,13 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
         bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in variables)
         none_of("described", bare, "number of variables without units or long name", study)
     for labels in present:
-        run = select_run(tree, labels)
+        variables, attrs = variables_of_run(tree, labels)
         # What a failed run has is not used; of it there is nothing to say but why it failed.
-        if "incomplete" in run.attrs:
-            checks.append(Check(COMPLETED, 1.0, 0.0, False, run.attrs["incomplete"], str(labels)))
+        if "incomplete" in attrs:
+            checks.append(Check(COMPLETED, 1.0, 0.0, False, attrs["incomplete"], str(labels)))
             continue
         checks.append(Check(COMPLETED, 0.0, 0.0, True, "the run reached the end of its path", str(labels)))
-        checks.extend(check_run(run, str(labels)))
+        checks.extend(_checked(variables, attrs, str(labels)))
     return tuple(checks)
 
 
@@ -357,7 +386,8 @@ def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]
 
 def _of_solver(solution) -> Iterator[Finding]:
     """Findings on how well a solution was found."""
-    yield "finite", _not_finite(solution), 0, "number of values that are not finite"
+    values = (variable.values for variable in solution.variables.values())
+    yield "finite", _not_finite(values), 0, "number of values that are not finite"
     yield (
         "converged",
         float(solution["residual"]) / float(solution["tolerance"]),

@@ -52,6 +52,14 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     ValueError
         If the campaign has no such run; the message says what it has.
     """
+    variables, attrs = variables_of_run(tree, labels)
+    of_study = tree.children[RunLabels(*labels).study].dataset.coords
+    coords = {name: variables.pop(name) for name in of_study if name not in LABELS}
+    return xr.Dataset(variables, coords, attrs)
+
+
+def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict[str, xr.Variable], dict]:
+    """Variables and attributes of `select_run`; for thousands of runs the dataset itself would take too long."""
     labels = RunLabels(*labels)
     if labels.study not in tree.children:
         raise ValueError(f"no study {labels.study!r}; there are {', '.join(tree.children)}")
@@ -80,9 +88,8 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
         if own.dtype.kind == "f" and own.encoding.get("dtype") == np.dtype("int32"):
             own = xr.Variable(own.dims, own.values.astype(np.int32), own.attrs)  # a float for other runs that lack it
         variables[name] = own
-    coords = {name: variables.pop(name) for name in study.coords if name not in LABELS}
     attrs = study.attrs | {"contact_model": labels.model} | ({"incomplete": failure.item()} if incomplete else {})
-    return xr.Dataset(variables, coords, attrs)
+    return variables, attrs
 
 
 # What the dataset of a campaign says of a run.
