@@ -6,7 +6,7 @@ from snakemake.utils import min_version
 
 from icha.planning.software import missing_software
 
-min_version("9.14")
+min_version("9.17")
 
 
 include: "workflow/rules/common.smk"

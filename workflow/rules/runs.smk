@@ -1,7 +1,7 @@
 # One sweep each, by asperities or by another model of contact, whose runs are in a folder of its name.
 
 from icha.configuration.settings import run_settings, run_sha256
-from icha.contact.models import MODELS
+from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.labels import model_folder
 from icha.planning.resources import run_memory, run_minutes, run_threads
 
@@ -34,6 +34,8 @@ rule run:
         "<benchmarks>/runs/<run>.jsonl"
     conda:
         "../envs/icha.yaml"
+    # The long ones first, or the last of them would keep one core busy at the end.
+    priority: by_case(lambda case: int(case.model == BOUNDARY_ELEMENTS))
     threads: by_case(lambda case: run_threads(CAMPAIGN, case))
     resources:
         mem_mb=by_case(lambda case: run_memory(CAMPAIGN, case)),
