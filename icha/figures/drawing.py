@@ -7,10 +7,9 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import netCDF4
 from matplotlib.figure import Figure
 
-from icha.datasets.files import read_campaign, read_dataset
+from icha.datasets.files import has_groups, read_campaign, read_dataset
 from icha.figures.registry import figure_module
 from icha.figures.select import NothingToDraw
 from icha.figures.style import GREY, new_figure, save, styled
@@ -45,12 +44,7 @@ def _read(files):
         return [_read(file) for file in files]
     if not str(files).endswith(".nc"):
         return files
-    return read_campaign(files) if _has_groups(files) else read_dataset(files)
-
-
-def _has_groups(file):
-    with netCDF4.Dataset(file) as content:
-        return bool(content.groups)
+    return read_campaign(files) if has_groups(files) else read_dataset(files)
 
 
 @styled
