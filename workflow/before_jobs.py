@@ -20,6 +20,16 @@ def end_jobs_with_this_process() -> None:
     os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
 
 
+def start_without_limit(workflow) -> None:
+    """Do without Snakemake's limit of jobs started a second, where jobs run on this machine.
+
+    For the limit's sake every job that ends wakes the scheduler once a second from then on: of a thousand short jobs
+    that takes most of a core. There is no option to leave it out.
+    """
+    if workflow.local_exec:
+        workflow.scheduler.job_rate_limiter = None
+
+
 class Campaign:
     """A campaign in this working directory that is about to be run: its results looked at, its lock held.
 
