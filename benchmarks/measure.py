@@ -10,6 +10,7 @@ import subprocess
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -25,11 +26,12 @@ class Measurement:
     last_words: str
 
 
-def measure(command: list[str], threads: int, limit: float) -> Measurement:
-    """Run the command with a number of threads; it is killed after `limit` seconds."""
+def measure(command: list[str], threads: int, limit: float, folder: Path | None = None) -> Measurement:
+    """Run the command with a number of threads, in a folder; it is killed after `limit` seconds."""
     environment = os.environ | dict.fromkeys(THREADS, str(threads)) | {"OMP_WAIT_POLICY": "passive"}
     start = time.perf_counter()
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    output = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=folder, env=environment, **output)
     lines: list[str] = []
     reader = threading.Thread(target=lambda: lines.extend(process.stderr))
     reader.start()

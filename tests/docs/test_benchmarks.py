@@ -151,13 +151,35 @@ def test_page_and_figures_are_written_alike_from_the_same_results(page, results,
 
 def test_a_campaign_spends_its_time_in_the_solver_or_not(page):
     runs = {"grid": 128, "runs": 1000, "seconds_a_run": 0.3, "cores": 2, "whole": {"wall": 250.0}}
-    plan = {"runs": 10000, "wall": 61.0, "peak": 2**29, "outcome": "complete"}
+    plan = {"runs": 10000, "wall": 16.0, "peak": 2**29, "outcome": "complete"}
     assert page.solver_share(runs) == pytest.approx(0.6)
     rows = [verdict.row() for verdict in page.verdicts({"campaign-runs-128": runs, "campaign-plan": plan})]
-    (share,) = [row for row in rows if row[0].startswith("1 000 small runs")]
+    (share,) = [row for row in rows if row[0].startswith("1 000 runs at 128²")]
     (planned,) = [row for row in rows if row[0].startswith("plan of a campaign")]
-    assert share[1:] == ["40% at 128²", "reached"]
-    assert planned[1] == "61 s, 0.5 GiB" and planned[2] != "reached"
+    assert share[1:] == ["60% at 128²", "reached"]
+    assert planned[1] == "16 s, 0.5 GiB" and planned[2] != "reached"
+
+
+def test_what_people_wait_for_is_held_against_processor_times(page):
+    call = {"wall": 9.0, "peak": 2**27, "outcome": "complete"}
+    results = {
+        "start-help": call | {"processor": 0.1},
+        "start-show": call | {"processor": 1.5},
+        "start-simulate": {"first": 1.2, "again": 0.2, "overhead": 1.0},
+    }
+    rows = {verdict.target: verdict.row()[1:] for verdict in page.verdicts(results)}
+    assert rows["`icha --help`: at most 0.3 s of processor"] == ["0.10 s", "reached"]
+    assert rows["`icha show` of a run: at most 1 s of processor"] == ["1.50 s", "**not reached**"]
+    (first,) = [row for target, row in rows.items() if "first `icha.simulate`" in target]
+    assert first == ["1.00 s", "reached"]
+
+
+def test_dataset_and_checks_have_one_target_together(page):
+    parts = {f"dataset-{part}-10000": {"wall": 59.0, "outcome": "complete"} for part in ("write", "check")}
+    (found,) = [verdict for verdict in page.verdicts(parts) if verdict.target.startswith("campaign dataset")]
+    assert found.reached and found.measured == "59 s and 59 s"
+    parts["dataset-check-10000"]["wall"] = 62.0
+    assert verdict(page, parts, "campaign dataset").reached is False
 
 
 def test_own_boundary_elements_are_no_other_code_and_have_targets_of_their_own(page, results):
