@@ -61,6 +61,15 @@ def case_of(wildcards):
     return held(FILES.runs, results.RUN, wildcards)
 
 
+def by_case(value):
+    """What `value` says of the case of a run, as a function of its wildcards.
+
+    Where it is the same for all runs, it itself: Snakemake calls no function for each of ten thousand runs.
+    """
+    found = {value(case) for case in FILES.runs.values()}
+    return found.pop() if len(found) == 1 else lambda wildcards: value(case_of(wildcards))
+
+
 def as_it_is(value):
     """A value as a parameter of a rule: what users have written may hold braces, which are no wildcards."""
     return lambda wildcards: value

@@ -14,15 +14,6 @@ wildcard_constraints:
 CODE_OF_RUN = {model: code_of("run_sweep.py", f"icha.models.{model}") for model in MODELS}
 
 
-def by_case(value):
-    """What `value` says of the case of a run, as a function of its wildcards.
-
-    Where it is the same for all runs, it itself: Snakemake calls no function for each of ten thousand runs.
-    """
-    found = {value(case) for case in FILES.runs.values()}
-    return found.pop() if len(found) == 1 else lambda wildcards: value(case_of(wildcards))
-
-
 rule run:
     input:
         surface="<results>/surfaces/{surface}/seed{seed}.nc",
