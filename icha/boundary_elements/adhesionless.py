@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from icha.boundary_elements.elasticity import solve_bonds
+from icha.boundary_elements.elasticity import Contact, rounding, solve_bonds
 from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.regions import merged
 from icha.contact.failures import FullContact, NotConverged
 
-# Error of the displacement in contact, over the surface's largest height: while cells still come and go, and at last.
-_COARSE, _EXACT = 1e-7, 1e-12
+# Error of the displacement in contact over the surface's largest height, at last. While cells still come and go, what
+# is left of the error.
+_EXACT, _COARSE = 1e-12, 0.03
 _MAX_CHANGES = 200
 
 
 def pressed(
-    space: HalfSpace, heights: np.ndarray, separation: float, touching: np.ndarray, pressure: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells in contact, pressures (E*) and gaps (cells), all (n, n), at a separation (cells).
+    space: HalfSpace,
+    heights: dict[np.dtype, np.ndarray],
+    contact: Contact,
+    *,
+    separation: float | None = None,
+    load: float | None = None,
+) -> tuple[Contact, np.ndarray, float]:
+    """The contact at a separation (cells), or under a mean pressure (E*); the gap, (n, n), and the separation in cells.
+
+    contact: one not far away; under a given pressure it has cells.
 
     Cells in tension leave the contact and cells that overlap join it until there are neither: a Newton's method for the
     complementarity of pressure and gap (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865).
@@ -28,24 +37,46 @@ def pressed(
     NotConverged
         If the contact does not settle.
     """
-    overlap = heights - separation
-    coarse, exact = (part * np.abs(heights).max() for part in (_COARSE, _EXACT))
-    tolerance = coarse
-    bonds = np.zeros_like(overlap)
-    touching = touching | (overlap > 0) if not touching.any() else touching
+    exactly, singly = heights[np.dtype(float)], heights[np.dtype(np.float32)]
+    exact = _EXACT * float(np.abs(exactly).max())
+    cells, pressure, rough = contact.cells, contact.pressure, True
+    if not len(cells):
+        cells = np.flatnonzero(exactly > separation)
+        pressure = np.zeros(len(cells))
     for _ in range(_MAX_CHANGES):
-        if not touching.any():
-            return touching, np.zeros_like(overlap), -overlap
-        if touching.all():
+        if not len(cells):
+            return Contact(cells, pressure, pressure), separation - exactly, separation
+        if len(cells) == exactly.size:
             raise FullContact("every cell touches")
-        pressure, displaced = solve_bonds(space, touching, bonds, overlap, pressure, tolerance)
-        gap = displaced - overlap
+        height = exactly.ravel()[cells]
+        if load is not None:
+            pressure = pressure * (load * exactly.size / np.sum(pressure))
+        pressure, displaced, left = solve_bonds(
+            space,
+            cells,
+            np.zeros(len(cells)),
+            height - (separation or 0.0),
+            pressure,
+            rounding(exactly) if rough else exact,
+            np.float32 if rough else float,
+            gain=_COARSE,
+            balanced=load is not None,
+        )
+        if load is not None:
+            separation = float(np.mean(height - displaced.ravel()[cells]))
+        gap = displaced
+        gap -= singly if rough else exactly
+        gap += gap.dtype.type(separation)
+        gap.ravel()[cells] = -left
+        off = max(float(np.abs(left).max()), exact)
         # Less pressure than makes up for the error of a gap is none.
-        leaving, joining = touching & (pressure < tolerance), ~touching & (gap < -tolerance)
-        touching = (touching & ~leaving) | joining
-        if leaving.any() or joining.any():
+        staying = pressure >= (0.0 if rough else off)
+        joining = np.flatnonzero(gap < -off)
+        if staying.all() and not len(joining):
+            if not rough:
+                return Contact(cells, np.ones(len(cells)), pressure), gap, separation
+            rough = off > rounding(exactly)
             continue
-        if tolerance == exact:
-            return touching, pressure, gap
-        tolerance = exact
+        cells, order = merged(cells[staying], joining)
+        pressure = np.concatenate([pressure[staying], np.zeros(len(joining))])[order]
     raise NotConverged("the contact did not settle")

@@ -6,14 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.boundary_elements.elasticity import Held
-from icha.boundary_elements.front import Front
+from icha.boundary_elements.elasticity import Contact, Held
+from icha.boundary_elements.front import COMPLIANCE, Front
 from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.newton import beside, front_at_rest
+from icha.boundary_elements.newton import front_at_rest
+from icha.boundary_elements.regions import region
+from icha.boundary_elements.windows import relaxed_in_windows
 from icha.contact.failures import FullContact
 
 # Deviation of sqrt(G/dgamma) at which a front rests well enough to see where new contact forms.
 _NEARLY_AT_REST = 1e-3
+# The same where it is clear, and what is clear: by so much of the gap at which a cell lets go.
+_IN_SIGHT, _CLEARLY = 3e-2, 0.1
 # More of the surface than this in contact, and the rest follows.
 _NEARLY_ALL = 0.98
 
@@ -32,28 +36,31 @@ class Summits:
     radius: np.ndarray
 
     def contacts(self, which: np.ndarray, grid: int) -> np.ndarray:
-        """Cells, (n, n) of bool, that these summits (k,) touch with when they jump into contact."""
-        found = np.zeros((grid, grid), dtype=bool)
+        """Cells, counted through, that these summits (k,) touch with when they jump into contact; some come twice."""
+        found = []
         for cell, radius in zip(self.cell[which], self.radius[which], strict=True):
             way = np.arange(-int(radius), int(radius) + 1)
-            disc = np.hypot(way[:, None], way) <= radius
-            rows, columns = (np.add.outer(at, way) % grid for at in divmod(int(cell), grid))
-            found[np.ix_(rows, columns)] |= disc
-        return found
+            rows, columns = np.nonzero(np.hypot(way[:, None], way) <= radius)
+            row, column = divmod(int(cell), grid)
+            found.append((row + way[rows]) % grid * grid + (column + way[columns]) % grid)
+        return np.concatenate([np.zeros(0, int), *found])
 
 
 def settled(
     space: HalfSpace,
     front: Front,
-    heights: np.ndarray,
+    heights: dict[np.dtype, np.ndarray],
     summits: Summits,
     separation: float,
-    state: Held,
+    contact: Contact,
     tolerance: float,
+    *,
+    near: bool = False,
 ) -> tuple[Held, int]:
     """The contact in equilibrium at a separation (cells), and how many summits within reach it left open.
 
-    tolerance: of sqrt(G/dgamma) along the fronts.
+    tolerance: of sqrt(G/dgamma) along the fronts. near: whether they are so near to rest that this shows at once where
+    new contact forms.
 
     Fronts come nearly to rest first; then all summits within reach make contact, until there is none, and fronts come
     to rest. A summit that loses the contact again stays open.
@@ -65,26 +72,42 @@ def settled(
     NotConverged
         If an equilibrium is not found.
     """
-    tried = np.zeros(heights.size, dtype=bool)
-    rest = False
+    margin = _CLEARLY * COMPLIANCE * front.strength
+    stages = [(_IN_SIGHT, margin), (_NEARLY_AT_REST, 0.0), (tolerance, 0.0)]
+    if tolerance > _NEARLY_AT_REST:
+        stages[1:] = [(tolerance, margin)]
+    if near:
+        del stages[:2]
+
+    def mended(state, restless):
+        return relaxed_in_windows(space, front, heights, separation, state, restless)
+
+    tried = np.zeros(space.size, dtype=bool)
+    stage = 0
     while True:
-        state = front_at_rest(space, front, heights, separation, state, tolerance if rest else _NEARLY_AT_REST)
-        if np.mean(state.fraction) > _NEARLY_ALL:
+        accuracy, beyond = stages[stage]
+        contact = front_at_rest(space, front, heights, separation, contact, accuracy, near=near, mended=mended)
+        if np.sum(contact.fraction) > _NEARLY_ALL * space.size:
             raise FullContact("the contact runs over the whole surface")
-        touching = state.fraction > 0
-        inside = state.gap.ravel()[summits.cell] - summits.above - summits.reach < 0
-        within = inside & ~touching.ravel()[summits.cell]
-        seeds = np.zeros(heights.size, dtype=bool)
-        seeds[summits.cell[within]] = True
-        # Without a summit, surfaces that overlap touch.
-        seeds |= ((state.gap < 0) & ~beside(touching)).ravel()
-        new = seeds & ~tried
-        if not new.any():
-            if rest:
-                return state, int(np.count_nonzero(seeds))
-            rest = True
+        within, overlapping = _within_reach(summits, contact, beyond)
+        seeds = np.union1d(summits.cell[within], overlapping)
+        new = seeds[~tried[seeds]]
+        if not len(new):
+            stage += 1
+            if stage == len(stages):
+                return contact, len(seeds)
             continue
-        rest = False
-        made = summits.contacts(within & ~tried[summits.cell], len(heights)) | new.reshape(heights.shape)
-        tried |= new
-        state = Held(np.where(made, 1.0, state.fraction), state.pressure, state.gap, 0.0, state.around)
+        stage = 0
+        made = np.union1d(summits.contacts(within & ~tried[summits.cell], space.grid), new)
+        tried[new] = True
+        contact = Contact(contact.cells, contact.fraction, contact.pressure).with_closed(made)
+
+
+def _within_reach(summits, state, margin):
+    """Which summits out of contact are within reach, by more than a margin (cells), (k,); and cells that overlap."""
+    gap = state.gap.ravel()
+    touched = region(state.cells, gap.shape)
+    within = (gap[summits.cell] - summits.above - summits.reach < -margin) & ~touched[summits.cell]
+    # Without a summit, surfaces that overlap touch; beside a front this is its own business.
+    touched[state.rim] = True
+    return within, np.flatnonzero((gap < -margin) & ~touched)

@@ -10,11 +10,11 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.boundary_elements.adhesionless import pressed
 from icha.boundary_elements.adhesive import Summits, settled
-from icha.boundary_elements.elasticity import Held
-from icha.boundary_elements.front import COMPLIANCE, Front, areas, contact_area_gradient, contact_areas, neighbours
+from icha.boundary_elements.elasticity import Contact
+from icha.boundary_elements.front import COMPLIANCE, Front, areas, contact_area_gradient, contact_areas
 from icha.boundary_elements.held_load import held
-from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.newton import FRONT_TOLERANCE, front_residual, tangent
+from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
+from icha.boundary_elements.newton import COARSE, FINE, FRONT_TOLERANCE, front_residual, tangent
 from icha.boundary_elements.patch_events import patch_events
 from icha.boundary_elements.patches import BEYOND_EDGES, edges, labelled
 from icha.boundary_elements.states import CellState
@@ -34,7 +34,7 @@ class BoundaryElements:
     """A periodic rough surface against a half-space, cell by cell: a `ContactModel`.
 
     heights: (n, n), m. spacing: m. law: of one summit, for how far its attraction reaches. The solver works in cells
-    and E*: `space`, `front` and `summits` are in these units.
+    and E*: `space`, `levels`, which are heights by precision, `front` and `summits` are in these units.
     """
 
     heights: np.ndarray
@@ -43,6 +43,7 @@ class BoundaryElements:
     rms_height: float
     asperities: Asperities
     space: HalfSpace
+    levels: dict[np.dtype, np.ndarray]
     front: Front
     summits: Summits
 
@@ -72,7 +73,9 @@ class BoundaryElements:
                 f"surface_energy: {material.surface_energy:g} J/m^2 cannot be told from none at heights like these; "
                 "needed: none at all, or more"
             )
-        return cls(surface.heights, h, law, surface.rms_height, asperities, HalfSpace.of(surface.grid), front, summits)
+        space = HalfSpace.of(surface.grid)
+        levels = in_both_precisions(surface.heights / h)
+        return cls(surface.heights, h, law, surface.rms_height, asperities, space, levels, front, summits)
 
     # --- what a path asks of every model --------------------------------------------------------------------------
 
@@ -100,8 +103,8 @@ class BoundaryElements:
         """The state at which the first summit is about to make contact."""
         reach = self.summits.reach * self.spacing if self.adhesive else 0.0
         separation = float(np.max(self.asperities.height + reach)) if self.adhesive else float(self.heights.max())
-        nothing = np.zeros(self.heights.shape)
-        return CellState(separation, nothing, nothing, separation - self.heights)
+        nothing = np.zeros(0)
+        return CellState(separation, nothing.astype(int), nothing, nothing, nothing)
 
     def equilibrium(
         self, state: CellState, separation: float, control: Control | None = None, *, let_go: int = 0
@@ -111,29 +114,41 @@ class BoundaryElements:
         Fronts lose their equilibrium together or alone without anybody's help: `let_go` changes nothing.
         """
         if control is None:
-            return self._at(state, separation)
-        return held(self, state, separation, control, self._at)
+            new = self._at(state, separation)
+        elif not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
+            new = self._pressed(state, load=control.target / self.contact_modulus)
+        else:
+            new = held(self, state, separation, control, self._at, self._events)
+        return replace(new, history=(*state.history, self._events(state, new)))
 
     def released(self, region: np.ndarray, separation: float) -> CellState:
         """The equilibrium at a separation (m) that a contact of a given region, (n, n) of bool, falls into."""
-        fraction = region.astype(float)
-        nothing = np.zeros(fraction.shape)
-        return self._at(CellState(separation, fraction, nothing, nothing), separation)
+        cells = np.flatnonzero(region)
+        nothing = np.zeros(len(cells))
+        return self.equilibrium(CellState(separation, cells, nothing + 1, nothing, nothing), separation)
 
     def pressure(self, state: CellState) -> float:
         """Force over nominal area, Pa; negative in tension."""
-        return float(np.mean(state.pressure))
+        return float(np.sum(state.pressure)) / self.heights.size
 
     def area_fraction(self, state: CellState) -> float:
         """Contact area over nominal area."""
         return float(np.sum(self.area_of_cells(state))) / self.heights.size
 
     def area_of_cells(self, state: CellState) -> np.ndarray:
-        """Contact area of every cell, (n, n), in cells: less than its fraction along the perimeter."""
+        """Contact area of every cell in contact, (k,), in cells: less than its fraction along the perimeter."""
         if self.adhesive:
-            return contact_areas(state.fraction, neighbours(state.fraction))
-        touching = state.touching
-        return touching - BEYOND_EDGES * edges(touching)
+            return contact_areas(state.fraction, state.around)
+        return 1 - BEYOND_EDGES * edges(state.cells, self.space.grid)
+
+    def gap(self, state: CellState) -> np.ndarray:
+        """Gap at the nodes, (n, n), m; zero in contact but for what bonds are drawn out."""
+        pressure = self.space.on_grid(state.cells, state.pressure / self.contact_modulus)
+        return self.space.displacement(pressure) * self.spacing + state.separation - self.heights
+
+    def fractions(self, state: CellState) -> np.ndarray:
+        """Fraction of every cell that is in contact, (n, n)."""
+        return self.space.on_grid(state.cells, state.fraction)
 
     def mean_gap(self, state: CellState) -> float:
         """Mean gap over the nominal area, m: the mean separation, for pressures displace no mean plane."""
@@ -141,7 +156,7 @@ class BoundaryElements:
 
     def spot_count(self, state: CellState) -> int:
         """Number of patches."""
-        return labelled(state.touching)[1]
+        return labelled(state.cells, self.space.grid)[1]
 
     def stiffness(self, state: CellState) -> float:
         """Contact stiffness -dp/du, fronts moving along, Pa/m."""
@@ -165,70 +180,85 @@ class BoundaryElements:
 
     # --- on the way -----------------------------------------------------------------------------------------------
 
-    def _cells(self, state):
-        """The state in the units of the solver; the energy is not needed."""
-        pressure, gap = state.pressure / self.contact_modulus, state.gap / self.spacing
-        return Held(state.fraction, pressure, gap, 0.0, neighbours(state.fraction))
-
-    def _on_the_way(self, state, separation):
-        """The state, and if it is not far to a separation (m) what its rates make of it there."""
-        cells = self._cells(state)
+    def _towards(self, state, separation):
+        """The contact of a state, and if it is not far to a separation (m) what its rates make of it there."""
+        contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         if state.rates is None:
-            return cells
+            return contact
         way = (separation - state.separation) / self.spacing
         change = state.rates[0] * way
         if np.abs(change).max() > _NEAR:
-            return cells
+            return contact
         fraction = np.clip(state.fraction + change, 0.0, 1.0)
-        return Held(fraction, cells.pressure + state.rates[1] * way, cells.gap, 0.0, neighbours(fraction))
+        touching = fraction > 0
+        return Contact(state.cells[touching], fraction[touching], (contact.pressure + state.rates[1] * way)[touching])
 
-    def _at(self, state, separation, tolerance=FRONT_TOLERANCE):
-        """The equilibrium at a separation, m."""
-        h = self.spacing
-        heights, u = self.heights / h, separation / h
-        if self.adhesive:
-            cells, pending = settled(
-                self.space, self.front, heights, self.summits, u, self._on_the_way(state, separation), tolerance
-            )
-            fraction, pressure, gap = cells.fraction, cells.pressure, cells.gap
-            residual = front_residual(self.front, cells)
-        else:
-            touching, pressure, gap = pressed(
-                self.space, heights, u, state.touching, state.pressure / self.contact_modulus
-            )
-            fraction, pending, residual = touching.astype(float), 0, 0.0
-        closed = np.abs(gap[fraction >= 1]).max(initial=0.0)
+    def _at(self, state, separation, tolerance=FRONT_TOLERANCE, *, near=False, same_slopes=False):
+        """The equilibrium at a separation, m; near: next to the state, same_slopes: and with its slopes."""
+        if not self.adhesive:
+            return self._pressed(state, separation=separation / self.spacing)
+        cells, pending = settled(
+            self.space,
+            self.front,
+            self.levels,
+            self.summits,
+            separation / self.spacing,
+            self._towards(state, separation),
+            tolerance,
+            near=near,
+        )
+        closed = cells.gap.ravel()[cells.cells[cells.fraction >= 1]]
         new = CellState(
             separation,
-            fraction,
-            pressure * self.contact_modulus,
-            gap * h,
-            front_residual=residual,
-            gap_residual=max(closed, -gap[fraction <= 0].min(initial=0.0)) * h,
+            cells.cells,
+            cells.fraction,
+            cells.pressure * self.contact_modulus,
+            cells.around,
+            front_residual=front_residual(self.front, cells),
+            gap_residual=max(np.abs(closed).max(initial=0.0), -cells.gap.min(initial=0.0)) * self.spacing,
             pending=pending,
         )
-        events = patch_events(state, new, self._set_free, self.summits.cell, h)
-        return replace(self._with_slopes(new), history=(*state.history, events))
+        if same_slopes and np.array_equal(new.cells, state.cells):
+            return replace(new, pressure_slope=state.pressure_slope, area_slope=state.area_slope, rates=state.rates)
+        return self._with_slopes(new, min(max(tolerance, FINE), COARSE))
 
-    def _with_slopes(self, state):
+    def _pressed(self, state, **given):
+        """The equilibrium without adhesion at a separation (cells) or under a load (E*)."""
+        contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
+        contact, gap, separation = pressed(self.space, self.levels, contact, **given)
+        new = CellState(
+            separation * self.spacing,
+            contact.cells,
+            contact.fraction,
+            contact.pressure * self.contact_modulus,
+            np.zeros(len(contact.cells)),
+            gap_residual=max(np.abs(gap.ravel()[contact.cells]).max(initial=0.0), -gap.min()) * self.spacing,
+        )
+        return self._with_slopes(new, FINE)
+
+    def _events(self, before, after):
+        """The events between two states that follow each other."""
+        return patch_events(before, after, self._set_free, self.summits.cell, self.space.grid, self.spacing)
+
+    def _with_slopes(self, state, accuracy):
         """The state with the derivatives of pressure and area."""
-        if not state.touching.any():
+        if not len(state.cells):
             return state
-        cells = self._cells(state)
-        fraction, pressure = tangent(self.space, self.front, cells)
-        stiffer = float(np.mean(pressure)) * self.contact_modulus / self.spacing
+        fraction, pressure = tangent(self.space, self.front, state.cells, state.fraction, state.around, accuracy)
+        cells = self.heights.size * self.spacing
+        stiffer = float(np.sum(pressure)) * self.contact_modulus / cells
         if self.adhesive:
-            wider = float(np.mean(contact_area_gradient(state.fraction, cells.around) * fraction)) / self.spacing
+            wider = float(np.sum(contact_area_gradient(state.fraction, state.around) * fraction)) / cells
         else:
             # Cells come and go as wholes; in the mean the area grows about in proportion to the load.
             wider = self.area_fraction(state) * stiffer / self.pressure(state)
         return replace(state, pressure_slope=stiffer, area_slope=wider, rates=(fraction, pressure))
 
     def _energy_of_cells(self, state):
-        """Elastic energy less that of adhesion of every cell, J/m^2."""
-        elastic = 0.5 * state.pressure * (self.heights - state.separation)
-        return elastic - self.law.material.surface_energy * areas(state.fraction, neighbours(state.fraction))
+        """Elastic energy less that of adhesion of every cell in contact, (k,), J/m^2."""
+        elastic = 0.5 * state.pressure * (self.heights.ravel()[state.cells] - state.separation)
+        return elastic - self.law.material.surface_energy * areas(state.fraction, state.around)
 
     def _set_free(self, state):
         """What every cell would set free if its patch jumped, J/m^2: without adhesion nothing jumps."""
-        return self._energy_of_cells(state) if self.adhesive else np.zeros(state.fraction.shape)
+        return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))

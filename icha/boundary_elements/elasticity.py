@@ -8,105 +8,155 @@ import numpy as np
 
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.regions import beside, merged
 from icha.contact.failures import FullContact, NotConverged
 
-# Compliance of a lone cell, h/E*, for the conditioning of bonds.
+# Compliance of a lone cell, h/E*, for the conditioning of bonds; and that of the shortest waves, 2/q, the least.
 _CELL = 1.12
+_LEAST_COMPLIANCE = np.sqrt(2) / np.pi
 _MAX_ITERATIONS = 300
+# Displacements in single precision are off by so much of the largest.
+_ROUNDING = 5e-7
 # What a correction in single precision leaves of the error, at best and at worst; and how far below what is asked.
 _GAIN, _LEAST_GAIN, _MARGIN = 1e-4, 0.5, 0.5
 _MAX_CHANGES = 200
+# What is left of the error while cells still come and go.
+_WHILE_CHANGING = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """A contact of given fractions, in elastic equilibrium. All (n, n); lengths in cells, pressures in E*.
+class Contact:
+    """The k cells in contact. Lengths in cells, pressures in E*.
 
-    fraction: of contact. pressure: mean of a cell, negative in tension. gap: at the nodes. around: of the front.
-    energy: elastic, of the half-space and the bonds, in E* cells^3.
+    cells: counted through, rising. fraction: of contact, (k,), positive. pressure: mean of a cell, (k,), negative in
+    tension.
     """
 
+    cells: np.ndarray
     fraction: np.ndarray
     pressure: np.ndarray
-    gap: np.ndarray
+
+    def with_closed(self, cells: np.ndarray) -> Contact:
+        """The same with these cells, (m,), wholly in contact."""
+        together = np.union1d(self.cells, cells)
+        fraction, pressure = np.zeros(len(together)), np.zeros(len(together))
+        old = np.searchsorted(together, self.cells)
+        fraction[old], pressure[old] = self.fraction, self.pressure
+        fraction[np.searchsorted(together, cells)] = 1.0
+        return Contact(together, fraction, pressure)
+
+
+@dataclass(frozen=True, eq=False)
+class Held(Contact):
+    """A contact in elastic equilibrium.
+
+    gap: at the nodes, (n, n). off: by how much the displacement may be, in contact. energy: elastic, of the half-space
+    and the bonds, in E* cells^3; unsure: by how much it may be larger. around: mean fraction around each of its cells,
+    (k,). rim: the cells beside, rising, (m,), and around_rim: the same there.
+    """
+
+    gap: np.ndarray = field(repr=False)
+    off: float
     energy: float
+    unsure: float
     around: np.ndarray = field(repr=False)
+    rim: np.ndarray = field(repr=False)
+    around_rim: np.ndarray = field(repr=False)
+
+
+def rounding(heights: np.ndarray) -> float:
+    """By how much displacements in single precision are off on a surface of given heights (n, n), both in cells."""
+    return _ROUNDING * float(max(heights.max(), -heights.min()))
 
 
 def solve_bonds(
     space: HalfSpace,
-    touching: np.ndarray,
+    cells: np.ndarray,
     bonds: np.ndarray,
     wanted: np.ndarray,
     pressure: np.ndarray,
     tolerance: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Pressures p with (K + bonds) p = wanted where `touching`, zero elsewhere; and K p everywhere.
+    kind: type = float,
+    *,
+    gain: float = 0.0,
+    balanced: bool = False,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pressures p with (K + bonds) p = wanted on cells, zero elsewhere; K p everywhere; and what is left of `wanted`.
 
     Corrections are found in single precision, and what they leave is found in double.
 
     Parameters
     ----------
-    touching : (n, n) of bool. bonds, wanted : (n, n), compliances and displacements. pressure : (n, n), to start from.
-    tolerance : of the displacement, in cells.
+    cells : (k,), counted through. bonds, wanted : (k,), compliances and displacements. pressure : (k,), to start from.
+    tolerance : of the displacement, in cells. kind : np.float32 for displacements, (n, n), in single precision. gain :
+    in single precision, what may be left of the error at the start. balanced : pressures change by nothing in sum, and
+    `wanted` is wanted but for a constant.
 
     Raises
     ------
     NotConverged
         If that is not reached.
     """
-    cells = np.flatnonzero(touching)
-    wanted, bonds = wanted.ravel()[cells], bonds.ravel()[cells]
-    p = np.where(touching, pressure, 0.0)
-    before = np.inf
+    p, before = pressure, np.inf
     while True:
-        displaced = space.displacement(p) if p.any() else np.zeros_like(p)
-        r = wanted - displaced.ravel()[cells] - bonds * p.ravel()[cells]
+        displaced = space.displacement(space.on_grid(cells, p, kind))
+        r = wanted - displaced.ravel()[cells] - bonds * p
+        if balanced:
+            r -= np.mean(r)
         error = np.abs(r).max(initial=0.0)
         if error <= tolerance:
-            return p, displaced
+            return p, displaced, r
         if not error <= _LEAST_GAIN * before:
             raise NotConverged(f"pressures at a given contact were not found (displacement off by {error:.1e} cells)")
         before = error
-        accuracy = max(_GAIN, _MARGIN * tolerance / error)
-        p.ravel()[cells] += error * _correction(space, cells, bonds.astype(np.float32), r / error, accuracy)
+        accuracy = max(gain if kind == np.float32 else _GAIN, _MARGIN * tolerance / error)
+        change, left, moved = _correction(space, cells, bonds, r / error, accuracy, balanced, kind == np.float32)
+        p = p + error * change
+        if kind == np.float32:
+            if np.abs(left).max() > accuracy:
+                raise NotConverged(f"pressures at a given contact were not found (to {accuracy:.1e})")
+            displaced += np.float32(error) * moved
+            return p, displaced, error * left
 
 
-def _correction(space, cells, bonds, wanted, accuracy):
-    """The pressure p with (K + bonds) p = wanted at given cells, (k,), to an accuracy of that.
+def _correction(space, cells, bonds, wanted, accuracy, balanced, everywhere):
+    """The pressure p with (K + bonds) p = wanted on cells, (k,), to an accuracy of that; what is left; K p if asked.
 
     Conjugate gradients, with the inverse of the free half-space as preconditioner. Single precision.
     """
-    field = np.zeros((space.grid, space.grid), np.float32)
-
-    def on_cells(filtered, values):
-        field.ravel()[cells] = values
-        return filtered(field).ravel()[cells]
-
-    scale = np.sqrt(_CELL / (_CELL + bonds))
+    scale, bonds = np.sqrt(_CELL / (_CELL + bonds)).astype(np.float32), bonds.astype(np.float32)
     r = wanted.astype(np.float32)
     p, way, rho = np.zeros_like(r), np.zeros_like(r), np.float32(1.0)
+    moved = np.zeros(space.shape, np.float32) if everywhere else None
     for count in range(_MAX_ITERATIONS):
         if np.abs(r).max() <= accuracy:
             break
-        z = scale * on_cells(space.pressure, scale * r)
+        z = scale * space.pressure(space.on_grid(cells, scale * r, np.float32)).ravel()[cells]
+        if balanced:
+            z -= np.mean(z)
         new = np.vdot(r, z)
         way = z + (new / rho) * way if count else z
         rho = new
-        image = on_cells(space.displacement, way) + bonds * way
+        displaced = space.displacement(space.on_grid(cells, way, np.float32))
+        image = displaced.ravel()[cells] + bonds * way
         step = rho / np.vdot(way, image)
         p += step * way
         r -= step * image
-    return p
+        if balanced:
+            r -= np.mean(r)
+        if everywhere:
+            displaced *= step
+            moved += displaced
+    return p, r, moved
 
 
 def held(
     space: HalfSpace,
-    heights: np.ndarray,
+    heights: dict[np.dtype, np.ndarray],
     separation: float,
-    fraction: np.ndarray,
-    pressure: np.ndarray,
+    contact: Contact,
     tolerance: float,
+    beyond: np.ndarray | None = None,
 ) -> Held:
     """The elastic equilibrium of given fractions of contact.
 
@@ -115,7 +165,8 @@ def held(
 
     Parameters
     ----------
-    heights : (n, n), cells. fraction, pressure : (n, n), the latter to start from. tolerance : as of `solve_bonds`.
+    heights : (n, n), cells, by precision. contact : with pressures to start from. tolerance : as of `solve_bonds`.
+    beyond : what contact outside of these cells adds to the mean fraction around every one, (n, n).
 
     Raises
     ------
@@ -124,31 +175,52 @@ def held(
     NotConverged
         If pressures or the contact under pressure are not found.
     """
-    overlap = heights - separation
-    open_before = fraction <= 0
+    kind = np.float32 if tolerance > rounding(heights[np.dtype(float)]) else float
+    cells, fraction, pressure = contact.cells, contact.fraction, contact.pressure
+    given = np.ones(len(cells), dtype=bool)
     for _ in range(_MAX_CHANGES):
-        touching = fraction > 0
-        if touching.all():
+        if len(cells) == space.size:
             raise FullContact("the contact runs over the whole surface")
-        bonds = COMPLIANCE * (1 / np.where(touching, fraction, 1.0) - 1)
-        pressure, displaced = solve_bonds(space, touching, bonds, overlap, pressure, tolerance)
-        closing = np.where(touching, (pressure > 0) & (fraction < 1), displaced - overlap < -tolerance)
-        leaving = touching & open_before & (pressure < 0)
-        if not closing.any() and not leaving.any():
-            break
-        fraction = np.where(closing, 1.0, np.where(leaving, 0.0, fraction))
+        overlap = heights[np.dtype(float)].ravel()[cells] - separation
+        bonds = COMPLIANCE * (1 / fraction - 1)
+        pressure, displaced, left = solve_bonds(
+            space, cells, bonds, overlap, pressure, tolerance, kind, gain=_WHILE_CHANGING
+        )
+        gap = displaced
+        gap -= heights[np.dtype(kind)]
+        gap += kind(separation)
+        # Of cells in contact the gap is known better than from a difference of displacements.
+        gap.ravel()[cells] = -left - bonds * pressure
+        closing = (pressure > 0) & (fraction < 1)
+        leaving = ~given & (pressure < 0)
+        overlapping = gap < -max(tolerance, float(np.abs(left).max(initial=0.0)))
+        overlapping.ravel()[cells] = False
+        joining = np.flatnonzero(overlapping)
+        if not closing.any() and not leaving.any() and not len(joining):
+            if np.abs(left).max(initial=0.0) <= tolerance:
+                break
+            continue
+        fraction = np.where(closing, 1.0, fraction)
+        cells, order = merged(cells[~leaving], joining)
+        fraction, pressure, given = (
+            np.concatenate([values[~leaving], np.full(len(joining), new, values.dtype)])[order]
+            for values, new in ((fraction, 1.0), (pressure, 0.0), (given, False))
+        )
     else:
         raise NotConverged("the contact under pressure did not settle")
     # The functional whose largest value is the energy: an error of the pressure counts only squared.
-    residual = np.where(touching, overlap - displaced - bonds * pressure, 0.0)
-    energy = 0.5 * float(np.vdot(pressure, overlap + residual))
-    return Held(fraction, pressure, displaced - overlap, energy, neighbours(fraction))
+    energy = 0.5 * float(np.sum(pressure * (overlap + left)))
+    unsure = 0.5 * float(np.sum(left**2 / (_LEAST_COMPLIANCE + bonds)))
+    if kind == np.float32:
+        unsure += 0.2 * _ROUNDING * float(np.sum(np.abs(pressure * overlap)))
+    rim = beside(cells, space.shape)
+    around = neighbours(space, cells, fraction, kind).ravel()
+    if beyond is not None:
+        around = around + beyond.ravel()
+    return Held(cells, fraction, pressure, gap, tolerance, energy, unsure, around[cells], rim, around[rim])
 
 
-def front_tension(front: Front, held: Held) -> np.ndarray:
-    """sqrt(G/dgamma) of every cell, (n, n): above 1 a cell in contact opens, below 1 an open one closes."""
-    strengths = front.strengths(held.around)
-    touching = held.fraction > 0
-    return (
-        np.where(touching, -held.pressure / np.where(touching, held.fraction, 1.0), held.gap / COMPLIANCE) / strengths
-    )
+def tension(front: Front, held: Held) -> tuple[np.ndarray, np.ndarray]:
+    """sqrt(G/dgamma): of cells in contact, (k,), which open above 1, and of those beside, (m,), which close below."""
+    inside = -held.pressure / (held.fraction * front.strengths(held.around))
+    return inside, held.gap.ravel()[held.rim] / (COMPLIANCE * front.strengths(held.around_rim))

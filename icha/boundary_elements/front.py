@@ -19,11 +19,14 @@ In units of the grid: lengths in cells, pressures in E*.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.ndimage import correlate1d
+from scipy.sparse import coo_array, csr_array, diags_array
+
+from icha.boundary_elements.kernel import HalfSpace, filtered
 
 # Compliance of the last row of a straight contact, with the kernel 2/q, over h/E*. The front's own is larger by a
 # factor at which circular spots, wherever in their cells, follow JKR (docs/short_range.md).
@@ -42,18 +45,40 @@ _profile = np.exp(-0.5 * (np.arange(-_REACH, _REACH + 1) / _WIDTH) ** 2)
 STENCIL = _profile / _profile.sum()
 
 
-def neighbours(fraction: np.ndarray) -> np.ndarray:
-    """w*f: mean fraction of contact around every cell, (n, n), periodic."""
-    along = correlate1d(fraction, STENCIL, axis=1, mode="wrap")
-    return correlate1d(along, STENCIL, axis=0, mode="wrap")
-
-
 @cache
-def neighbour_modes(grid: int) -> np.ndarray:
-    """Factors, (n, n//2 + 1), of Fourier modes that make `neighbours`, in single precision."""
+def _neighbour_modes(grid: int, kind: type) -> np.ndarray:
+    """Factors, (n, n//2 + 1), of Fourier modes that make `neighbours`."""
     way = np.arange(-_REACH, _REACH + 1)
     along = np.cos(2 * np.pi * np.outer(np.fft.fftfreq(grid), way)) @ STENCIL
-    return np.outer(along, along[: grid // 2 + 1]).astype(np.float32)
+    return np.outer(along, along[: grid // 2 + 1]).astype(kind)
+
+
+def neighbours(space: HalfSpace, cells: np.ndarray, fraction: np.ndarray, kind: type = float) -> np.ndarray:
+    """w*f: mean fraction of contact around every cell, (n, n), periodic; in a precision, of fractions on cells (k,)."""
+    return filtered(space.on_grid(cells, fraction, kind), _neighbour_modes(space.grid, kind))
+
+
+def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:
+    """The part of w between given cells, (k,), counted through on grids of a shape: (k, k), in single precision."""
+    grid, count = shape[-1], len(cells)
+    number = np.full(math.prod(shape), -1, np.int32)
+    number[cells] = np.arange(count, dtype=np.int32)
+    within = cells % grid**2
+    first, (row, column) = cells - within, np.divmod(within, grid)
+    columns = [(column + way) % grid for way in range(-_REACH, _REACH + 1)]
+    found, weights = [np.stack([np.arange(count)] * 2)], [np.full(count, STENCIL[_REACH] ** 2)]
+    for down in range(_REACH + 1):
+        start = first + (row + down) % grid * grid
+        for way, at in zip(range(-_REACH, _REACH + 1), columns, strict=True):
+            if (down, way) <= (0, 0):
+                continue
+            other = number[start + at]
+            one = np.flatnonzero(other >= 0)
+            found.append(np.stack([one, other[one]]))
+            weights.append(np.full(len(one), STENCIL[_REACH + down] * STENCIL[_REACH + way]))
+    entries = np.concatenate(weights).astype(np.float32), np.concatenate(found, axis=1)
+    half = coo_array(entries, (count, count)).tocsr()
+    return half + half.T - diags_array(half.diagonal(), dtype=np.float32, format="csr")
 
 
 def areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:

@@ -8,68 +8,122 @@ are made softer in them, which shortens the step (Levenberg and Marquardt).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from icha.boundary_elements.elasticity import Held, front_tension, held
-from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_modes
-from icha.boundary_elements.kernel import HalfSpace, filtered
+from icha.boundary_elements.elasticity import Contact, Held, held, tension
+from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_weights
+from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.regions import adjacent, region
 from icha.contact.failures import NotConverged
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
 FRONT_TOLERANCE = 1e-9
-# So near to equilibrium Newton's steps need no watching.
-_NEARLY = 1e-7
 # Of the displacement in contact, over the gap at which a cell is free.
 GAP_TOLERANCE = 1e-11
-# The same on the way, over the error of the front that is to be mended.
-_GAP_TO_FRONT = 1e-5
+# The same on the way, over the error of the front that is to be mended, at most; and over an error of the front that
+# is enough.
+_GAP_TO_FRONT, _GAP_TO_TENSION = 1e-2, 0.02
+# Of the displacement, near to rest and where energies are in doubt. Relative change of an energy that is rounding.
+_NEAR, _SAME_ENERGY = 1e-5, 1e-12
+# Pressures that are found again are so much better.
+_FINER = 0.03
 _MAX_STEPS = 400
 _MAX_KRYLOV = 60
 # Of the linear equations: never better than needed, and never worse.
-_LOOSE, _TIGHT = 1e-2, 1e-4
+COARSE, FINE = 5e-2, 1e-4
 # The rows of the front, in the preconditioner: what is left of a bond beside the half-space.
 _NET = 0.6
+# A deviation of sqrt(G/dgamma) that keeps the whole front waiting, and of how much of it.
+_RESTLESS, _FEW = 0.03, 0.05
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
 _SMALLEST_STEP = 2.0**-12
 
 
-def beside(cells: np.ndarray) -> np.ndarray:
-    """The cells and those that share an edge with one of them, (n, n) of bool, periodic."""
-    wide = cells.copy()
-    for axis in (0, 1):
-        for way in (-1, 1):
-            wide |= np.roll(cells, way, axis)
-    return wide
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """The cells that take part in a step: those in contact, and those beside it that close. Arrays of length k.
+
+    cells: rising. fraction, pressure, gap, around: of each. tension: sqrt(G/dgamma). free: whether the front there
+    would close or open.
+    """
+
+    cells: np.ndarray
+    fraction: np.ndarray
+    pressure: np.ndarray
+    gap: np.ndarray
+    around: np.ndarray
+    tension: np.ndarray
+    free: np.ndarray
+
+    def moved(self, change: np.ndarray, pressed: np.ndarray) -> Contact:
+        """The contact after changes of fraction and pressure."""
+        fraction = np.clip(self.fraction + change, 0.0, 1.0)
+        touching = fraction > 0
+        return Contact(self.cells[touching], fraction[touching], (self.pressure + pressed)[touching])
+
+    @property
+    def front(self) -> np.ndarray:
+        """Whether a cell is free or partly in contact."""
+        return self.free | ((self.fraction > 0) & (self.fraction < 1))
+
+    @property
+    def error(self) -> float:
+        """Largest deviation of sqrt(G/dgamma) from 1 where the front is free to move."""
+        return float(np.max(np.abs(self.tension - 1)[self.free], initial=0.0))
 
 
-def moving(front: Front, state: Held) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells whose front would close or open, (n, n) of bool each, and sqrt(G/dgamma)."""
-    tension = front_tension(front, state)
-    touching = state.fraction > 0
-    closing = (state.fraction < 1) & (tension < 1) & beside(touching)
-    opening = touching & (tension > 1) & beside(state.fraction < 1)
-    return closing, opening, tension
+def moving(front: Front, state: Held) -> Moving:
+    """The cells of a state that take part in a step."""
+    inside, outside = tension(front, state)
+    closed = region(state.cells[state.fraction >= 1], state.gap.shape).ravel()
+    opening = inside > 1
+    around = adjacent(state.cells[opening], state.gap.shape[-1])
+    opening[opening] = ~np.all(closed[around], axis=0) | (state.fraction[opening] < 1)
+    free = opening | ((inside < 1) & (state.fraction < 1))
+    closing = outside < 1
+    nothing = np.zeros(np.count_nonzero(closing))
+    cells = np.concatenate([state.cells, state.rim[closing]])
+    order = np.argsort(cells, kind="stable")
+    cells = cells[order]
+    parts = (
+        (state.fraction, nothing),
+        (state.pressure, nothing),
+        (state.around, state.around_rim[closing]),
+        (inside, outside[closing]),
+        (free, nothing == 0),
+    )
+    fraction, pressure, around, off, free = (np.concatenate(part)[order] for part in parts)
+    return Moving(cells, fraction, pressure, state.gap.ravel()[cells], around, off, free)
 
 
 def front_residual(front: Front, state: Held) -> float:
     """Largest deviation of sqrt(G/dgamma) from 1 where the front is free to move."""
-    closing, opening, tension = moving(front, state)
-    off = np.abs(tension - 1)[closing | opening]
-    return float(np.max(off, initial=0.0))
+    return moving(front, state).error
 
 
 def front_at_rest(
     space: HalfSpace,
     front: Front,
-    heights: np.ndarray,
+    heights: dict[np.dtype, np.ndarray],
     separation: float,
-    state: Held,
+    contact: Contact,
     tolerance: float,
+    *,
+    near: bool = False,
+    most_steps: int = _MAX_STEPS,
+    beyond: np.ndarray | None = None,
+    mended: Callable[[Held, np.ndarray], Contact | None] = lambda state, restless: None,
 ) -> Held:
-    """The contact in equilibrium at a separation (cells), down in energy from that of a state.
+    """The contact in equilibrium at a separation (cells), down in energy from that of a given one.
 
-    tolerance: of sqrt(G/dgamma) along the front.
+    contact: if it is `Held`, at this separation. tolerance: of sqrt(G/dgamma) along the front. near: whether it is not
+    far from rest. beyond: of a window, what the contact outside adds to the mean fraction around every cell, a field.
+    mended: where few cells, (m,), of a contact are far from rest, the contact with these at rest, if a short way leads
+    there.
 
     Raises
     ------
@@ -77,49 +131,67 @@ def front_at_rest(
         If it is not found.
     """
     reach = COMPLIANCE * front.strength
+    enough = max(GAP_TOLERANCE, _GAP_TO_TENSION * tolerance)
 
-    def at(fraction, pressure, error):
-        off = max(GAP_TOLERANCE, _GAP_TO_FRONT * min(error, 1.0)) * reach
-        return held(space, heights, separation, fraction, pressure, off)
+    def at(contact, off):
+        return held(space, heights, separation, contact, off * reach, beyond)
 
     def energy(state):
-        return state.energy - front.adhesion_length * float(np.sum(areas(state.fraction, state.around)))
+        # What lies beyond loses perimeter where it meets what lies here, as this does.
+        around = state.around if beyond is None else state.around + beyond.ravel()[state.cells]
+        return state.energy - front.adhesion_length * float(np.sum(areas(state.fraction, around)))
 
-    state = at(state.fraction, state.pressure, 1.0)
-    level, damping, solved = energy(state), 0.0, 1.0
-    for _ in range(_MAX_STEPS):
-        closing, opening, tension = moving(front, state)
-        free = closing | opening
-        error = float(np.max(np.abs(tension - 1)[free], initial=0.0))
-        if error <= tolerance and solved <= tolerance:
-            return state
-        if error <= _NEARLY < solved or error <= tolerance:
-            # The pressures may still be those of a coarse beginning, and the error theirs.
-            state, solved = at(state.fraction, state.pressure, 0.0), 0.0
-            level = energy(state)
+    def lower(new, old):
+        return energy(new) <= energy(old) + new.unsure + old.unsure + _SAME_ENERGY * abs(energy(old))
+
+    most_off = _NEAR if near else _GAP_TO_FRONT
+    state = contact if isinstance(contact, Held) else at(contact, max(enough, most_off))
+    damping, all_moved = 0.0, True
+    for _ in range(most_steps):
+        now = moving(front, state)
+        error = now.error
+        if error <= tolerance:
+            if state.off <= enough * reach:
+                return state
+            # The pressures are still those of a coarse beginning, and the error theirs.
+            state = at(state, enough)
             continue
-        at_front = free | ((state.fraction > 0) & (state.fraction < 1))
-        accuracy = min(_LOOSE, max(_TIGHT, 0.1 * error))
-        while True:
-            change, pressed = _step(space, front, state, at_front, damping, accuracy)
-            # Down in energy, as far as tensions tell: G - dgamma against the change of contact.
-            if np.vdot(tension**2 - 1, change) <= GAP_TOLERANCE * np.abs(change).sum():
+        restless = now.free & (np.abs(now.tension - 1) > _RESTLESS)
+        if all_moved and 0 < np.count_nonzero(restless) <= _FEW * np.count_nonzero(now.front):
+            all_moved = False
+            contact = mended(state, now.cells[restless])
+            if contact is not None:
+                new = at(contact, min(most_off, 0.1 * _GAP_TO_FRONT))
+                if lower(new, state):
+                    state = new
+                    continue
+        accuracy = min(COARSE, max(FINE, error))
+        step = _down(space, front, now, damping, accuracy)
+        if step is None:
+            if state.off > enough * reach:
+                # Or tensions of pressures that are not good enough say so.
+                state = at(state, max(enough, _FINER * state.off / reach))
+            else:
+                damping = _more(damping)
+            continue
+        change, pressed = step
+        off = max(enough, min(most_off, error * min(_GAP_TO_FRONT, max(error, FINE))))
+        part = 1.0
+        while part >= _SMALLEST_STEP:
+            new = at(now.moved(part * change, part * pressed), off)
+            if lower(new, state) or most_off > _NEAR:
                 break
-            damping = _more(damping)
-        step = 1.0
-        while step >= _SMALLEST_STEP:
-            fraction = np.clip(state.fraction + step * change, 0.0, 1.0)
-            new = at(fraction, state.pressure + step * pressed, error)
-            new_level = energy(new)
-            if new_level <= level + 1e-12 * abs(level):
-                break
-            step /= 2
+            part /= 2
+        if lower(new, state):
+            if part == 1.0:
+                damping = damping / 4 if damping > 0.01 else 0.0
+            state, all_moved = new, True
+        elif most_off > _NEAR:
+            # Energies of coarse pressures are not to be trusted that far.
+            most_off = _NEAR
+            state = at(state, max(enough, most_off))
         else:
             damping = _more(4 * damping)
-            continue
-        if step == 1.0:
-            damping = damping / 4 if damping > 0.01 else 0.0
-        state, level, solved = new, new_level, error
     raise NotConverged(f"the front did not come to rest (sqrt(G/dgamma) is off by {error:.1e})")
 
 
@@ -130,27 +202,32 @@ def _more(damping):
     return damping
 
 
-def _step(space, front, state, at_front, damping, accuracy):
-    """Newton's step: changes of fraction and pressure, (n, n)."""
-    linear = Linearised(space, front, state, at_front, damping)
+def _down(space, front, now, damping, accuracy):
+    """Newton's step if it leads down in energy, as far as tensions tell: G - dgamma against the change of contact."""
+    change, pressed = _step(space, front, now, damping, accuracy)
+    if np.sum((now.tension**2 - 1) * change) > GAP_TOLERANCE * np.abs(change).sum():
+        return None
+    return change, pressed
+
+
+def _step(space, front, now, damping, accuracy):
+    """Newton's step: changes of fraction and pressure, (k,)."""
+    linear = Linearised(space, front, now.cells, now.front, now.fraction, now.around, damping)
     # To the tension that the law wants at the present fraction, and from there with the law.
-    strengths = linear.strengths
-    missing = strengths * linear.fraction + state.pressure.ravel()[linear.front_cells]
-    moved = space.displacement(linear.on_grid(None, missing, float)).ravel()
-    gap = state.gap.ravel()[linear.front_cells]
-    right = np.concatenate(
-        [moved[linear.closed_cells], moved[linear.front_cells] + COMPLIANCE * strengths * (1 - linear.fraction) - gap]
-    )
-    change, pressure = linear.solve(right, accuracy)
-    pressure.ravel()[linear.front_cells] -= missing
-    return change, pressure
+    strengths = front.strengths(now.around)
+    missing = np.where(now.front, strengths * now.fraction + now.pressure, 0.0)
+    moved = space.displacement(space.on_grid(now.cells, missing, np.float32)).ravel()[now.cells]
+    bond = np.where(now.front, COMPLIANCE * strengths * (1 - now.fraction), 0.0)
+    change, pressure = linear.solve(moved + bond - now.gap, accuracy)
+    return change, pressure - missing
 
 
-def tangent(space: HalfSpace, front: Front, state: Held) -> tuple[np.ndarray, np.ndarray]:
-    """Changes of fraction and of pressure, (n, n), with the mean separation: per cell, and in E* per cell."""
-    at_front = (state.fraction > 0) & (state.fraction < 1)
-    linear = Linearised(space, front, state, at_front, 0.0)
-    return linear.solve(-np.ones(linear.size), _TIGHT)
+def tangent(
+    space: HalfSpace, front: Front, cells: np.ndarray, fraction: np.ndarray, around: np.ndarray, accuracy: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of fraction and of pressure, (k,), with the mean separation: per cell, and in E* per cell."""
+    linear = Linearised(space, front, cells, fraction < 1, fraction, around, 0.0)
+    return linear.solve(np.full(len(cells), -1.0), accuracy)
 
 
 class Linearised:
@@ -159,56 +236,50 @@ class Linearised:
     Unknowns are the pressures of closed cells and, times the strength, the fractions of those at the front.
     """
 
-    def __init__(self, space: HalfSpace, front: Front, state: Held, at_front: np.ndarray, damping: float):
-        """Note which cells are closed and which are at the front, (n, n) of bool; damping: softer bonds."""
-        self.space, self.front, self.damping = space, front, damping
-        self.closed_cells = np.flatnonzero((state.fraction >= 1) & ~at_front)
-        self.front_cells = np.flatnonzero(at_front)
-        self.size = len(self.closed_cells) + len(self.front_cells)
-        self.strengths = front.strengths(state.around).ravel()[self.front_cells]
-        self.fraction = state.fraction.ravel()[self.front_cells]
+    def __init__(self, space, front, cells, at_front, fraction, around, damping):
+        """Cells (k,), whether they are at the front, fractions of contact there and around; damping: softer bonds."""
+        self.space, self.front, self.cells = space, front, cells
+        self.closed, self.at_front = ~at_front, np.flatnonzero(at_front)
+        self.own = front.strengths(around[self.at_front]).astype(np.float32)
+        self.fraction = fraction[self.at_front].astype(np.float32)
+        self.soft = np.float32(1 + damping)
+        self.weights = neighbour_weights(cells[self.at_front], space.shape)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of fraction and pressure, (n, n), for given right-hand sides, to a relative accuracy."""
-        size = (self.size, self.size)
+        """Changes of fraction and pressure, (k,), for given right-hand sides, to a relative accuracy."""
+        size = (len(self.cells), len(self.cells))
         solution, _ = gmres(
-            LinearOperator(size, self._displaced, dtype=float),
-            right,
-            M=LinearOperator(size, self._nearly_inverse, dtype=float),
+            LinearOperator(size, self._displaced, dtype=np.float32),
+            right.astype(np.float32),
+            M=LinearOperator(size, self._nearly_inverse, dtype=np.float32),
             rtol=accuracy,
             restart=_MAX_KRYLOV,
             maxiter=1,
         )
-        fraction, pressure, _, _ = self._spread(solution)
-        return self.on_grid(None, fraction, float), self.on_grid(*pressure, float)
-
-    def on_grid(self, closed: np.ndarray | None, at_front: np.ndarray | None, kind: type = np.float32) -> np.ndarray:
-        """A field, (n, n), of given values on closed cells and at the front."""
-        field = np.zeros((self.space.grid, self.space.grid), kind)
-        if closed is not None:
-            field.ravel()[self.closed_cells] = closed
-        if at_front is not None:
-            field.ravel()[self.front_cells] = at_front
-        return field
+        pressure, _, _ = self._spread(solution)
+        fraction = np.zeros(len(solution))
+        fraction[self.at_front] = solution[self.at_front] / (self.front.strength or 1.0)
+        return fraction, pressure.astype(float)
 
     def _spread(self, unknowns):
-        """Changes of fraction at the front; of pressure on closed cells and at the front; of strength and tension."""
-        closed = len(self.closed_cells)
-        fraction = unknowns[closed:] / (self.front.strength or 1.0)
-        stronger = np.zeros(len(fraction))
-        if len(fraction):
-            around = filtered(self.on_grid(None, fraction), neighbour_modes(self.space.grid))
-            stronger = self.front.strength_change(self.strengths, around.ravel()[self.front_cells])
-        pull = self.strengths * fraction + self.fraction * stronger
-        return fraction, (unknowns[:closed], -pull), stronger, pull
+        """Changes of pressure; of strength and of tension at the front."""
+        fraction = unknowns[self.at_front] / np.float32(self.front.strength or 1.0)
+        if not len(fraction):
+            return unknowns, fraction, fraction
+        stronger = self.front.strength_change(self.own, self.weights @ fraction)
+        pull = self.own * fraction + self.fraction * stronger
+        pressure = unknowns.copy()
+        pressure[self.at_front] = -pull
+        return pressure, stronger, pull
 
     def _displaced(self, unknowns):
-        _, pressure, stronger, pull = self._spread(unknowns)
-        moved = self.space.displacement(self.on_grid(*pressure)).ravel()
-        held = COMPLIANCE * ((1 + self.damping) * pull - stronger)
-        return np.concatenate([moved[self.closed_cells], moved[self.front_cells] + held])
+        pressure, stronger, pull = self._spread(unknowns)
+        moved = self.space.displacement(self.space.on_grid(self.cells, pressure, np.float32)).ravel()[self.cells]
+        moved[self.at_front] += np.float32(COMPLIANCE) * (self.soft * pull - stronger)
+        return moved
 
     def _nearly_inverse(self, right):
-        closed = len(self.closed_cells)
-        pressure = self.space.pressure(self.on_grid(right[:closed], None)).ravel()
-        return np.concatenate([pressure[self.closed_cells], right[closed:] / (_NET * COMPLIANCE)])
+        field = self.space.on_grid(self.cells, np.where(self.closed, right, np.float32(0)), np.float32)
+        result = self.space.pressure(field).ravel()[self.cells]
+        result[self.at_front] = right[self.at_front] / np.float32(_NET * COMPLIANCE)
+        return result

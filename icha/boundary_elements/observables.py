@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.boundary_elements.contact import BoundaryElements
-from icha.boundary_elements.patches import centres, edges, labelled
+from icha.boundary_elements.patches import centres, edges, labelled, labels_at
 from icha.boundary_elements.states import CellState
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
@@ -26,7 +26,7 @@ class PatchObservables:
     def of_step(self, state: CellState) -> dict:
         """Residuals of the equilibrium, events so far, and how far Wu's formula is known to hold."""
         contact = self.contact
-        touched = state.touching.ravel()[contact.summits.cell]
+        touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
         counts = {
@@ -42,8 +42,8 @@ class PatchObservables:
             "residual": state.gap_residual / contact.rms_height,
             "front_residual": state.front_residual,
             "gap_residual": state.gap_residual / contact.rms_height,
-            "pressure_residual": float(np.max(np.abs(state.pressure[~state.touching]), initial=0.0))
-            / (contact.contact_modulus * self.surface.rms_slope),
+            # Where there is no contact there is no pressure, by construction.
+            "pressure_residual": 0.0,
             "pending_count": state.pending,
             "outside_wu_fraction": outside if contact.adhesive else 0.0,
         }
@@ -56,16 +56,18 @@ class PatchObservables:
         ValueError
             If a gap or a pressure lies beyond the bins.
         """
-        gap, cells = self._gap_density(state), self.contact.area_of_cells(state)
+        cells = self.contact.area_of_cells(state)
+        gap = self._gap_density(state, cells)
         pressure, mean = self._pressure_density(state, cells)
+        on_grid = self.contact.space.on_grid
         return {
             "overlap_fraction": 0.0,
             "area_beyond_edges": 0.0,
             "gap_density": gap,
             "pressure_density": pressure,
             "pressure_bin_mean": mean,
-            "contact_map": state.fraction.astype(np.float32),
-            "contact_pressure": state.pressure.astype(np.float32),
+            "contact_map": on_grid(state.cells, state.fraction, np.float32),
+            "contact_pressure": on_grid(state.cells, state.pressure, np.float32),
             **self._patches(state, cells),
         }
 
@@ -75,52 +77,51 @@ class PatchObservables:
         sum_of_radii = float(np.sum(self.contact.asperities.radius_of_curvature))
         return 1.5 * np.pi * self.contact.law.material.surface_energy * sum_of_radii / self.contact.area
 
-    def _gap_density(self, state):
+    def _gap_density(self, state, cells):
         """Density of the gap over the nominal area, outside contact: with the area, it is whole."""
         edges_of_bins = GAP_BINS * self.surface.rms_height
-        gap = np.maximum(state.gap, 0.0)
+        gap = np.maximum(self.contact.gap(state), 0.0)
         if gap.max() > edges_of_bins[-1]:
             raise ValueError(f"gap: {gap.max():.3e} m exceeds the largest bin, {edges_of_bins[-1]:.3e} m")
-        outside = 1 - self.contact.area_of_cells(state)
+        outside = 1 - self.contact.space.on_grid(state.cells, cells)
         content, _ = np.histogram(gap, edges_of_bins, weights=outside)
         return content / gap.size / np.diff(edges_of_bins)
 
     def _pressure_density(self, state, cells):
         """Density of the pressure over the nominal area, and its mean in every bin; the pressure is the patches'."""
         edges_of_bins = PRESSURE_BINS * (self.contact.contact_modulus * self.surface.rms_slope)
-        inside = state.touching
         # The force of a cell acts on the part of it that touches; what that is beside its area is the same everywhere.
-        weight = state.fraction[inside]
-        weight = weight * (np.sum(cells) / (np.sum(weight) or 1.0))
-        pressure = state.pressure[inside] / weight
+        weight = state.fraction * (np.sum(cells) / (np.sum(state.fraction) or 1.0))
+        pressure = state.pressure / weight
         if len(pressure) and np.abs(pressure).max() > edges_of_bins[-1]:
             raise ValueError(f"pressure: {np.abs(pressure).max():.3e} Pa exceeds the bins, {edges_of_bins[-1]:.3e} Pa")
         content, _ = np.histogram(pressure, edges_of_bins, weights=weight)
         force, _ = np.histogram(pressure, edges_of_bins, weights=weight * pressure)
         mean = np.divide(force, content, out=np.zeros(len(content)), where=content > 0)
-        return content / inside.size / np.diff(edges_of_bins), mean
+        return content / self.contact.heights.size / np.diff(edges_of_bins), mean
 
     def _patches(self, state, cells):
         """Every patch: centre of area, area, perimeter, force, summits, and the curvature of the highest of them."""
         contact, h = self.contact, self.contact.spacing
-        labels, count = labelled(state.touching)
+        grid = contact.space.grid
+        labels, count = labelled(state.cells, grid)
 
         def sums(weight):
-            return np.bincount(labels.ravel(), weight.ravel(), count + 1)[1:]
+            return np.bincount(labels, weight, count + 1)[1:]
 
         area = sums(cells) * h**2
-        of_summit = labels.ravel()[contact.summits.cell]
+        of_summit = labels_at(contact.summits.cell, state.cells, labels)
         order = np.argsort(contact.asperities.height, kind="stable")
         # A patch whose summits have been left is that of a cap of the surface's mean curvature.
         radius = np.full(count + 1, 1 / self.surface.rms_curvature)
         radius[of_summit[order]] = contact.asperities.radius_of_curvature[order]
-        centre = centres(labels, count, state.fraction) * h
+        centre = centres(state.cells, grid, labels, count, state.fraction) * h
         return {
             "spot_x": centre[:, 0],
             "spot_y": centre[:, 1],
             "spot_radius": np.sqrt(area / np.pi),
             "spot_area": area,
-            "spot_perimeter": np.pi / 4 * sums(edges(state.touching)) * h,
+            "spot_perimeter": np.pi / 4 * sums(edges(state.cells, grid)) * h,
             "spot_force": sums(state.pressure) * h**2,
             "spot_curvature_radius": radius[1:],
             "spot_members": np.bincount(of_summit, minlength=count + 1)[1:],

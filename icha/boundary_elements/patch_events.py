@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from icha.boundary_elements.patches import centres, labelled
+from icha.boundary_elements.patches import centres, labelled, labels_at
 from icha.boundary_elements.states import CellState
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 
@@ -16,24 +16,25 @@ def patch_events(
     after: CellState,
     energy_of_cells: Callable[[CellState], np.ndarray],
     summits: np.ndarray,
+    grid: int,
     spacing: float,
 ) -> Events:
     """The events between two states that follow each other.
 
-    energy_of_cells: what every cell, (n, n), of a state would set free in a jump, J/m^2. summits: their cells, counted
-    through. spacing: m.
+    energy_of_cells: what every cell, (k,), of a state would set free in a jump, J/m^2. summits: their cells, counted
+    through. grid: cells a side. spacing: m.
     """
-    (old, old_count), (new, new_count) = labelled(before.touching), labelled(after.touching)
-    both = (old > 0) & (new > 0)
-    pairs = np.unique(np.stack([old[both], new[both]]), axis=1)
+    (old, old_count), (new, new_count) = labelled(before.cells, grid), labelled(after.cells, grid)
+    _, in_old, in_new = np.intersect1d(before.cells, after.cells, assume_unique=True, return_indices=True)
+    pairs = np.unique(np.stack([old[in_old], new[in_new]]), axis=1)
     parts_of_old = np.bincount(pairs[0], minlength=old_count + 1)[1:]
     parts_of_new = np.bincount(pairs[1], minlength=new_count + 1)[1:]
 
     def of_old(kind, which, sign):
-        return _events(kind, before, old, energy_of_cells, which, sign, summits, spacing)
+        return _events(kind, before, old, old_count, energy_of_cells, which, sign, summits, grid, spacing)
 
     def of_new(kind, which, sign):
-        return _events(kind, after, new, energy_of_cells, which, sign, summits, spacing)
+        return _events(kind, after, new, new_count, energy_of_cells, which, sign, summits, grid, spacing)
 
     return Events.joined(
         [
@@ -45,17 +46,15 @@ def patch_events(
     )
 
 
-def _events(kind, state, labels, energy_of_cells, which, sign, summits, spacing):
+def _events(kind, state, labels, count, energy_of_cells, which, sign, summits, grid, spacing):
     """Events of one kind to patches `which`, (k,), of a state; of a jump the energy of its patch is set free."""
-    count = int(labels.max())
     if not len(which):
         return Events.joined(())
-    energy = np.bincount(labels.ravel(), energy_of_cells(state).ravel(), count + 1)[1:]
-    position = centres(labels, count, state.fraction) * spacing
-    members = np.bincount(labels.ravel()[summits], minlength=count + 1)[1:]
+    energy = np.bincount(labels, energy_of_cells(state), count + 1)[1:]
+    position = centres(state.cells, grid, labels, count, state.fraction) * spacing
     return Events(
         np.full(len(which), kind, np.int8),
         position[which],
-        members[which],
+        np.bincount(labels_at(summits, state.cells, labels), minlength=count + 1)[1:][which],
         np.maximum(sign * energy[which], 0.0) * spacing**2,
     )

@@ -7,16 +7,19 @@ from scipy.ndimage import label
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from icha.boundary_elements.regions import adjacent, region
+
 # Nodes along an edge overestimate an area by so much of the edges of cells (Yastrebov, Anciaux & Molinari, Tribol. Int.
 # 114 (2017) 161, eq. 9).
 BEYOND_EDGES = (np.pi - 1 + np.log(2)) / 24
 
 
-def labelled(touching: np.ndarray) -> tuple[np.ndarray, int]:
-    """Number of the patch of every cell, (n, n), 0 outside, and how many there are; cells that share an edge belong
-    together, over the edges of the period too.
+def labelled(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
+    """Number of the patch of every cell in contact, (k,), from 1 on, and how many there are.
+
+    cells: counted through, rising. Cells that share an edge belong together, over the edges of the period too.
     """
-    labels, count = label(touching)
+    labels, count = label(region(cells, (grid, grid)))
     pairs = [
         np.stack([one, other], axis=1)[(one > 0) & (other > 0)]
         for one, other in ((labels[0], labels[-1]), (labels[:, 0], labels[:, -1]))
@@ -24,26 +27,32 @@ def labelled(touching: np.ndarray) -> tuple[np.ndarray, int]:
     rows, columns = np.concatenate(pairs).T
     graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1))
     _, component = connected_components(graph, directed=False)
-    # Numbered in the order of their first cells; 0 stays outside.
-    return component[labels], int(component.max())
+    # Numbered in the order of their first cells; 0 is outside.
+    return component[labels.ravel()[cells]], int(component.max())
 
 
-def edges(touching: np.ndarray) -> np.ndarray:
-    """Edges between contact and no contact of every cell, (n, n); none of a cell that does not touch."""
-    return sum((touching & ~np.roll(touching, way, axis)).astype(float) for axis in (0, 1) for way in (-1, 1))
+def labels_at(places: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Number of the patch at some places, cells (m,) of any kind; 0 where there is none."""
+    if not len(cells):
+        return np.zeros(len(places), dtype=int)
+    at = np.minimum(np.searchsorted(cells, places), len(cells) - 1)
+    return np.where(cells[at] == places, labels[at], 0)
 
 
-def centres(labels: np.ndarray, count: int, weight: np.ndarray) -> np.ndarray:
-    """Centres (count, 2) of the patches, (x, y) in cells, of a weight (n, n); across the edges of the period too."""
-    n = len(labels)
-    turn = np.exp(2j * np.pi * np.arange(n) / n)
-    inside = np.flatnonzero(labels)
-    own, weights = labels.ravel()[inside], weight.ravel()[inside]
+def edges(cells: np.ndarray, grid: int) -> np.ndarray:
+    """Edges of every cell in contact, (k,), beyond which there is none."""
+    touching = region(cells, (grid, grid)).ravel()
+    return 4.0 - np.count_nonzero(touching[adjacent(cells, grid)], axis=0)
+
+
+def centres(cells: np.ndarray, grid: int, labels: np.ndarray, count: int, weight: np.ndarray) -> np.ndarray:
+    """Centres (count, 2) of the patches, (x, y) in cells, of a weight (k,); across the edges of the period too."""
+    turn = np.exp(2j * np.pi * np.arange(grid) / grid)
     result = np.empty((count, 2))
-    for axis, at in enumerate((inside % n, inside // n)):
+    for axis, at in enumerate((cells % grid, cells // grid)):
         phase = turn[at]
-        mean = np.bincount(own, weights * phase.real, count + 1) + 1j * np.bincount(
-            own, weights * phase.imag, count + 1
+        mean = np.bincount(labels, weight * phase.real, count + 1) + 1j * np.bincount(
+            labels, weight * phase.imag, count + 1
         )
-        result[:, axis] = np.angle(mean[1:]) * n / (2 * np.pi) % n
+        result[:, axis] = np.angle(mean[1:]) * grid / (2 * np.pi) % grid
     return result

@@ -21,8 +21,8 @@ def surface_memory(campaign: Campaign, surface: str) -> int:
 
 
 def run_threads(campaign: Campaign, case: RunLabels) -> int:
-    """Cores for a run: those of its surface, but one for boundary elements."""
-    return surface_threads(campaign, case.surface) if case.model == ASPERITIES else 1
+    """Cores for a run: those of its surface."""
+    return surface_threads(campaign, case.surface)
 
 
 def run_memory(campaign: Campaign, case: RunLabels) -> int:

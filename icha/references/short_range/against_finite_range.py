@@ -24,7 +24,7 @@ def without_adhesion(surface: Surface, reduced_pressures: Sequence[float]) -> li
         load = p * surface.rms_slope * HARD.contact_modulus
         state = contact.equilibrium(contact.untouched(), theirs.mean_separation)
         state = contact.equilibrium(state, state.separation, Control(PRESSURE, load))
-        gap = state.gap
+        gap = contact.gap(state)
         rows.append(
             {
                 "grid": surface.grid,
@@ -32,8 +32,8 @@ def without_adhesion(surface: Surface, reduced_pressures: Sequence[float]) -> li
                 "separation": state.separation / surface.rms_height,
                 "separation_error": state.separation / theirs.mean_separation - 1,
                 "gap_error": float(np.sqrt(np.mean((gap - theirs.gap) ** 2))) / surface.rms_height,
-                "area": float(np.mean(state.fraction > 0)),
-                "area_error": np.count_nonzero(state.fraction > 0) / np.count_nonzero(theirs.contact) - 1,
+                "area": len(state.cells) / surface.grid**2,
+                "area_error": len(state.cells) / np.count_nonzero(theirs.contact) - 1,
                 "corrected_area_error": contact.area_fraction(state) / perimeter_correction(theirs.contact)[0] - 1,
             }
         )

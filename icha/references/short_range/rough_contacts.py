@@ -85,7 +85,7 @@ def symmetries(surface: Surface, separation: float, material: Material = SOFT) -
     def solved(heights):
         contact = BoundaryElements.of(Surface(heights, surface.period), material)
         (state,) = followed(contact, [separation])
-        return contact.pressure(state), contact.area_fraction(state), state.fraction
+        return contact.pressure(state), contact.area_fraction(state), contact.fractions(state)
 
     pressure, area, fraction = solved(surface.heights)
     rows = []
@@ -119,7 +119,7 @@ def by_steps(
             "steps": count,
             "pressure_error": contact.pressure(state) / contact.pressure(best) - 1,
             "area_error": contact.area_fraction(state) / contact.area_fraction(best) - 1,
-            "fraction_error": float(np.abs(state.fraction - best.fraction).max()),
+            "fraction_error": float(np.abs(contact.fractions(state) - contact.fractions(best)).max()),
         }
         for count, state in found.items()
     ]
@@ -159,7 +159,7 @@ def digest(grid: int = 64, separation: float = 2.2) -> str:
     with threadpool_limits(1):
         contact = BoundaryElements.of(rough(grid, waves=grid // 8), SOFT)
         (state,) = followed(contact, [separation])
-    parts = (state.fraction, state.pressure, state.gap)
+    parts = (state.cells, state.fraction, state.pressure, state.around)
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 
 

@@ -316,14 +316,15 @@ def pair(
         spots = asperities.equilibrium(spots, top - approach)
         force, area = force_and_area(contact, state)
         other = asperities.pressure(spots) * contact.area
-        mirrored = np.roll(state.fraction[:, ::-1], 1, axis=1)
+        fraction = contact.fractions(state)
+        mirrored = np.roll(fraction[:, ::-1], 1, axis=1)
         rows.append(
             {
                 "grid": grid,
                 "distance": distance,
                 "approach": approach,
                 "spots": contact.spot_count(state),
-                "asymmetry": float(np.abs(mirrored - state.fraction).max()),
+                "asymmetry": float(np.abs(mirrored - fraction).max()),
                 "area_error": area / (asperities.area_fraction(spots) * contact.area) - 1,
                 "force_error": (force - other) / max(abs(other), 2 * _PULL_OFF),
             }

@@ -1,0 +1,44 @@
+"""Sets of cells of periodic grids: fields of bool, (n, n) or (t, n, n), or rising lists of cells counted through."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def region(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """The cells, counted through, as a field of bool."""
+    inside = np.zeros(shape, dtype=bool)
+    inside.ravel()[cells] = True
+    return inside
+
+
+def widened(inside: np.ndarray) -> np.ndarray:
+    """The cells of a region and those that share an edge with one of them."""
+    wide = inside.copy()
+    for axis in (-2, -1):
+        for way in (-1, 1):
+            wide |= np.roll(inside, way, axis)
+    return wide
+
+
+def beside(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """The cells that share an edge with one of those given, and are none of them: rising, (m,)."""
+    wide = widened(region(cells, shape))
+    wide.ravel()[cells] = False
+    return np.flatnonzero(wide)
+
+
+def adjacent(cells: np.ndarray, grid: int) -> np.ndarray:
+    """The four cells that share an edge with each, (4, k)."""
+    within = cells % grid**2
+    first, (row, column) = cells - within, np.divmod(within, grid)
+    above, below, left, right = (row - 1) % grid, (row + 1) % grid, (column - 1) % grid, (column + 1) % grid
+    around = [above * grid + column, below * grid + column, row * grid + left, row * grid + right]
+    return first + np.stack(around)
+
+
+def merged(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two rising lists of cells without a common one as one list, and the order in which it takes them."""
+    cells = np.concatenate([one, other])
+    order = np.argsort(cells, kind="stable")
+    return cells[order], order

@@ -1,0 +1,64 @@
+"""Windows around the few places where a front is far from rest, and the sums over neighbours that steps are made of."""
+
+import numpy as np
+import pytest
+
+from icha.boundary_elements import windows as module
+from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.elasticity import Contact, held
+from icha.boundary_elements.front import COMPLIANCE, neighbour_weights, neighbours
+from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.newton import moving
+from icha.references.short_range.rough_contacts import SOFT, rough
+
+GRID = 128
+
+
+def test_displacements_in_a_window_are_those_of_the_whole_surface():
+    restless = np.zeros((256, 256), dtype=bool)
+    restless[60:66, 1] = restless[3, 100] = True
+    cells, free = module._windows(restless)
+    assert len(cells) > 1 and free.any(axis=(1, 2)).all()
+    rng = np.random.default_rng(1)
+    whole = HalfSpace.of(256)
+    small = HalfSpace(cells.shape, *module._kernel(256))
+    for window, inside in zip(cells, free, strict=True):
+        pressure = rng.normal(size=np.count_nonzero(inside))
+        expected = whole.displacement(whole.on_grid(window[inside], pressure)).ravel()[window[inside]]
+        alone = np.zeros(cells.shape)
+        alone[0][inside] = pressure
+        np.testing.assert_allclose(small.displacement(alone)[0][inside], expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(64, 64), (3, 48, 48)])
+def test_weights_between_cells_are_those_of_the_stencil(shape):
+    space = HalfSpace(shape, HalfSpace.of(shape[-1]).compliance, HalfSpace.of(shape[-1]).stiffness)
+    rng = np.random.default_rng(2)
+    cells = np.sort(rng.choice(space.size, 900, replace=False))
+    fraction = rng.random(900)
+    expected = neighbours(space, cells, fraction).ravel()[cells]
+    np.testing.assert_allclose(neighbour_weights(cells, shape) @ fraction, expected, rtol=0, atol=1e-6)
+
+
+def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_moves():
+    contact = BoundaryElements.of(rough(GRID, waves=GRID // 8), SOFT)
+    separation = 2.0 * contact.rms_height
+    state = contact.equilibrium(contact.untouched(), separation)
+    reach, u = COMPLIANCE * contact.front.strength, separation / contact.spacing
+    pressure = state.pressure / contact.contact_modulus
+
+    # Cells of the front, around one of them, are closed.
+    place = state.cells[np.flatnonzero((state.fraction > 0.2) & (state.fraction < 0.8))[7]]
+    apart = np.abs(np.stack(np.divmod(state.cells, GRID)) - np.stack(np.divmod(place, GRID))[:, None])
+    near = np.all(np.minimum(apart, GRID - apart) <= 2, axis=0)
+    fraction = np.where(near, 1.0, state.fraction)
+    disturbed = held(contact.space, contact.levels, u, Contact(state.cells, fraction, pressure), 1e-9 * reach)
+    before = moving(contact.front, disturbed)
+    restless = before.cells[before.free & (np.abs(before.tension - 1) > 0.03)]
+    assert len(restless) and before.error > 0.1
+
+    mended = module.relaxed_in_windows(contact.space, contact.front, contact.levels, u, disturbed, restless)
+    np.testing.assert_array_equal(mended.cells, state.cells)
+    far = np.all(np.minimum(apart, GRID - apart) > 12, axis=0)
+    np.testing.assert_array_equal(mended.fraction[far], state.fraction[far])
+    assert np.abs(mended.fraction - state.fraction).max() < 0.05 < np.abs(fraction - state.fraction).max()
