@@ -20,7 +20,10 @@ _LONGEST = 30
 
 @dataclass(frozen=True)
 class Benchmark:
-    """What one job took: wall time in s and peak memory in MB (none where it ended before it was measured)."""
+    """What one job took: wall time in s and peak memory in MB (none where it ended before it was measured).
+
+    The memory is its own (`max_uss`): jobs that are forks share what the process had that they were forked from.
+    """
 
     job: str
     seconds: float
@@ -72,7 +75,8 @@ def read_benchmarks(files: Mapping[str, str | os.PathLike]) -> list[Benchmark]:
         else:
             rows = list(csv.DictReader(text.splitlines(), delimiter="\t"))
         seconds = sum(float(row["s"]) for row in rows)
-        memory = [float(row["max_rss"]) for row in rows if _is_number(row.get("max_rss"))]
+        peaks = [row.get("max_uss", row.get("max_rss")) for row in rows]
+        memory = [float(peak) for peak in peaks if _is_number(peak)]
         found.append(Benchmark(job, seconds, max(memory, default=None)))
     return found
 

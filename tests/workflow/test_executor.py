@@ -1,5 +1,6 @@
 """The executor that forks jobs, on a workflow of a few scripts and with a package that is soon imported."""
 
+import json
 import os
 import signal
 import subprocess
@@ -29,7 +30,12 @@ use rule told as alone with:
     benchmark: "alone.jsonl"
     threads: 2
 
-ruleorder: alone > told
+ruleorder: alone > heavy > told
+
+rule heavy:
+    output: "heavy{megabytes}.txt"
+    benchmark: "heavy{megabytes}.jsonl"
+    script: "workflow/scripts/heavy.py"
 
 rule wrong:
     output: "wrong{how}"
@@ -54,6 +60,15 @@ if snakemake.wildcards.how == "1":
     sys.exit("a message")
 os.kill(os.getpid(), signal.SIGKILL)
 """
+# What the process that jobs are forked from has is no job's own.
+ASKED = """
+BALLAST = b"x" * (200 << 20)
+"""
+HEAVY = """
+ballast = b"y" * (int(snakemake.wildcards.megabytes) << 20)
+del ballast
+open(snakemake.output[0], "w").close()
+"""
 # Only the first one takes long.
 LONG = """
 import os, time
@@ -69,8 +84,8 @@ open(snakemake.output[0], "w").close()
 def workflow(tmp_path_factory):
     """Start Snakemake on this workflow."""
     folder = tmp_path_factory.mktemp("executor")
-    files = {"Snakefile": SNAKEFILE, "icha/__init__.py": "", "icha/asked.py": "", "icha/broken.py": "raise OSError"}
-    scripts = {"tell": TELL, "wrong": WRONG, "long": LONG, "beside": "WORD = 'beside'"}
+    files = {"Snakefile": SNAKEFILE, "icha/__init__.py": "", "icha/asked.py": ASKED, "icha/broken.py": "raise OSError"}
+    scripts = {"tell": TELL, "wrong": WRONG, "long": LONG, "heavy": HEAVY, "beside": "WORD = 'beside'"}
     for name, text in (files | {f"workflow/scripts/{name}.py": text for name, text in scripts.items()}).items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
@@ -116,6 +131,14 @@ def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow):
     # A job of two threads runs by itself.
     assert alone[:1] == ["False"] and alone[3] == "2" and alone[7] != told[7]
     assert float((workflow.folder / "told.jsonl").read_text().split('"max_rss": ')[1].split(",")[0]) > 1
+
+
+def test_the_memory_of_a_job_is_its_own_at_its_peak(workflow):
+    said = workflow("heavy0.txt", "heavy100.txt").communicate(timeout=120)[0]
+    took = {name: json.loads((workflow.folder / f"heavy{name}.jsonl").read_text()) for name in (0, 100)}
+    assert took[0]["max_rss"] > 200, said
+    assert took[0]["max_uss"] < 50
+    assert 100 < took[100]["max_uss"] < 150
 
 
 def test_jobs_that_fail_are_told_with_how_they_ended(workflow):

@@ -23,6 +23,7 @@ from multiprocessing import forkserver
 from multiprocessing.connection import wait
 from pathlib import Path, PurePath
 
+import psutil
 from snakemake.exceptions import SpawnedJobError
 from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.executors.local import common_settings
@@ -105,9 +106,16 @@ def run_script(script: str, told: Snakemake, benchmark: str | None) -> None:
         record = {
             "s": round(time.monotonic() - started, 4),
             "max_rss": round(took.ru_maxrss / 1024, 2),
+            "max_uss": round(took.ru_maxrss / 1024 - _shared_megabytes(), 2),
             "cpu_time": round(took.ru_utime + took.ru_stime, 2),
         }
         Path(benchmark).write_text(json.dumps(record) + "\n", encoding="ascii")
+
+
+def _shared_megabytes() -> float:
+    """What this process has in memory together with others: nearly all that it was forked with."""
+    here = psutil.Process().memory_full_info()
+    return (here.rss - here.uss) / 2**20
 
 
 def end_with(parent: int) -> None:
