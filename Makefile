@@ -64,7 +64,7 @@ tamaas: .venv/.tamaas
 slurm-environment: .venv-slurm/.installed
 
 run: environment
-	@icha run $(CONFIG) --cores $(CORES)
+	@icha run $(CONFIG) --cores $(CORES) $(OPTIONS)
 
 publish: environment
 	@icha run $(CONFIG) publish --cores $(CORES)

@@ -1,10 +1,14 @@
-"""Predicted over measured: processor time, memory and disk by `icha.planning.costs` against small cases, one at a time.
+"""Expected over measured: processor time, memory and disk by `icha.planning.costs` against small cases, one at a time.
 
-python benchmarks/costs.py [--quick]
+python benchmarks/costs.py [--fit] [--kept] [--only KIND ...]
 
-The formulas were fitted to cases like those of the group `fitted`; surfaces, seeds and loads of the group `others` were
-not looked at then. Every case is a fork of this process, which has everything imported, on one thread; what starting a
-process takes is taken off the prediction. Linux only. Writes benchmarks/results/costs.json.
+Cases are drawn at random (`benchmarks/cost_cases.py`), with some numbers for the group `fitted` and another for
+`others`, which no formula and no constant was made for: after a look at them, draw others. `--fit` measures the group
+`fitted` alone, and writes `icha/planning/constants.py` as fitted to it; then run it without. `--kept` takes what was
+measured before, as after a change of a formula.
+
+Single jobs are forks of this process, which has everything imported, on one thread. Campaigns are run by `icha run`,
+and their time is that of all processes. Linux only. Writes benchmarks/results/costs.json.
 """
 
 from __future__ import annotations
@@ -14,149 +18,86 @@ import os
 os.environ["OMP_NUM_THREADS"] = "1"
 
 import argparse
+import ctypes
+import inspect
 import json
 import math
 import resource
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, fields, replace
+from pathlib import Path, PurePath
 
 import numpy as np
+import psutil
+import yaml
+from cost_cases import Draw
+from scipy.optimize import least_squares
 
-import icha
-from icha.asperity.cohesive_zone import shortest_range
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
-from icha.datasets.files import write_dataset
-from icha.datasets.surface_file import write_surface
-from icha.planning import costs
-from icha.references.error_sources.variants import error_sources
-from icha.references.finite_range import finite_range_solution
-from icha.references.finite_range_loops import finite_range_loop
-from icha.simulation import simulate
+from icha.configuration.load import load_configuration
+from icha.datasets.results import job_file
+from icha.planning.constants import FITTED, Constants
+from icha.planning.costs import Cost
+from icha.planning.plan import TO_DO, Item, plan, time_on
 
 RESULT = Path(__file__).parent / "results/costs.json"
-PERIOD, RANGE = 100e-6, 2.071e-9
-HARD, SOFT = (25e6, 0.0, RANGE), (25e6, 0.05, RANGE)
-PDMS, STICKY = (0.24e6, 2e-3, RANGE), (0.24e6, 8e-3, RANGE)
+# What the cases of a group are drawn with.
+DRAWS = {"fitted": (1, 3), "others": (2,)}
+# Which constants are fitted to which kinds of cases.
+FITS = {
+    "making": ("surface",),
+    "loading": ("loading",),
+    "cycle": ("both ways",),
+    "patches": ("patches",),
+    "patch_cycle": ("patches both ways",),
+    "finite_range": ("finite range", "finite range both ways", "error sources"),
+    "gathering": ("theories", "dataset and checks", "figures", "report"),
+    "workflow": ("campaign",),
+}
+# What small cases say nothing about: of the runs with many spots and the campaigns of many runs in docs/benchmarks.md.
+NOT_FITTED = (
+    "crowd",
+    "planned",
+    "dataset_run",
+    "comparison_run",
+    "checks_run",
+    "error_run",
+    "figure_run",
+    "report_run",
+)
+# Deviations of constants that the cases say nothing about, in units of those of a case.
+_STAY = 0.05
+_SUBREAPER = 36  # of prctl
 
 
-def spectrum(grid, hurst=0.8, rolloff=PERIOD / 5, cells=8):
-    return icha.SelfAffineSpectrum(PERIOD, rolloff, PERIOD / grid * cells, hurst)
+class Row:
+    """A case, or a job of one, with what was measured of it."""
+
+    def __init__(self, kind: str, title: str, cost: Callable[[Constants], Cost], found: dict):
+        self.kind, self.title, self.cost, self.found = kind, title, cost, found
+
+    def ratios(self) -> dict[str, float]:
+        """Expected over measured."""
+        cost = self.cost(FITTED)
+        expected = {"time": cost.seconds, "memory": cost.memory, "disk": cost.disk}
+        measured = {"time": "seconds", "memory": "memory", "disk": "disk"}
+        return {
+            name: value / self.found[measured[name]] for name, value in expected.items() if measured[name] in self.found
+        }
 
 
-def surface(grid):
-    def work(file):
-        write_surface(file, spectrum(grid).realise(grid, 1), name="rough", seed=1)
-
-    return f"surface {grid}²", costs.surface_cost(grid), work
-
-
-def sweep(grid, material, pressures, slope=1.0, seed=1, unload=False, model=ASPERITIES, **shape):
-    form = spectrum(grid, **shape)
-    path = icha.Path(reduced_pressures=list(pressures), unload=unload)
-    described = costs.Sweep(len(pressures), 1, pressures[-1], material[1] > 0, int(unload), path.max_step)
-    summits = costs.self_affine_summits(PERIOD, form.rolloff_wavelength, form.short_wavelength, form.hurst)
-
-    def work(file):
-        scaled = form.realise(grid, seed).scaled_to_rms_slope(slope)
-        write_dataset(simulate(scaled, icha.Material(*material), path, model=model, seed=seed), file)
-
-    ways = "both ways" if unload else "loading"
-    about = "".join(f", {name} {value:g}" for name, value in shape.items())
-    adhesion = "adhesive" if material[1] else "bare"
-    title = f"{ways} {grid}², {adhesion}, {len(pressures)} stops to p* = {pressures[-1]:.3g}, slope {slope:g}{about}"
-    if model == BOUNDARY_ELEMENTS:
-        return f"boundary elements {title}", costs.patch_cost(grid, summits, described), work
-    return title, costs.sweep_cost(grid, summits, described), work
+def shared() -> float:
+    """Bytes that this process has in memory together with others."""
+    here = psutil.Process().memory_full_info()
+    return here.rss - here.uss
 
 
-def solution(grid, refinement, pressure, adhesive, hurst=0.8):
-    nodes = grid * refinement
-    material = _resolved(nodes) if adhesive else HARD
-
-    def work(file):
-        rough = spectrum(grid, hurst=hurst).realise(grid, 1)
-        write_dataset(finite_range_solution(rough, icha.Material(*material), pressure, refinement=refinement), file)
-
-    title = f"finite range {nodes}², {'adhesive' if adhesive else 'bare'}, p* = {pressure:g}"
-    return title, costs.solution_cost(nodes, pressure, adhesive=adhesive), work
-
-
-def loop(grid, refinement, step, adhesive=True):
-    nodes = grid * refinement
-    material = _resolved(nodes) if adhesive else HARD
-
-    def work(file):
-        rough = spectrum(grid, rolloff=PERIOD).realise(grid, 1).scaled_to_rms_slope(0.3)
-        settings = {"largest_reduced_pressure": 0.01, "separation_step": step, "refinement": refinement}
-        write_dataset(finite_range_loop(rough, icha.Material(*material), tolerance=1e-6, **settings), file)
-
-    return f"finite range both ways {nodes}², steps {step}", costs.loop_cost(nodes, step, adhesive=adhesive), work
-
-
-def sources(grid, pressures):
-    def work(file):
-        write_dataset(error_sources(spectrum(grid).realise(grid, 1), icha.Material(*HARD), pressures), file)
-
-    return (
-        f"error sources {2 * grid}², {len(pressures)} loads",
-        costs.sources_cost(2 * grid, pressures, adhesive=False),
-        work,
-    )
-
-
-def _resolved(nodes):
-    return 25e6, 0.05, 1.02 * shortest_range(icha.Material(*SOFT), PERIOD / nodes)
-
-
-def cases(quick):
-    some, many = np.geomspace(1e-3, 3e-2, 4), np.geomspace(5e-4, 8e-2, 20)
-    fitted = [
-        *(surface(grid) for grid in (64, 512, 2048)),
-        *(sweep(grid, HARD, many) for grid in (128, 512)),
-        sweep(256, SOFT, some),
-        sweep(64, PDMS, some, unload=True),
-        sweep(128, STICKY, some, slope=0.5, unload=True),
-        solution(128, 2, 0.01, False),
-        solution(128, 1, 0.01, True),
-        *(sweep(grid, material, many, model=BOUNDARY_ELEMENTS) for grid in (64, 256) for material in (HARD, SOFT)),
-        sweep(64, PDMS, some, unload=True, model=BOUNDARY_ELEMENTS),
-    ]
-    others = [
-        surface(1280),
-        sweep(160, SOFT, some, seed=21, slope=0.7, hurst=0.4),
-        sweep(320, PDMS, many, seed=22, slope=0.6, hurst=0.9, rolloff=PERIOD / 4),
-        sweep(448, HARD, [2e-4, 5e-3], seed=23, hurst=0.6, rolloff=PERIOD / 6),
-        sweep(80, STICKY, [5e-3, 4e-2], seed=24, slope=1.2, unload=True, hurst=0.7),
-        sweep(160, SOFT, [6e-3], seed=25, slope=0.8, unload=True, rolloff=PERIOD / 4),
-        sweep(128, HARD, [2e-2], seed=26, unload=True, hurst=0.4),
-        solution(80, 2, 0.02, False, hurst=0.6),
-        solution(160, 1, 5e-3, True, hurst=0.6),
-        sweep(160, SOFT, some, seed=21, slope=0.7, hurst=0.4, model=BOUNDARY_ELEMENTS),
-        sweep(320, HARD, [2e-4, 5e-3], seed=23, hurst=0.6, rolloff=PERIOD / 6, model=BOUNDARY_ELEMENTS),
-        sweep(80, SOFT, [2e-2], seed=24, slope=1.2, unload=True, hurst=0.7, model=BOUNDARY_ELEMENTS),
-        sweep(96, HARD, [2e-2], seed=26, unload=True, hurst=0.4, model=BOUNDARY_ELEMENTS),
-        loop(24, 4, 0.25),
-        sources(80, [2e-3, 2e-2]),
-    ]
-    if not quick:
-        fitted += [
-            sweep(1024, SOFT, many),
-            sweep(256, SOFT, some, slope=0.5, unload=True),
-            solution(256, 2, 0.1, False),
-        ]
-        others += [
-            sweep(896, PDMS, some, seed=27, slope=0.9, hurst=0.7, rolloff=PERIOD / 3),
-            sweep(224, PDMS, [2e-2], seed=28, slope=0.6, unload=True, rolloff=PERIOD / 5),
-            solution(224, 2, 2e-2, True),
-        ]
-    return [("fitted", case) for case in fitted] + [("others", case) for case in others]
-
-
-def measured(work, folder):
-    """Processor time (s), peak memory and size of the file (bytes) of `work` in a fork of this process."""
+def measured_fork(work, folder) -> dict:
+    """Processor time (s), peak of its own memory and size of the file (bytes) of `work` in a fork of this process."""
     file = folder / "out.nc"
     reading, writing = os.pipe()
     child = os.fork()
@@ -167,7 +108,7 @@ def measured(work, folder):
         except Exception as error:
             said["failure"] = f"{type(error).__name__}: {error}"
         said["seconds"] = time.process_time() - start
-        said["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+        said["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - shared()
         os.write(writing, json.dumps(said).encode())
         os._exit(0)
     os.close(writing)
@@ -180,44 +121,168 @@ def measured(work, folder):
     return found
 
 
+def measured_campaign(configuration: Path, folder: Path) -> dict:
+    """Processor time of `icha run` and of all that it starts, and what its jobs say they took, by their paths."""
+    # What outlives the one that started it (the process that jobs are forked from) becomes a child of this one.
+    ctypes.CDLL(None).prctl(_SUBREAPER, 1)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    icha = [sys.executable, "-c", "from icha.cli import main; main()"]
+    command = [*icha, "run", str(configuration), "--directory", str(folder), "--plain"]
+    said = subprocess.run(command, capture_output=True, text=True)
+    try:
+        while True:
+            os.waitpid(-1, 0)
+    except ChildProcessError:
+        pass
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    found = {"seconds": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, "jobs": {}}
+    if said.returncode:
+        found["failure"] = said.stdout[-300:] + said.stderr[-300:]
+    results = folder / "results" / configuration.stem
+    for path in sorted((results / "benchmarks").rglob("*.jsonl")):
+        record = json.loads(path.read_text().splitlines()[-1])
+        found["jobs"][str(path.relative_to(results))] = {
+            "seconds": record["cpu_time"],
+            "memory": record["max_uss"] * 2**20,
+        }
+    return found
+
+
+def rows_of_campaign(title: str, text: dict, found: dict, folder: Path) -> Iterator[Row]:
+    """A campaign as a whole, and the jobs that make something of its runs."""
+    file = folder / f"{text['name']}.yaml"
+    file.write_text(yaml.safe_dump(text))
+    campaign = load_configuration(file).campaign
+
+    def items(constants) -> list[Item]:
+        return [replace(item, state=TO_DO) for item in plan(campaign, folder / "nothing", constants)]
+
+    def whole(constants):
+        return Cost(time_on(items(constants), 1, constants), 0.0, 0.0)
+
+    yield Row("campaign", title, whole, {"seconds": found["seconds"]})
+    for index, item in enumerate(items(FITTED)):
+        path = PurePath(item.path)
+        own = (
+            job_file(item.path, "benchmarks", ".jsonl"),
+            *(f"benchmarks/{n}.jsonl" for n in (path.stem, path.parts[0])),
+        )
+        took = next((found["jobs"][name] for name in own if name in found["jobs"]), None)
+        if took and item.part in FITS["gathering"] and took["seconds"] > 0.05:
+            yield Row(item.part, f"{title}: {item.path}", lambda c, index=index: items(c)[index].cost, took)
+
+
+def rows(group: str, kept: dict, only) -> Iterator[Row]:
+    """The cases of a group, measured unless they were before."""
+    for number in DRAWS[group]:
+        draw = Draw(number)
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            for case in draw.cases():
+                if only and case.kind not in only:
+                    continue
+                found = kept.get(case.title) or measured_fork(case.work, folder)
+                kept[case.title] = found
+                if "failure" in found or "disk" not in found:
+                    print(f"{case.title:<110} failed: {found.get('failure', 'no file')}", flush=True)
+                    continue
+                yield Row(case.kind, case.title, case.cost, found)
+            for text in draw.campaigns() if not only or "campaign" in only else ():
+                title = f"campaign {text['name']}: {text['title']}"
+                if title not in kept:
+                    file = folder / f"{text['name']}.yaml"
+                    file.write_text(yaml.safe_dump(text))
+                    kept[title] = measured_campaign(file, folder)
+                if "failure" in kept[title]:
+                    print(f"{title:<110} failed: {kept.pop(title)['failure']}", flush=True)
+                    continue
+                yield from rows_of_campaign(title, text, kept[title], folder)
+
+
+def fitted(constants: Constants, measured: list[Row]) -> Constants:
+    """The constants that expect what was measured, by least squares of logarithms, kind by kind."""
+    for section, kinds in FITS.items():
+        own = [row for row in measured if row.kind in kinds]
+        if not own:
+            continue
+        constants = _fitted(constants, section, own)
+    return constants
+
+
+def _fitted(constants, section, rows):
+    start = getattr(constants, section)
+    # Bytes are no matter of time.
+    names = [each.name for each in fields(start) if each.name not in NOT_FITTED and getattr(start, each.name) < 1e6]
+    origin = np.log([getattr(start, name) for name in names])
+
+    def with_values(logs):
+        values = {name: float(f"{math.exp(log):.2g}") for name, log in zip(names, logs, strict=True)}
+        return replace(constants, **{section: replace(start, **values)})
+
+    def deviations(logs):
+        values = dict(zip(names, np.exp(logs), strict=True))
+        trial = replace(constants, **{section: replace(start, **values)})
+        off = [math.log(row.cost(trial).seconds / row.found["seconds"]) for row in rows]
+        return np.concatenate([off, _STAY * (logs - origin)])
+
+    return with_values(least_squares(deviations, origin, loss="soft_l1", f_scale=0.3).x)
+
+
+def write(constants: Constants) -> None:
+    """Write the values of constants into their module, line by line."""
+    file = Path(inspect.getfile(Constants))
+    section, lines = None, file.read_text(encoding="utf-8").splitlines()
+    by_class = {type(values).__name__: asdict(values) for values in vars(constants).values()}
+    for number, line in enumerate(lines):
+        if line.startswith("class "):
+            section = by_class.get(line.removeprefix("class ").removesuffix(":"), {})
+        name, _, value = line.strip().partition(": float = ")
+        if value and section.get(name, 1e6) < 1e6:
+            lines[number] = f"    {name}: float = {section[name]:g}"
+    file.write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="leave out what takes more than ten seconds")
-    rows, results = [], []
-    print(f"{'case':<78} {'predicted':>9} {'measured':>9}   time memory  disk", flush=True)
-    with tempfile.TemporaryDirectory() as folder:
-        # What is imported late is imported now.
-        surface(64)[2](Path(folder, "first.nc"))
-        sweep(64, HARD, [1e-3, 1e-2])[2](Path(folder, "second.nc"))
-        solution(64, 2, 0.01, True)[2](Path(folder, "third.nc"))
-        for group, (title, cost, work) in cases(parser.parse_args().quick):
-            found = measured(work, Path(folder))
-            row = {"group": group, "case": title} | found
-            if "disk" in found and "failure" not in found:
-                expected = max(cost.seconds - costs.JOB_SECONDS, 0.01)
-                row["ratios"] = {
-                    "time": expected / max(found["seconds"], 0.01),
-                    "memory": cost.memory / found["memory"],
-                    "disk": cost.disk / found["disk"],
-                }
-                rows.append(row)
-                ratios = " ".join(f"{ratio:6.2f}" for ratio in row["ratios"].values())
-                print(f"{title:<78} {expected:>8.2f}s {found['seconds']:>8.2f}s {ratios}", flush=True)
-            else:
-                print(f"{title:<78} failed: {found.get('failure', 'no file')}", flush=True)
-            results.append(row)
-    for group in ("fitted", "others"):
+    parser.add_argument("--fit", action="store_true", help="measure what is fitted to, and write fitted constants")
+    parser.add_argument("--kept", action="store_true", help="take what was measured before")
+    parser.add_argument("--only", nargs="+", metavar="KIND", help="kinds of cases, such as loading or campaign")
+    options = parser.parse_args()
+    known = json.loads(RESULT.read_text()) if RESULT.exists() else {"cases": [], "measured": {}}
+    kept = known["measured"] if options.kept else {}
+    found: dict[str, list[Row]] = {}
+    print(f"{'case':<110} {'expected':>8} {'measured':>8}   time memory  disk", flush=True)
+    for group in ["fitted"] if options.fit else DRAWS:
+        found[group] = []
+        for row in rows(group, kept, options.only):
+            found[group].append(row)
+            ratios = " ".join(f"{ratio:6.2f}" for ratio in row.ratios().values())
+            print(f"{row.title[:110]:<110} {row.cost(FITTED).seconds:>7.2f}s {row.found['seconds']:>7.2f}s {ratios}")
+    for group, own in found.items():
         for name in ("time", "memory", "disk"):
-            logs = [math.log2(row["ratios"][name]) for row in rows if row["group"] == group]
-            spread = statistics.fmean(abs(value) for value in logs)
-            within = sum(abs(value) <= 1 for value in logs)
-            print(
-                f"{group}, {name}: median {2 ** statistics.median(logs):.2f}, off by a factor of "
-                f"{2**spread:.2f} on average, {within} of {len(logs)} within a factor of two"
-            )
-    RESULT.write_text(json.dumps({"cases": results}, indent=1) + "\n")
-    return 0
+            ratios = [row.ratios()[name] for row in own if row.ratios().get(name)]
+            if ratios:
+                print(f"{group}, {name}: {summary(ratios)}")
+    if options.fit:
+        RESULT.write_text(json.dumps(known | {"measured": kept}, indent=1) + "\n")
+        write(fitted(FITTED, found["fitted"]))
+        return
+    cases = [
+        {"group": group, "kind": row.kind, "case": row.title, "ratios": row.ratios()}
+        for group, own in found.items()
+        for row in own
+    ]
+    RESULT.write_text(json.dumps({"cases": cases, "measured": kept}, indent=1) + "\n")
+
+
+def summary(ratios) -> str:
+    """Median, spread and ends of ratios."""
+    within = sum(0.5 <= ratio <= 2 for ratio in ratios)
+    return (
+        f"median {statistics.median(ratios):.2f}, {min(ratios):.2f} to {max(ratios):.2f}, {within} of {len(ratios)} "
+        f"({within / len(ratios):.0%}) within a factor of two"
+    )
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

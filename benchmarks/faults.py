@@ -69,6 +69,7 @@ class Place:
         """A call that makes everything; `icha run` calls Snakemake in its turn."""
         if way == "icha run":
             program = [sys.executable, "-c", "from icha.cli import main; main()", "run", str(self.configuration)]
+            program += ["--anyway"]  # on disks that are too small from the beginning, too
             return [*program, *self.targets, "--plain", "--cores", "2", "--directory", str(self.folder), *arguments]
         program = [sys.executable, "-m", "snakemake", *self.targets, "--cores", "2"]
         place = ["--snakefile", str(self.project / "Snakefile"), "--directory", str(self.folder)]

@@ -1,14 +1,13 @@
 """Tell what a campaign asks for, what of it is there, and what the rest will cost."""
 
-import os
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from icha.cli.options import Config, Cores, Folder
-from icha.cli.project import configuration_path, find_project, read_configuration, shown
+from icha.cli.options import Config, Cores, Folder, core_count
+from icha.cli.project import configuration_path, find_project, profile_settings, read_configuration, shown
 from icha.support import in_words
 from icha.support.in_words import counted
 
@@ -26,16 +25,18 @@ def describe(
     """
     from rich.console import Console
 
+    from icha.planning.needs import wanting
     from icha.planning.plan import plan
     from icha.planning.software import missing_software
     from icha.support.checksums import damaged
 
     path = configuration_path(config)
     campaign = read_configuration(path).campaign
-    home = (folder or find_project() or Path.cwd()).resolve()
+    found = find_project() or Path.cwd()
+    home = (folder or found).resolve()
     results = home / "results" / campaign.name
     items, spoilt = plan(campaign, results), damaged(results)
-    count = _count(cores)
+    count = core_count(cores)
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(f"[bold]{campaign.name}[/]: {campaign.title}", highlight=False)
     console.print(f"configuration: {shown(path)}\n", highlight=False)
@@ -44,24 +45,20 @@ def describe(
     _summary(console, items, spoilt, count)
     if missing := missing_software(campaign):
         console.print(f"[red]missing:[/] {missing}", highlight=False, soft_wrap=True)
-
-
-def _count(cores: str | None) -> int:
-    if cores == "all":
-        return os.cpu_count() or 1
-    return int(cores) if cores else 2
+    for lack in wanting(items, count, results, profile_settings(found / "profiles/default")):
+        console.print(f"[red]not enough:[/] {lack}", highlight=False, soft_wrap=True)
 
 
 def _summary(console, items, damaged, cores) -> None:
     from rich.table import Table
 
-    from icha.planning.plan import memory_on, time_on, total
+    from icha.planning.plan import around_jobs, memory_on, time_on, total
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
     parts: dict[str, list] = {}
     for item in items:
         parts.setdefault(item.part, []).append(item)
-    every = total(items)
+    every, around = total(items), around_jobs(items)
     columns = {
         "": "all",
         "files": str(every.count),
@@ -69,7 +66,7 @@ def _summary(console, items, damaged, cores) -> None:
         "failed": str(every.failed or ""),
         "to do": str(every.to_do),
         "each": "",
-        "core time": in_words.duration(every.work),
+        "core time": in_words.duration(every.work + around),
         "memory": in_words.size(every.memory),
         "disk": in_words.size(every.disk),
     }
@@ -91,6 +88,8 @@ def _summary(console, items, damaged, cores) -> None:
             in_words.size(sums.memory),
             in_words.size(sums.disk),
         )
+    if around:
+        table.add_row("start and handing out", "", "", "", "", "", in_words.duration(around))
     console.print(table)
     runs = [item for item in items if item.is_run]
     changed = sum(item.state == "changed" for item in runs)
@@ -101,8 +100,7 @@ def _summary(console, items, damaged, cores) -> None:
         time, memory = in_words.duration(time_on(items, cores)), in_words.size(memory_on(items, cores))
         console.print(
             f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and {memory}"
-            f" of memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk when all is there, and as "
-            f"much again for the dataset.",
+            f" of memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk when all is there.",
             highlight=False,
         )
     for path in damaged:

@@ -4,8 +4,10 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+from icha.datasets.results import CHECKS, MODEL_ERROR, REPORT
 
 # Rules that only collect others' files.
 _TARGETS = ("all", "surfaces", "runs", "references", "dataset", "figures", "report", "publish")
@@ -15,7 +17,10 @@ _PRIOR = 5.0
 
 @dataclass(frozen=True)
 class Job:
-    """A job: its rule, what it says of itself, its outputs and log files, when it started and ended (s)."""
+    """A job: its rule, what it says of itself, its outputs and log files, when it started and ended (s), its cores.
+
+    `waits` are the seconds that it waits for the imports of the first jobs.
+    """
 
     rule: str
     title: str
@@ -23,6 +28,8 @@ class Job:
     logs: tuple[str, ...]
     started: float
     ended: float | None = None
+    threads: int = 1
+    waits: float = 0.0
 
     @property
     def seconds(self) -> float:
@@ -36,14 +43,16 @@ class Watch:
 
     Parameters
     ----------
-    expected : seconds that the job of an output file is expected to take on one core, by the file's path.
+    expected : core-seconds that the job of an output file is expected to take, by the file's path.
     clock : time in s.
+    environment : seconds that the first jobs are expected to wait for imports.
 
     Whoever reads it while another thread feeds it holds its `lock`.
     """
 
     expected: Mapping[str, float] = field(default_factory=dict)
     clock: Callable[[], float] = time.monotonic
+    environment: float = 0.0
     total: dict[str, int] = field(default_factory=dict)
     running: dict[int, Job] = field(default_factory=dict)
     done: list[Job] = field(default_factory=list)
@@ -51,6 +60,10 @@ class Watch:
     cores: int = 1  # of a cluster: jobs at a time
     started: float | None = None
     lock: threading.RLock = field(default_factory=threading.RLock)
+
+    def __post_init__(self):
+        """Keep when it was called."""
+        self.called = self.clock()
 
     def take(self, event: Mapping) -> Job | None:
         """Take in one event of the logger plugin; return the job that it has ended, if any."""
@@ -72,6 +85,8 @@ class Watch:
                     tuple(event["output"] or ()),
                     tuple(_path(log) for log in event["log"] or ()),
                     self.clock(),
+                    threads=event.get("threads") or 1,
+                    waits=0.0 if self.done or self.failed else self.environment,
                 )
                 self.running[event["jobid"]] = job
             case "job_finished" if event["job_id"] in self.running:
@@ -82,7 +97,7 @@ class Watch:
 
     def _ended(self, number, where):
         job = self.running.pop(number)
-        job = Job(job.rule, job.title, job.outputs, job.logs, job.started, self.clock())
+        job = replace(job, ended=self.clock())
         where.append(job)
         return job
 
@@ -98,8 +113,9 @@ class Watch:
         return [(rule, done[rule], running[rule], failed[rule], total) for rule, total in self.total.items()]
 
     def work_of(self, job: Job) -> float:
-        """Seconds that a job is expected to take on one core."""
-        return max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0) or DEFAULT_SECONDS
+        """Core-seconds that a job is expected to take."""
+        known = max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0)
+        return (known or DEFAULT_SECONDS) + job.waits * job.threads
 
     def seconds_left(self) -> float | None:
         """Time until everything is done, from what is expected of the jobs and how long others took; None if unknown.
@@ -111,15 +127,17 @@ class Watch:
         now = self.clock()
         ended = [*self.done, *self.failed]
         ended_work = sum(map(self.work_of, ended))
-        taken = sum(job.seconds for job in ended)
+        taken = sum(job.seconds * job.threads for job in ended)
         # How much longer than expected jobs take on this machine, in this company.
         slowness = (taken + _PRIOR) / (ended_work + _PRIOR)
-        begun = sum(max(self.work_of(job) * slowness - (now - job.started), 0.0) for job in self.running.values())
-        waiting = Counter(self.total) - Counter(job.rule for job in [*ended, *self.running.values()])
-        return (begun + self._work_waiting(waiting) * slowness) / max(self.cores, 1)
+        running = self.running.values()
+        begun = sum(max(self.work_of(job) * slowness - (now - job.started) * job.threads, 0.0) for job in running)
+        waiting = Counter(self.total) - Counter(job.rule for job in [*ended, *running])
+        left = (begun + self._work_waiting(waiting) * slowness) / max(self.cores, 1)
+        return left if ended or running else left + self.environment
 
     def _work_waiting(self, waiting):
-        """Expected seconds of the jobs that have not begun: by rule, for which files they are for is not told."""
+        """Expected core-seconds of the jobs that have not begun: by rule, for which files they are for is not told."""
         known = {output for job in [*self.done, *self.failed, *self.running.values()] for output in job.outputs}
         left: dict[str, list[float]] = {}
         for output, seconds in self.expected.items():
@@ -133,26 +151,31 @@ class Watch:
         return work
 
 
-# Expected of a job of which nothing is known: a figure, a table.
-DEFAULT_SECONDS = 4.0
+# Expected of a job of which nothing is known: it writes a few lines.
+DEFAULT_SECONDS = 0.1
 
+# By what their files begin with, below the folder of results; the first that fits.
 _RULES = {
-    "surfaces": "surface",
-    "runs": "run",
-    "references/boundary_elements": "boundary_elements",
-    "references/loops": "boundary_element_loop",
-    "references/error_sources": "error_sources",
-    "references/one_asperity": "one_asperity",
+    "surfaces/": "surface",
+    "runs/": "run",
+    "references/boundary_elements/": "boundary_elements",
+    "references/loops/": "boundary_element_loop",
+    "references/error_sources/": "error_sources",
+    "references/one_asperity/": "one_asperity",
+    "references/": "reference",
+    "dataset/": "campaign_dataset",
+    MODEL_ERROR: "model_error",
+    "aggregated/": "comparison",
+    CHECKS: "checks",
+    "figures/": "figure",
+    REPORT: "report_page",
 }
 
 
 def rule_of(output: str) -> str:
     """The rule whose job makes a file under `results/<campaign>/`."""
     inside = "/".join(Path(output).parts[2:])
-    for folder, rule in _RULES.items():
-        if inside.startswith(f"{folder}/"):
-            return rule
-    return ""
+    return next((rule for beginning, rule in _RULES.items() if inside.startswith(beginning)), "")
 
 
 def _path(log: str) -> str:

@@ -1,5 +1,6 @@
 """Options that several commands have."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,13 @@ def _cores(value: str | None) -> str | None:
     if value is not None and value != "all" and not (value.isdecimal() and int(value) > 0):
         raise typer.BadParameter(f"{value!r} is neither a number of cores, 1 or more, nor `all`")
     return value
+
+
+def core_count(cores: str | None) -> int:
+    """How many cores are meant."""
+    if cores == "all":
+        return os.cpu_count() or 1
+    return int(cores) if cores else 2
 
 
 Config = Annotated[

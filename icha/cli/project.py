@@ -102,6 +102,14 @@ def read_configuration(path: Path):
     return configuration
 
 
+def profile_settings(folder: Path) -> dict:
+    """Settings of a profile of Snakemake, a folder; none if it is not there."""
+    import yaml
+
+    file = folder / "config.yaml"
+    return yaml.safe_load(file.read_text(encoding="utf-8")) or {} if file.is_file() else {}
+
+
 def shown(path: Path) -> Path:
     """The path as people like to read it: relative to the working directory where it lies in it."""
     path = Path(path)

@@ -14,8 +14,17 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.options import Config, Cores, Folder
-from icha.cli.project import DEFAULT, FAILED, Mistake, configuration_path, project, read_configuration, shown
+from icha.cli.options import Config, Cores, Folder, core_count
+from icha.cli.project import (
+    DEFAULT,
+    FAILED,
+    Mistake,
+    configuration_path,
+    profile_settings,
+    project,
+    read_configuration,
+    shown,
+)
 from icha.support.in_words import counted
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
@@ -48,11 +57,16 @@ def run(
     plain: Annotated[
         bool, typer.Option("--plain", help="Print a line for every job instead of the live view.")
     ] = False,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Run it even if memory or disk are not expected to suffice.")
+    ] = False,
 ) -> None:
     """Run a campaign; what is there and up to date is not computed again.
 
     Ends with what failed, and where figures, dataset and report are. Exit status: 0 if everything was made, 1 if
     something failed (the rest is made all the same), 2 if the campaign cannot be run.
+
+    What needs more memory or disk than is there is not begun without asking, or, where nobody can be asked, not at all.
 
     Ctrl-C stops it; the next call goes on where it was.
     """
@@ -80,10 +94,15 @@ def run(
 
     from icha.cli.events import Watch
     from icha.cli.live import LiveView, PlainView
-    from icha.planning.plan import expected_seconds
+    from icha.planning.constants import FITTED
+    from icha.planning.plan import expected_seconds, plan, time_on
 
     console = Console()
-    watch = Watch(expected_seconds(campaign, folder / "results" / campaign.name))
+    items = plan(campaign, folder / "results" / campaign.name)
+    if not anyway:
+        settings = profile_settings(_profile(profile or "default", home))
+        _ask_if_wanting(items, asked, core_count(cores), folder / "results" / campaign.name, settings)
+    watch = Watch(expected_seconds(items, f"results/{campaign.name}"), environment=FITTED.workflow.environment)
     if plain or not console.is_terminal:
         view = PlainView(watch, campaign.name, folder, lambda line: print(line, flush=True))
     else:
@@ -96,7 +115,9 @@ def run(
         except Mistake:
             log.unlink(missing_ok=True)
             raise
-    _tell(status, stopped, watch, campaign, folder, log)
+    # What `icha describe` says: of everything, on this machine.
+    promised = None if profile or set(asked) - {"all"} else time_on(items, core_count(cores))
+    _tell(status, stopped, watch, campaign, folder, log, promised)
     if not status and "publish" in asked:
         deposit = f"{campaign.name}-{campaign.published().version}.zip"
         print(f"deposit: {shown(folder / 'results' / campaign.name / 'publish' / deposit)}")
@@ -110,6 +131,35 @@ def _profile(asked: str, home: Path) -> Path:
             return path.resolve()
     there = sorted(path.parent.name for path in (home / "profiles").glob("*/config.yaml"))
     raise Mistake(f"--profile {asked}: no folder with a config.yaml; there are: {', '.join(there)}")
+
+
+def _ask_if_wanting(items, asked: list[str], cores: int, results: Path, profile: dict) -> None:
+    """Have somebody say whether to go on where memory or disk will not do.
+
+    Raises
+    ------
+    Mistake
+        If nobody is there to be asked, or says no.
+    """
+    from icha.planning.needs import wanting
+
+    if "surfaces" in asked:
+        items = [item for item in items if item.part == "surfaces"]
+    elif not set(asked) <= set(TARGETS):
+        return  # single files, of which nothing is known
+    lacks = wanting(items, cores, results, profile)
+    if not lacks:
+        return
+    said = "\n".join(["not enough for what is to be done:", *(f"  {lack}" for lack in lacks)])
+    if not _at_a_terminal():
+        raise Mistake(f"{said}\nNothing was begun; --anyway begins it all the same")
+    typer.secho(said, fg="red")
+    if not typer.confirm("Begin all the same?"):
+        raise Mistake("nothing was begun")
+
+
+def _at_a_terminal() -> bool:
+    return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def _rehearse(command: list[str], home: Path, campaign, asked: list[str]) -> None:
@@ -223,8 +273,8 @@ def _listen(reading: int, watch, view, stopped: list) -> None:
                 view.ended(job, failed)
 
 
-def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) -> None:
-    """Print what has become of the campaign."""
+def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, promised: float | None) -> None:
+    """Print what has become of the campaign, and in how many seconds of those that were promised."""
     from icha.cli.events import reason_of
     from icha.planning.plan import failed_runs
     from icha.support import in_words
@@ -237,8 +287,9 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path) 
     if status == 0 and watch.started is None:
         print("Nothing to do: everything that was asked for is there and up to date.")
     elif ended:
-        took = in_words.duration(watch.clock() - watch.started)
-        print(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}")
+        took = in_words.duration(watch.clock() - watch.called)
+        beside = f"; about {in_words.duration(promised)} were expected" if promised and ended == watch.job_count else ""
+        print(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}{beside}")
     incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
     if incomplete:
         _heading(f"{counted(len(incomplete), 'run')} could not be computed to the end:")

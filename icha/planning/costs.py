@@ -1,11 +1,9 @@
-"""What computing costs: seconds on one core, memory and disk of surfaces, runs and boundary elements, beforehand.
+"""What computing costs: seconds on one core, memory and disk of whatever a campaign makes, beforehand.
 
-The formulas say how costs grow: with the nodes of a grid, with the number of summits, with the load. Their constants
-were fitted by eye to processor times on one core of an Intel Xeon: of about a hundred runs on grids of 64 to 1024 nodes
-a side like those of group `fitted` of `benchmarks/costs.py`, of boundary elements on 32 to 512 nodes a side, and of the
-scaling and the full challenge surface in docs/benchmarks.md. That benchmark prints predicted over measured, also for
-surfaces and loads that were not part of the fit. Expect a factor of two either way, more where nothing can be known
-beforehand of how a path will go; `correction` brings in what a campaign's own jobs took.
+The formulas say how costs grow: with the nodes of a grid, with summits and spots, with loads and jumps. Their
+constants, `icha.planning.constants`, were fitted to processor times of some dozens of small cases;
+`benchmarks/costs.py` prints expected over measured for others. Expect a factor of two either way, more where nothing
+can be known beforehand of how a path will go; `correction` brings in what a campaign's own jobs took.
 """
 
 from __future__ import annotations
@@ -16,19 +14,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from icha.path.limits import DEFAULT_STEP
+from icha.planning.constants import FITTED, Constants, MiB
 
-_MiB = 2**20
-# A job's process: start, imports and files in s, memory in bytes.
-JOB_SECONDS = 0.4
-_PROGRAM = 140 * _MiB
 _DOUBLE = 8
-# Seconds for the labelled dataset of a run, and for that of boundary elements.
-_DATASET, _SOLUTION = 0.2, 0.15
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds on one core, largest memory in bytes, and disk in bytes."""
+    """Seconds on one core, largest memory that is the job's own in bytes, and disk in bytes."""
 
     seconds: float
     memory: float
@@ -40,28 +33,53 @@ class Cost:
 
 
 @dataclass(frozen=True)
+class Roughness:
+    """What of a surface the cost of a run depends on.
+
+    Parameters
+    ----------
+    grid : nodes a side.
+    summits : number of summits.
+    hills : number of hills that carry them: area over the square of the ratio of rms height and slope of a profile.
+    sharpness : h_rms^(3/2) kappa_rms^(1/2) at rms slope 1, m, with the rms curvature kappa of a profile: what the
+        adhesion of a spot is held against.
+    """
+
+    grid: int
+    summits: float
+    hills: float
+    sharpness: float
+
+
+@dataclass(frozen=True)
 class Sweep:
     """What of a path and a material the cost of a run depends on.
 
     Parameters
     ----------
-    stops, snapshots : number of stops, and of those that keep their fields.
-    largest_load : largest reduced pressure p/(E* h'_rms).
-    adhesive : whether there is adhesion.
+    loads : reduced pressures p/(E* h'_rms) of the stops of the first loading.
+    snapshots : number of stops that keep their fields.
+    adhesion : surface energy over E* and the sharpness of the surface at its slope: 0 without adhesion.
     legs : legs after the first loading: 0, or 1 and more for ways back and in again.
     max_step : longest step of the mean separation, in h_rms.
     """
 
-    stops: int
+    loads: tuple[float, ...]
     snapshots: int
-    largest_load: float
-    adhesive: bool
+    adhesion: float
     legs: int = 0
     max_step: float = DEFAULT_STEP
 
 
-# A figure as PNG and PDF.
-FIGURE = Cost(3.0, 230 * _MiB, 170e3)
+def roughness_of(grid: int, period: float, m0: float, m2: float, m4: float, summits: float | None = None) -> Roughness:
+    """Of a surface with variances m0 (m^2), m2, m4 (m^-2) of a profile's heights, slopes and curvatures.
+
+    Its summits, unless they were counted, are those expected of an isotropic Gaussian surface.
+    """
+    expected = gaussian_summits(period, m2, m4) if summits is None else summits
+    # At rms slope 1 of the surface m2 is 1/2.
+    sharpness = m0**0.75 * m4**0.25 / (2 * m2)
+    return Roughness(grid, expected, period**2 * m2 / m0, sharpness)
 
 
 def gaussian_summits(period: float, m2: float, m4: float) -> float:
@@ -77,10 +95,13 @@ def gaussian_summits(period: float, m2: float, m4: float) -> float:
     return period**2 * m4 / (6 * math.sqrt(3) * math.pi * m2)
 
 
-def self_affine_summits(period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float) -> float:
-    """Expected number of summits of a self-affine surface with roll-off; m.
+def self_affine_moments(
+    period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
+) -> tuple[float, float, float]:
+    """m0, m2, m4 of a self-affine surface with roll-off, but for a common factor; lengths in m.
 
-    Of the spectrum's moments as integrals over the plane of wave vectors, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
+    Of the spectrum's moments as integrals over the plane of wave vectors, m0 = int C, m2 = 1/2 int q^2 C,
+    m4 = 3/8 int q^4 C.
     """
     q_l, q_0, q_1 = (2 * math.pi / length for length in (period, rolloff_wavelength, short_wavelength))
 
@@ -90,12 +111,13 @@ def self_affine_summits(period: float, rolloff_wavelength: float, short_waveleng
         falling = math.log(q_1 / q_0) if power == 0 else math.expm1(power * math.log(q_1 / q_0)) / power
         return (q_0 ** (order + 2) - q_l ** (order + 2)) / (order + 2) + q_0 ** (order + 2) * falling
 
-    return gaussian_summits(period, moment(2) / 2, 3 / 8 * moment(4))
+    return moment(0), moment(2) / 2, 3 / 8 * moment(4)
 
 
-def summits_of_grid(grid: int) -> float:
-    """A guess at the number of summits where only the nodes a side are known: shortest waves of eight cells."""
-    return (grid / 8) ** 2 / 4.5
+def self_affine_summits(period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float) -> float:
+    """Expected number of summits of a self-affine surface with roll-off; m."""
+    _, m2, m4 = self_affine_moments(period, rolloff_wavelength, short_wavelength, hurst)
+    return gaussian_summits(period, m2, m4)
 
 
 def job_threads(grid: int) -> int:
@@ -103,102 +125,132 @@ def job_threads(grid: int) -> int:
     return 2 if grid >= 2048 else 1
 
 
-def surface_cost(grid: int) -> Cost:
+def surface_cost(grid: int, of: Constants = FITTED) -> Cost:
     """Making a topography of `grid` nodes a side, and writing it."""
     heights = _DOUBLE * grid**2
     # Heights of grids between 64 and 2048 nodes are compressed, by about a sixth.
     compression = 0.84 if 64 <= grid < 2048 else 1.0
-    return Cost(JOB_SECONDS + 1.2e-7 * grid**2, _PROGRAM + 2.7 * heights, 18e3 + compression * heights)
+    seconds = of.making.file + of.making.node * grid**2
+    return Cost(seconds, _own(of, grid) + 2.7 * heights, 18e3 + compression * heights)
 
 
-def sweep_cost(grid: int, summits: float, sweep: Sweep) -> Cost:
-    """A run of `icha.simulate` on a surface of `grid` nodes a side with so many summits."""
-    loaded = _loaded(sweep)
-    spots = _spots(summits, sweep)
-    fields = (1e-7 + 2e-7 * sweep.snapshots) * grid**2
-    # Loading solves at jumps and unions, whose number is that of the spots, more than at the stops that are asked for.
-    effort = 1 + 0.008 * (sweep.stops + 2 / sweep.max_step)
-    loading = 6.3e-4 * summits * (1 + (summits / 1.5e5) ** 0.6)
-    seconds = JOB_SECONDS + _DATASET + fields + loaded * loading * effort
-    steps = sweep.stops
+def _own(of, grid=0):
+    """Memory that the job of a surface has before it begins."""
+    return of.workflow.program if job_threads(grid) > 1 else of.workflow.forked
+
+
+def sweep_cost(rough: Roughness, sweep: Sweep, of: Constants = FITTED) -> Cost:
+    """A run of `icha.simulate` by asperities."""
+    here, nodes = of.loading, rough.grid**2
+    met = [spots(rough, load) for load in sweep.loads]
+    most = max(met)
+    at_stops = sum(here.stop + here.spot * each * _crowded(each, here) for each in met)
+    seconds = here.run + (here.node + here.field * sweep.snapshots) * nodes
+    seconds += at_stops + here.event * most * _crowded(most, here)
+    steps = len(sweep.loads)
     if sweep.legs:
-        steps += cyclic_steps(spots, sweep)
-        seconds += steps * ((0.0135 if sweep.adhesive else 0.0095) + 1e-5 * summits)
-    disk = 58e3 + 57 * spots * max(sweep.snapshots + bool(sweep.legs), 1) + 160 * steps + 20e3 * bool(sweep.legs)
-    return Cost(seconds, _PROGRAM + _DOUBLE * grid**2 + 9 * 1024 * summits, disk)
+        steps = cyclic_steps(most, sweep, of)
+        seconds += steps * (of.cycle.step + of.cycle.spot * most)
+    disk = 58e3 + 57 * most * max(sweep.snapshots + bool(sweep.legs), 1) + 160 * steps + 20e3 * bool(sweep.legs)
+    memory = _own(of, rough.grid) + here.memory * (2 if sweep.legs else 1) + _DOUBLE * nodes + 9 * 1024 * rough.summits
+    return Cost(seconds, memory, disk)
 
 
-def _loaded(sweep):
-    """How far a path goes, of the largest loads that the model covers."""
-    return min(1.0, (sweep.largest_load / 0.08) ** 0.55)
+def _crowded(count, here):
+    return 1 + (count / here.crowd) ** 0.6
 
 
-def _spots(summits, sweep):
-    """Spots at the largest load: up to about half of the summits, where the model ends; small surfaces have more."""
-    return max(1.0, min(summits, (summits + 40) * _loaded(sweep) / 2))
+def spots(rough: Roughness, load: float) -> float:
+    """Spots at a reduced pressure: there are the more the more summits and the more hills there are."""
+    return max(1.0, min(0.6 * rough.summits, 1.0 * math.sqrt(rough.summits * rough.hills * load)))
 
 
-# Boundary elements in the limit of a short range: seconds of a pair of transforms over n^2 log2 n; pairs for a state
-# with adhesion and without; states for a stop, and the way in from first contact, in h_rms, along which steps are long.
-_TRANSFORMS = 6.5e-10
-_PAIRS, _PAIRS_WITHOUT_ADHESION = 300, 65
-_STATES_AT_STOP, _WAY_IN = 3, 3.0
-# Arrays of the grid that they hold at a time; bytes of a cell that a snapshot's maps take, compressed.
+# Arrays of the grid that boundary elements hold at a time; bytes of a cell that a snapshot's maps take, compressed.
 PATCH_ARRAYS = 30
 _MAPS = 1.5
 
 
-def patch_states(summits: float, sweep: Sweep) -> float:
-    """Equilibria of a run by boundary elements: at its stops, between them, and on ways back at every jump."""
-    states = (1 + sweep.legs) * (_STATES_AT_STOP * sweep.stops + _WAY_IN / sweep.max_step)
-    return states + (cyclic_steps(_spots(summits, sweep), sweep) if sweep.legs else 0)
-
-
-def patch_cost(grid: int, summits: float, sweep: Sweep) -> Cost:
-    """A run of `icha.simulate` by boundary elements on a surface of `grid` nodes a side with so many summits."""
-    cells, states = grid**2, patch_states(summits, sweep)
-    pairs = _PAIRS if sweep.adhesive else _PAIRS_WITHOUT_ADHESION
-    seconds = JOB_SECONDS + _DATASET + states * pairs * _TRANSFORMS * cells * math.log2(grid)
+def patch_cost(rough: Roughness, sweep: Sweep, of: Constants = FITTED) -> Cost:
+    """A run of `icha.simulate` by boundary elements in the limit of a short range."""
+    cells = rough.grid**2
+    transforms = cells * math.log2(rough.grid)
+    here, stops = of.patches, len(sweep.loads)
+    longer = 1.0
+    if sweep.adhesion:
+        density = max(rough.summits, 1) / cells
+        longer = here.adhesion * (sweep.adhesion / 0.01) ** here.strength * (density / 0.01) ** here.density
+    states = stops + here.way * DEFAULT_STEP / sweep.max_step
+    seconds = of.loading.run + states * here.stop * transforms * longer
+    if sweep.legs:
+        here, states = of.patch_cycle, cyclic_steps(max(spots(rough, load) for load in sweep.loads), sweep, of)
+        seconds += states * (here.step + here.cell * transforms) * (here.adhesion if sweep.adhesion else 1)
     disk = 80e3 + 160 * states + _MAPS * cells * (sweep.snapshots + bool(sweep.legs))
-    return Cost(seconds, _PROGRAM + PATCH_ARRAYS * _DOUBLE * cells, disk)
+    return Cost(seconds, of.workflow.forked + of.loading.memory + PATCH_ARRAYS * _DOUBLE * cells, disk)
 
 
-def cyclic_steps(spots: float, sweep: Sweep) -> float:
+def cyclic_steps(most: float, sweep: Sweep, of: Constants = FITTED) -> float:
     """Equilibria of a path both ways: every spot comes and goes, and with adhesion each of its jumps is resolved."""
-    events = 2 * spots
-    jumps = 40 * events**0.6 if sweep.adhesive else 55 + 0.5 * events
-    return (1 + sweep.legs) / 2 * (45 * DEFAULT_STEP / sweep.max_step + jumps)
+    here = of.cycle
+    jumps = here.jumps * most**here.together if sweep.adhesion else here.touches * most
+    return (1 + sweep.legs) / 2 * (here.way * DEFAULT_STEP / sweep.max_step + jumps)
 
 
-def solution_cost(nodes: int, reduced_pressure: float, *, adhesive: bool) -> Cost:
+def solution_cost(nodes: int, reduced_pressure: float, of: Constants = FITTED, *, adhesive: bool) -> Cost:
     """Boundary elements of `nodes` a side at one load; with adhesion the mean gap that carries it is searched for."""
-    seconds = JOB_SECONDS + _SOLUTION + _solver(nodes, reduced_pressure, adhesive)
-    return Cost(seconds, _PROGRAM + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
+    seconds = of.finite_range.run + _solver(nodes, reduced_pressure, of, adhesive)
+    return Cost(seconds, of.workflow.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
-def _solver(nodes, reduced_pressure, adhesive):
+def _solver(nodes, reduced_pressure, of, adhesive):
     if adhesive:
-        return 2.6 * (nodes / 256) ** 3
-    return 2.2 * (nodes / 512) ** 3.1 * (reduced_pressure / 0.01) ** 0.3
+        # At light loads the search for the gap takes longer.
+        return of.finite_range.adhesive * (nodes / 256) ** 3 * (0.01 / reduced_pressure) ** 0.5
+    return of.finite_range.bare * (nodes / 512) ** 3.1 * (reduced_pressure / 0.01) ** 0.3
 
 
-def loop_cost(nodes: int, separation_step: float, *, adhesive: bool) -> Cost:
+def loop_cost(nodes: int, separation_step: float, of: Constants = FITTED, *, adhesive: bool) -> Cost:
     """Boundary elements both ways in steps of `separation_step` (in h_rms), which are divided where spots jump."""
     steps = 7 / separation_step + (35 if adhesive else 0)
-    seconds = JOB_SECONDS + _SOLUTION + 1.2 * steps * _solver(nodes, 0.01, adhesive)
-    return Cost(seconds, _PROGRAM + 20 * _DOUBLE * nodes**2, 33e3)
+    seconds = of.finite_range.run + of.finite_range.loop_step * steps * _solver(nodes, 0.01, of, adhesive)
+    return Cost(seconds, of.workflow.forked + 20 * _DOUBLE * nodes**2, 33e3)
 
 
-def sources_cost(nodes: int, reduced_pressures: Sequence[float], *, adhesive: bool) -> Cost:
+def sources_cost(nodes: int, reduced_pressures: Sequence[float], of: Constants = FITTED, *, adhesive: bool) -> Cost:
     """Sources of the model's error: some variants of the model and of boundary elements at every load."""
-    seconds = JOB_SECONDS + 0.7 + sum(0.2 + 2.5 * _solver(nodes, load, adhesive) for load in reduced_pressures)
-    return Cost(seconds, _PROGRAM + 25 * _MiB + 20 * _DOUBLE * nodes**2, 28e3)
+    here = of.finite_range
+    each = sum(0.2 + here.sources * _solver(nodes, load, of, adhesive) for load in reduced_pressures)
+    return Cost(here.run + 0.7 + each, of.workflow.forked + 25 * MiB + 20 * _DOUBLE * nodes**2, 28e3)
 
 
-def one_asperity_cost(tabor_parameter: float | None) -> Cost:
+def one_asperity_cost(tabor_parameter: float | None, of: Constants = FITTED) -> Cost:
     """One asperity by model and boundary elements, whose nodes a side grow with the square of the Tabor parameter."""
     nodes = 800 * ((tabor_parameter or 1.5) / 4) ** 2
-    return Cost(JOB_SECONDS + 2.0 + 240 * (nodes / 800) ** 3, _PROGRAM + 20 * _DOUBLE * nodes**2, 23e3)
+    seconds = of.finite_range.run + 2.0 + of.finite_range.asperity * (nodes / 800) ** 3
+    return Cost(seconds, of.workflow.forked + 20 * _DOUBLE * nodes**2, 23e3)
+
+
+def theories_cost(of: Constants = FITTED) -> Cost:
+    """Theories and literature for a surface."""
+    return Cost(of.gathering.theories, of.workflow.forked, 35e3)
+
+
+def table_cost(seconds: float, disk: float, of: Constants = FITTED) -> Cost:
+    """A file that holds something of every run, which takes so many seconds for all of them."""
+    return Cost(of.gathering.table + seconds, of.workflow.forked + of.gathering.table_memory, disk)
+
+
+def figure_cost(runs: int, nodes: int, of: Constants = FITTED) -> Cost:
+    """A figure of so many runs, as PNG and PDF, with a topography of so many nodes."""
+    here = of.gathering
+    seconds = here.figure + here.figure_run * runs + here.map_node * nodes
+    return Cost(seconds, of.workflow.forked + here.figure_memory + 3 * _DOUBLE * nodes, 400e3)
+
+
+def report_cost(runs: int, figures: int, of: Constants = FITTED) -> Cost:
+    """The report, which holds its figures."""
+    here = of.gathering
+    seconds = here.report + here.report_run * runs + here.report_figure * figures
+    return Cost(seconds, of.workflow.forked + here.report_memory, 700e3 + 250e3 * figures)
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:

@@ -1,32 +1,38 @@
 """Every file that a campaign computes: what is there, what is to be done, and what that is expected to cost."""
 
 import json
+import math
 import statistics
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.settings import run_settings, run_sha256
-from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import ASPERITIES
-from icha.datasets.results import job_file
+from icha.datasets import results as results_files
+from icha.datasets.results import ResultFiles, job_file
+from icha.figures.registry import DECLARATIONS
 from icha.planning import costs
+from icha.planning.constants import FITTED, Constants
 from icha.planning.resources import run_threads
-from icha.planning.results import campaign_files
+from icha.planning.results import CampaignFiles, campaign_files
+from icha.planning.roughness import roughness
 from icha.support.checksums import is_whole
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
 # So many of the files that are there are compared with what was expected of them.
 _SAMPLE = 200
+# Taken for the reduced pressure of stops that are given as separations.
+_UNKNOWN_LOAD = 0.03
 
 
 @dataclass(frozen=True)
 class Item:
     """One file: the part of the campaign that it belongs to, its path in the results, its state and its cost.
 
-    `threads` are the cores that its job takes.
+    `threads` are the cores that its job takes; jobs of a `stage` wait for those of the stages before.
     """
 
     part: str
@@ -35,6 +41,7 @@ class Item:
     cost: costs.Cost
     threads: int = 1
     reason: str = ""
+    stage: int = 0
 
     @property
     def is_run(self) -> bool:
@@ -47,58 +54,74 @@ class Item:
         return self.state in (TO_DO, CHANGED, DAMAGED)
 
 
-def plan(campaign: Campaign, results: Path) -> list[Item]:
-    """All files of a campaign but those that are made of others at little cost, in the order of the configuration.
+def plan(campaign: Campaign, results: Path, of: Constants = FITTED) -> list[Item]:
+    """All files of a campaign but those that cost next to nothing, in the order in which they are made.
 
     A run counts as done if its file is there and was made with the present settings (`config_sha256`); whether the
-    program has changed since is known to Snakemake only. Other files count as done if they are there. What is not what
-    was written, by its record (`icha.support.checksums`), is damaged, and to be made again.
+    program has changed since is known to Snakemake only. Other files count as done if they are there, and what they
+    are made of is. What is not what was written, by its record (`icha.support.checksums`), is damaged, and to be made
+    again.
 
     Parameters
     ----------
     campaign : the campaign.
     results : its folder of results. Benchmarks in there of jobs that were done say how fast this machine is.
+    of : constants of the costs.
     """
-    return list(_calibrated(_items(campaign, results), results))
+    return list(_calibrated(_items(campaign, results, of), results))
 
 
-def _items(campaign, results) -> Iterator[Item]:
+def _items(campaign, results, of) -> list[Item]:
+    files = campaign_files(campaign)
+    items = list(_computed(campaign, results, files, of))
+    made_anew = {item.path for item in items if item.to_do}
+    for part, path, stage, inputs, cost in _gathered(campaign, files, items, of):
+        state = _there(results, path)
+        if state == DONE and not made_anew.isdisjoint(inputs):
+            state = TO_DO
+        items.append(Item(part, path, state, cost, stage=stage))
+        if items[-1].to_do:
+            made_anew.add(path)
+    return items
+
+
+def _there(results, path):
+    return TO_DO if not (results / path).is_file() else DONE if is_whole(results, path) else DAMAGED
+
+
+def _computed(campaign, results, files, of) -> Iterator[Item]:
+    """Surfaces, runs, and what is computed beside them."""
     grid = campaign.grid
-
-    @cache
-    def asperities(surface):
-        return _asperities(campaign, surface, results / "surfaces" / surface)
+    rough = cache(lambda surface: roughness(campaign, surface))
 
     def there(part, path, cost, threads=1):
-        state = TO_DO if not (results / path).is_file() else DONE if is_whole(results, path) else DAMAGED
-        return Item(part, path, state, cost, threads)
-
-    def threads(surface):
-        return costs.job_threads(grid(surface))
+        return Item(part, path, _there(results, path), cost, threads)
 
     def beside(part, entries, cases, cost, asked):
         for path, case in cases.items():
             entry = entries[case.entry]
             adhesive = campaign.materials[case.material].surface_energy > 0
             nodes = grid(case.surface) * entry.refinement
-            yield there(f"{part} {case.entry}", path, cost(nodes, asked(entry, case), adhesive=adhesive))
+            yield there(f"{part} {case.entry}", path, cost(nodes, asked(entry, case), of, adhesive=adhesive))
 
-    files = campaign_files(campaign)
     for path, (name, _) in files.surfaces.items():
-        yield there("surfaces", path, costs.surface_cost(grid(name)), threads(name))
+        yield there("surfaces", path, costs.surface_cost(grid(name), of), costs.job_threads(grid(name)))
     sweep_cost, patch_cost = cache(costs.sweep_cost), cache(costs.patch_cost)
     for path, case in files.runs.items():
         state, reason = run_state(results / path, run_sha256(campaign, case))
         if not is_whole(results, path):
             state, reason = DAMAGED, ""
-        settings = _described(run_settings(campaign, case), case.rms_slope)
+        surface = rough(case.surface)
+        settings = _described(run_settings(campaign, case), case.rms_slope, surface)
         part, cores = f"study {case.study}", run_threads(campaign, case)
         if case.model == ASPERITIES:
-            cost = sweep_cost(grid(case.surface), asperities(case.surface), settings)
+            cost = sweep_cost(surface, settings, of)
         else:
-            cost = patch_cost(grid(case.surface), asperities(case.surface), settings)
+            cost = patch_cost(surface, settings, of)
             part = f"{part}, boundary elements"
         yield Item(part, path, state, cost, cores, reason)
+    for path in files.theories:
+        yield there("theories", path, costs.theories_cost(of))
     yield from beside(
         "boundary elements",
         campaign.boundary_elements,
@@ -121,56 +144,67 @@ def _items(campaign, results) -> Iterator[Item]:
         lambda entry, case: tuple(entry.reduced_pressures),
     )
     for path, tabor_parameter in files.one_asperity.items():
-        yield there("one asperity", path, costs.one_asperity_cost(tabor_parameter))
-    for path in files.figures:
-        if path.endswith(".png"):  # the same job makes the other
-            yield there("figures", path, costs.FIGURE)
+        yield there("one asperity", path, costs.one_asperity_cost(tabor_parameter, of))
 
 
-def _described(settings, rms_slope) -> costs.Sweep:
+def _gathered(
+    campaign, files: CampaignFiles, computed: list[Item], of
+) -> Iterator[tuple[str, str, int, Iterable[str], costs.Cost]]:
+    """What is made of runs: part, path, stage, inputs and cost."""
+    runs, here = len(files.runs), of.gathering
+    size = sum(item.cost.disk for item in computed if item.is_run)
+
+    def table(path, stage, inputs, each, disk):
+        return "dataset and checks", path, stage, inputs, costs.table_cost(each, disk, of)
+
+    yield table(files.dataset, 1, files.runs, here.dataset_run * runs, 0.5 * size)
+    yield table(files.comparison, 2, [files.dataset], here.comparison_run * runs, 0.03 * size + 90e3)
+    beside = [*files.compared, *files.solutions]
+    for path in files.model_error:
+        yield table(path, 2, [files.dataset, *beside], here.error_run * len(beside), 150e3)
+    yield table(files.checks, 2, [files.dataset, *files.solutions], here.checks_run * runs, 5e3 * runs)
+    for name in campaign.figures.drawn():
+        path = ResultFiles(campaign.name).path(results_files.FIGURE, name=name, ending="png")
+        inputs = campaign.figures.inputs(name, campaign, ResultFiles(campaign.name))
+        shown = set(campaign.figures.studies_of(name, campaign))
+        grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
+        cost = costs.figure_cost(
+            sum(case.study in shown for case in files.runs.values()),
+            max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0,
+            of,
+        )
+        yield "figures", path, 3, _flat(inputs), cost
+    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, of)
+
+
+def _flat(inputs):
+    return [path for each in inputs.values() for path in ([each] if isinstance(each, str) else each)]
+
+
+def _described(settings, rms_slope, rough) -> costs.Sweep:
     """What of a run's settings its cost depends on."""
-    path = settings["path"]
-    stops = path.get("reduced_pressures") or path.get("area_fractions") or path.get("mean_separations")
+    path, material = settings["path"], settings["material"]
     snapshots = path["snapshots"] if path["snapshots"] is not None else [()]
     return costs.Sweep(
-        stops=len(stops),
+        loads=tuple(_loads(path, snapshots, rms_slope)),
         snapshots=len(snapshots),
-        largest_load=_largest_load(path, snapshots, rms_slope),
-        adhesive=settings["material"]["surface_energy"] > 0,
+        adhesion=material["surface_energy"] / material["contact_modulus"] / (rough.sharpness * rms_slope**2),
         legs=len(path.get("turning_points", ())) + bool(path.get("unload")),
         max_step=path["max_step"],
     )
 
 
-def _largest_load(path, snapshots, rms_slope):
-    """Largest reduced pressure of a path, roughly: half of the area fraction; unknown for separations."""
+def _loads(path, snapshots, rms_slope):
+    """Reduced pressures of the stops of a path, roughly: half of the area fractions; of separations a guess."""
     loads = {
         "reduced_pressure": lambda value: value,
         "relative_load": lambda value: value / rms_slope,
         "area_fraction": lambda value: value / 2,
+        "mean_separation": lambda value: _UNKNOWN_LOAD,
     }
-    states = [(kind, value) for kind, value in (tuple(s) for s in snapshots if s) if kind in loads]
-    for kind in ("reduced_pressure", "area_fraction"):
-        states += [(kind, value) for value in path.get(f"{kind}s") or ()]
-    return max((loads[kind](value) for kind, value in states), default=0.05)
-
-
-def _asperities(campaign: Campaign, name: str, folder: Path) -> float:
-    """Expected number of summits: from the spectrum, or else from the moments of a surface file that is there."""
-    surface = campaign.surfaces[name]
-    if isinstance(surface, SelfAffineSurface):
-        return costs.self_affine_summits(
-            surface.period, surface.rolloff_wavelength, surface.short_wavelength, surface.hurst
-        )
-    from icha.datasets.surface_file import read_spectral_moments
-
-    for file in sorted(folder.glob("seed*.nc")):
-        try:
-            moments = read_spectral_moments(file)
-        except ValueError:
-            continue
-        return costs.gaussian_summits(campaign.period(name), moments.m2, moments.m4)
-    return costs.summits_of_grid(campaign.grid(name))
+    stops = [(kind, value) for kind in loads for value in path.get(f"{kind}s") or ()]
+    stops += [tuple(snapshot) for snapshot in snapshots if snapshot and tuple(snapshot) not in stops]
+    return [loads[kind](value) for kind, value in stops]
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
@@ -226,9 +260,9 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
     return {path: reason for path, (state, reason) in states.items() if state == FAILED}
 
 
-def expected_seconds(campaign: Campaign, results: Path) -> dict[str, float]:
-    """Expected seconds of the job of every file of `plan`, by its path from the folder in which results/ stands."""
-    return {f"results/{results.name}/{item.path}": item.cost.seconds for item in plan(campaign, results)}
+def expected_seconds(items: Iterable[Item], folder: str, of: Constants = FITTED) -> dict[str, float]:
+    """Expected core-seconds of the job of every item, handing it out included, by its path with `folder` before it."""
+    return {f"{folder}/{item.path}": item.cost.seconds * item.threads + of.workflow.job for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
@@ -236,12 +270,8 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
 
     By the cost model alone, whatever the jobs of this machine have taken: the same wherever it is asked for.
     """
-    each = [(item.cost, item.threads) for item in _items(campaign, results)]
-    return costs.Cost(
-        sum(cost.seconds * threads for cost, threads in each),
-        max(cost.memory for cost, _ in each),
-        sum(cost.disk for cost, _ in each),
-    )
+    items = [replace(item, state=TO_DO) for item in _items(campaign, results, FITTED)]
+    return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)
 
 
 def _calibrated(items: Iterable[Item], results: Path) -> Iterator[Item]:
@@ -309,16 +339,45 @@ def total(items: Iterable[Item]) -> Total:
     )
 
 
-def time_on(items: Iterable[Item], cores: int) -> float:
-    """Seconds that what is to be done takes on some cores: the work shared out, but never less than the longest job."""
+def time_on(items: Iterable[Item], cores: int, of: Constants = FITTED) -> float:
+    """Seconds from the call to the end on some cores, if anything is to be done.
+
+    The work of every stage is shared out, but takes never less than its longest job; jobs are handed out one by one.
+    """
+    items = list(items)
+    stages: dict[int, list[Item]] = {}
+    for item in items:
+        stages.setdefault(item.stage, []).append(item)
+    return start_up(items, of) + sum(_stage_on(stage, cores, of) for stage in stages.values())
+
+
+def _stage_on(items, cores, of):
     sums = total(items)
-    return max(sums.work / cores, sums.longest)
+    handing_out = of.workflow.job * sums.to_do
+    return max((sums.work + handing_out) / cores, sums.longest, handing_out)
 
 
-def memory_on(items: Iterable[Item], cores: int) -> float:
-    """Bytes that the largest jobs to be done take, as many as run side by side."""
-    memory, free = 0.0, cores
-    for item in sorted((item for item in items if item.to_do), key=lambda item: -item.cost.memory):
+def start_up(items: Collection[Item], of: Constants = FITTED) -> float:
+    """Seconds until the first job, for what is to be done: Snakemake, its plan, what jobs import."""
+    if not any(item.to_do for item in items):
+        return 0.0
+    here = of.workflow
+    return here.start + here.planned * len(items) + here.environment
+
+
+def around_jobs(items: Collection[Item], of: Constants = FITTED) -> float:
+    """Seconds on one core that go into starting and into handing out what is to be done."""
+    return start_up(items, of) + of.workflow.job * sum(item.to_do for item in items)
+
+
+def memory_on(items: Iterable[Item], cores: int, most: float = math.inf, of: Constants = FITTED) -> float:
+    """Bytes that Snakemake and the largest jobs to be done take, as many as run side by side.
+
+    Those side by side are let take no more than `most`, unless one does alone.
+    """
+    left = sorted((item for item in items if item.to_do), key=lambda item: -item.cost.memory)
+    together, free = 0.0, cores
+    for item in left:
         if item.threads <= free or free == cores:
-            memory, free = memory + item.cost.memory, free - item.threads
-    return memory
+            together, free = together + item.cost.memory, free - item.threads
+    return of.workflow.memory + min(together, max(most, left[0].cost.memory)) if left else 0.0

@@ -23,7 +23,8 @@ from icha.configuration.load import load_configuration
 from icha.configuration.settings import run_sha256
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
-from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
+from icha.planning.constants import FITTED
+from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, start_up, time_on, total
 from icha.support.checksums import damaged, write_checksum
 
 HEAVY = ["scipy", "pandas", "xarray", "matplotlib", "netCDF4", "snakemake"]
@@ -274,7 +275,7 @@ def test_jobs_that_were_slow_make_the_rest_expected_slower(project):
     campaign, results = load_configuration("tiny.yaml").campaign, project / "results/tiny"
 
     def left():
-        return time_on([item for item in plan(campaign, results) if item.is_run], 1)
+        return total(item for item in plan(campaign, results) if item.is_run).work
 
     before = left()
     for case in run_cases(campaign)[:3]:
@@ -289,11 +290,55 @@ def test_jobs_that_were_slow_make_the_rest_expected_slower(project):
     assert left() > 5 * before
 
 
-def test_time_on_several_cores_is_never_less_than_the_longest_job(project):
+def test_time_on_several_cores_is_never_less_than_the_longest_job_of_every_stage(project):
     Path("tiny.yaml").write_text(TINY)
     items = plan(load_configuration("tiny.yaml").campaign, project / "results/tiny")
-    assert time_on(items, 2) == pytest.approx(total(items).work / 2)
-    assert time_on(items, 10**6) == total(items).longest
+    runs = [item for item in items if item.is_run]
+    start, handing_out = start_up(runs), FITTED.workflow.job * len(runs)
+    assert time_on(runs, 2) == pytest.approx(start + (total(runs).work + handing_out) / 2)
+    assert time_on(runs, 10**6) == start + max(total(runs).longest, handing_out)
+    longest = [total(item for item in items if item.stage == stage).longest for stage in range(5)]
+    assert time_on(items, 10**6) >= start_up(items) + sum(longest)
+
+
+BEGUN = 77
+
+
+@pytest.fixture
+def small_machine(monkeypatch):
+    monkeypatch.setattr("icha.planning.needs.memory_of_machine", lambda: 2**20)
+
+    def begun(*_):
+        raise SystemExit(BEGUN)
+
+    # The package's own name `run` is the command.
+    monkeypatch.setattr(sys.modules["icha.cli.run"], "_follow", begun)
+
+
+def test_what_exceeds_the_machine_is_refused_where_nobody_can_be_asked(project, small_machine):
+    Path("tiny.yaml").write_text(TINY)
+    refused = icha("run", "tiny.yaml")
+    told = " ".join(refused.output.split())
+    assert refused.exit_code == 2
+    assert "MB of memory are needed on 2 cores, and this machine has 1.05 MB" in told
+    assert "Nothing was begun; --anyway begins it all the same" in told
+    assert "not enough: about" in icha("describe", "tiny.yaml").output
+    assert icha("run", "tiny.yaml", "--anyway").exit_code == BEGUN
+
+
+def test_what_exceeds_the_machine_is_begun_if_that_is_said(project, small_machine, monkeypatch):
+    Path("tiny.yaml").write_text(TINY)
+    monkeypatch.setattr(sys.modules["icha.cli.run"], "_at_a_terminal", lambda: True)
+    for answer, status in (("y\n", BEGUN), ("n\n", 2), ("", 1)):
+        asked = CliRunner().invoke(app, ["run", "tiny.yaml"], input=answer)
+        assert "MB of memory are needed" in asked.output and "Begin all the same?" in asked.output
+        assert asked.exit_code == status
+
+
+def test_the_memory_of_this_machine_is_no_matter_on_a_cluster(project, small_machine):
+    Path("tiny.yaml").write_text(TINY)
+    assert icha("run", "tiny.yaml", "--profile", "slurm").exit_code == BEGUN
+    assert icha("run", "tiny.yaml", "--profile", "default").exit_code == 2
 
 
 def test_one_run_without_the_workflow(tmp_path, monkeypatch):
@@ -390,6 +435,20 @@ def test_time_left_follows_what_jobs_take(watch):
     before = watch.seconds_left()
     watch.clock.now += 5
     assert watch.seconds_left() == pytest.approx(before - 5 / 2)
+
+
+def test_what_is_expected_counts_the_imports_of_the_first_jobs_and_the_cores_of_each():
+    clock = Clock()
+    watch = Watch({f"results/tiny/runs/{k}.nc": 10.0 for k in range(4)}, clock, environment=3.0)
+    clock.now = 2.0
+    watch.take({"event": "resources_info", "cores": 2})
+    watch.take({"event": "run_info", "stats": {"run": 4, "all": 1, "total": 5}})
+    assert watch.seconds_left() == pytest.approx(3 + 4 * 10 / 2)
+    watch.take(started(0) | {"threads": 2})
+    clock.now += 8.0
+    # Of two cores for 3 s of imports and 5 s of its own work.
+    watch.take({"event": "job_finished", "job_id": 0})
+    assert watch.seconds_left() == pytest.approx(3 * 10 / 2)
 
 
 def test_the_live_view_shows_jobs_and_what_they_say(watch, tmp_path):

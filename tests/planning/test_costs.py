@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from icha.planning import costs
+from icha.planning.roughness import measured_roughness
 from icha.surfaces.moments import spectral_moments
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.summits import find_summits
 
-LOADING = costs.Sweep(stops=10, snapshots=1, largest_load=0.03, adhesive=True)
+LOADING = costs.Sweep(loads=(1e-3, 3e-3, 1e-2, 3e-2), snapshots=1, adhesion=3e-3)
+
+
+def rough(grid=256, summits=500, hills=100):
+    return costs.Roughness(grid, summits, hills, sharpness=1e-6)
 
 
 @pytest.mark.parametrize(("hurst", "rolloff", "short"), [(0.8, 20e-6, 3e-6), (0.3, 50e-6, 4e-6), (1.0, 25e-6, 6e-6)])
@@ -23,6 +28,11 @@ def test_summits_are_counted_as_on_real_surfaces(hurst, rolloff, short):
     assert expected == pytest.approx(counted, rel=0.15)
     moments = spectral_moments(surfaces[0])
     assert costs.gaussian_summits(100e-6, moments.m2, moments.m4) == pytest.approx(expected, rel=0.1)
+    by_spectrum = costs.roughness_of(256, 100e-6, *costs.self_affine_moments(100e-6, rolloff, short, hurst))
+    by_heights = measured_roughness(surfaces[0])
+    assert by_heights.summits == len(find_summits(surfaces[0]).height)
+    assert by_spectrum.hills == pytest.approx(by_heights.hills, rel=0.25)
+    assert by_spectrum.sharpness == pytest.approx(by_heights.sharpness, rel=0.15)
 
 
 def test_the_spectrum_may_lie_where_its_moments_are_logarithms():
@@ -31,20 +41,26 @@ def test_the_spectrum_may_lie_where_its_moments_are_logarithms():
 
 
 def test_costs_grow_with_what_is_asked_for():
-    def seconds(summits=500, **changes):
-        return costs.sweep_cost(256, summits, costs.Sweep(**(vars(LOADING) | changes))).seconds
+    def seconds(summits=500, hills=100, **changes):
+        surface = rough(summits=summits, hills=hills)
+        return costs.sweep_cost(surface, costs.Sweep(**(vars(LOADING) | changes))).seconds
 
-    assert seconds(summits=5000) > 5 * seconds() - costs.JOB_SECONDS * 5
-    assert seconds(largest_load=0.1) > seconds(largest_load=0.001)
-    assert seconds(stops=40) > seconds(stops=4)
+    many = {"loads": tuple(np.geomspace(1e-3, 0.1, 40))}
+    # From here on nothing counts but the spots.
+    assert seconds(summits=5e6, hills=1e6) > 5 * seconds(summits=5e5, hills=1e5)
+    assert seconds(hills=400) > seconds()
+    assert seconds(loads=(1e-3, 0.1)) > seconds(loads=(1e-3, 2e-3))
+    assert seconds(**many) > seconds()
     assert seconds(legs=1) > 3 * seconds()
-    assert seconds(legs=1, adhesive=True) > seconds(legs=1, adhesive=False)
-    assert seconds(max_step=0.01) > seconds()
+    assert seconds(legs=1) > seconds(legs=1, adhesion=0.0)
+    assert seconds(legs=1, max_step=0.01) > seconds(legs=1)
     assert (
         costs.solution_cost(512, 0.01, adhesive=True).seconds > costs.solution_cost(512, 0.01, adhesive=False).seconds
     )
     big, small = costs.surface_cost(8192), costs.surface_cost(1024)
     assert big.disk == pytest.approx(8 * 8192**2, rel=0.01) and big.memory > big.disk > 60 * small.disk
+    assert costs.figure_cost(10, 0).seconds < costs.figure_cost(100, 0).seconds < costs.figure_cost(100, 10**8).seconds
+    assert costs.report_cost(10, 2).seconds < costs.report_cost(100, 2).seconds < costs.report_cost(100, 9).seconds
 
 
 def test_what_jobs_took_corrects_what_is_expected_of_others():
@@ -58,15 +74,18 @@ def test_what_jobs_took_corrects_what_is_expected_of_others():
     assert LOADING_COST.slower(3).memory == LOADING_COST.memory
 
 
-LOADING_COST = costs.sweep_cost(256, 500, LOADING)
+LOADING_COST = costs.sweep_cost(rough(), LOADING)
 
 
 def test_boundary_elements_grow_with_their_transforms():
     def cost(grid=512, **changes):
-        return costs.patch_cost(grid, 500, costs.Sweep(**(vars(LOADING) | changes)))
+        return costs.patch_cost(rough(grid, summits=grid**2 / 500), costs.Sweep(**(vars(LOADING) | changes)))
 
-    work = cost(1024).seconds - costs.JOB_SECONDS, cost(512).seconds - costs.JOB_SECONDS
+    fixed = cost(2).seconds
+    work = cost(1024).seconds - fixed, cost(512).seconds - fixed
     assert 4 < work[0] / work[1] < 4.6
     assert cost(1024).memory > 1.5 * cost(512).memory
-    assert cost(adhesive=False).seconds < cost().seconds < cost(stops=20).seconds < cost(stops=20, legs=1).seconds
+    more = {"loads": tuple(np.geomspace(1e-3, 3e-2, 20))}
+    assert cost(adhesion=0.0).seconds < cost().seconds < cost(**more).seconds < cost(**more, legs=1).seconds
+    assert cost(adhesion=1e-2).seconds > cost().seconds
     assert cost(max_step=0.05).seconds > cost().seconds and cost(snapshots=4).disk > cost().disk

@@ -12,7 +12,7 @@ from snakemake_interface_logger_plugins.base import LogHandlerBase
 _FIELDS = {
     "run_info": ("stats",),
     "resources_info": ("cores", "nodes"),
-    "job_info": ("jobid", "rule_name", "rule_msg", "output", "log"),
+    "job_info": ("jobid", "rule_name", "rule_msg", "output", "log", "threads"),
     "job_finished": ("job_id",),
     "job_error": ("jobid", "rule_name", "output", "log"),
 }

@@ -1,0 +1,36 @@
+"""What of a campaign's surfaces the costs of their runs depend on, before a surface is made."""
+
+from icha.configuration.campaign import Campaign
+from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.configuration.surfaces import SelfAffineSurface
+from icha.planning.costs import Roughness, roughness_of, self_affine_moments
+
+
+def roughness(campaign: Campaign, name: str) -> Roughness:
+    """Of a random surface what its spectrum leads to expect; of one from a file its summits are counted there."""
+    section = campaign.surfaces[name]
+    if isinstance(section, SelfAffineSurface):
+        lengths = section.period, section.rolloff_wavelength, section.short_wavelength
+        return roughness_of(section.grid, section.period, *self_affine_moments(*lengths, section.hurst))
+    return measured_roughness(_read(section))
+
+
+def _read(section):
+    # SciPy, for which campaigns without such a surface do not wait.
+    if isinstance(section, MeasuredSurface):
+        from icha.surfaces.measured.topography import prepared_topography
+
+        return prepared_topography(section.path, section.preparation).surface
+    from icha.surfaces.measured.height_map import read_height_map
+    from icha.surfaces.surface import Surface
+
+    return Surface(read_height_map(section.path, section.metres_per_unit), section.period)
+
+
+def measured_roughness(surface) -> Roughness:
+    """Of an `icha.Surface` that is there."""
+    from icha.surfaces.moments import spectral_moments
+    from icha.surfaces.summits import find_summits
+
+    moments = spectral_moments(surface)
+    return roughness_of(surface.grid, surface.period, moments.m0, moments.m2, moments.m4, len(find_summits(surface)))

@@ -1,0 +1,126 @@
+"""What is planned: everything that is made, with what it costs; and what the machine must have for it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from icha.configuration.load import load_configuration
+from icha.planning import needs
+from icha.planning.constants import FITTED
+from icha.planning.costs import Cost
+from icha.planning.plan import DONE, TO_DO, Item, memory_on, plan, start_up, time_on
+from icha.planning.results import campaign_files
+from icha.planning.roughness import roughness
+from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.summits import find_summits
+
+GB = 1e9
+CAMPAIGN = """
+name: scanned
+title: Scanned
+summary: For tests.
+license: CC0-1.0
+surfaces:
+  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 40 um, short_wavelength: 14.3 um, hurst: 0.8, grid: 32}
+  scan: {kind: measured, path: scan.npy, size: 50 um, height_unit: um, boundary: window}
+  map: {kind: file, path: map.npy, period: 50 um, height_unit: um}
+materials:
+  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
+  soft: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 2 nm}
+studies:
+  load:
+    surfaces: [rough, scan, map]
+    seeds: [1]
+    rms_slopes: [1.0]
+    materials: [bare, soft]
+    targets: {reduced_pressures: [1.0e-3, 1.0e-2]}
+figures:
+  fig2_area_and_gap: {study: load}
+"""
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    heights = np.random.default_rng(1).normal(size=(40, 40))
+    np.save(tmp_path / "scan.npy", heights)
+    np.save(tmp_path / "map.npy", heights[:30, :30])
+    (tmp_path / "scanned.yaml").write_text(CAMPAIGN)
+    return load_configuration(tmp_path / "scanned.yaml").campaign
+
+
+def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
+    section = campaign.surfaces["scan"]
+    surface = prepared_topography(section.path, section.preparation).surface
+    counted = roughness(campaign, "scan")
+    assert (counted.grid, counted.summits) == (40, len(find_summits(surface)))
+    assert roughness(campaign, "map").grid == 30
+    assert roughness(campaign, "map").summits != pytest.approx(counted.summits, rel=0.1)
+
+
+def test_every_file_that_costs_something_is_planned(campaign, tmp_path):
+    planned = {item.path for item in plan(campaign, tmp_path)}
+    files = campaign_files(campaign)
+    # The other half of a figure is made by the same job; a verdict is a line.
+    assert planned == {path for path in files.computed if not path.endswith(".pdf")} - {files.verdict}
+
+
+def test_what_is_made_of_something_new_is_made_anew(campaign, tmp_path):
+    files = campaign_files(campaign)
+    for path in (*files.surfaces, files.dataset, files.comparison, files.checks, *files.figures, files.report):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text("made of other runs")
+    states = {item.path: item.state for item in plan(campaign, tmp_path)}
+    assert all(states[path] == DONE for path in files.surfaces)
+    assert all(states[path] == TO_DO for path in (*files.runs, files.dataset, files.checks, files.report))
+    assert states[files.figures[0]] == TO_DO
+
+
+def item(name, seconds=1.0, memory=1 * GB, stage=0, state=TO_DO, threads=1):
+    return Item("part", name, state, Cost(seconds, memory, 5 * GB), threads, stage=stage)
+
+
+def test_time_is_that_of_the_start_and_of_one_stage_after_the_other():
+    jobs = [item("a", 10), item("b", 2), item("c", 4, stage=1)]
+    start, job = start_up(jobs), FITTED.workflow.job
+    assert start > FITTED.workflow.environment
+    assert time_on(jobs, 1) == pytest.approx(start + 16 + 3 * job)
+    assert time_on(jobs, 10**6) == pytest.approx(start + 10 + 4)
+    assert time_on([item("a", state=DONE)], 1) == 0
+
+
+def test_memory_is_that_of_the_jobs_side_by_side_and_of_what_starts_them():
+    jobs = [item("a", memory=3 * GB), item("b", memory=2 * GB), item("c", memory=1 * GB)]
+    around = FITTED.workflow.memory
+    assert [memory_on(jobs, cores) - around for cores in (1, 2, 4)] == pytest.approx([3 * GB, 5 * GB, 6 * GB])
+    assert memory_on([item("a", state=DONE)], 2) == 0
+
+
+def test_too_much_memory_is_told_with_what_is_there_and_what_would_do(monkeypatch, tmp_path):
+    jobs = [item(name, memory=20 * GB) for name in "abc"]
+    monkeypatch.setattr(needs, "memory_of_machine", lambda: 24 * GB)
+    monkeypatch.setattr(needs, "free_disk", lambda folder: 100 * GB)
+    (said,) = needs.wanting(jobs, 2, tmp_path, {})
+    assert said.startswith(
+        "about 40.3 GB of memory are needed on 2 cores, and this machine has 24 GB; --cores 1 needs 20"
+    )
+    assert needs.wanting(jobs, 1, tmp_path, {}) == []
+    # Snakemake starts no more of them side by side than it is told.
+    assert needs.wanting(jobs, 2, tmp_path, {"executor": "icha", "resources": ["mem_mb=23000"]}) == []
+    # On a cluster it is the nodes that need it.
+    assert needs.wanting(jobs, 2, tmp_path, {"executor": "slurm-batches"}) == []
+    (said,) = needs.wanting([item("a", memory=30 * GB)], 2, tmp_path, {"resources": ["mem_mb=14000"]})
+    assert said.startswith("about 30.3 GB of memory") and "--cores" not in said
+
+
+def test_too_little_room_is_told_with_what_is_free(monkeypatch, tmp_path):
+    monkeypatch.setattr(needs, "free_disk", lambda folder: 9 * GB)
+    (said,) = needs.wanting([item("a"), item("b")], 2, tmp_path, {})
+    assert said.startswith(f"about 10 GB of disk are needed for {tmp_path}, and 9 GB are free there")
+    assert needs.wanting([item("a"), item("b", state=DONE)], 2, tmp_path, {}) == []
+
+
+def test_what_there_is_is_looked_at_where_results_will_be(tmp_path):
+    assert needs.free_disk(tmp_path / "not" / "there") > 0
+    assert needs.free_disk(Path("results")) > 0
+    assert needs.memory_of_machine() > 1e8
