@@ -100,7 +100,7 @@ def run(
     console = Console()
     items = plan(campaign, folder / "results" / campaign.name)
     if not anyway:
-        settings = profile_settings(_profile(profile or "default", home))
+        settings = profile_settings(_profile(profile, home) if profile else home / "profiles/default")
         _ask_if_wanting(items, asked, core_count(cores), folder / "results" / campaign.name, settings)
     watch = Watch(expected_seconds(items, f"results/{campaign.name}"), environment=FITTED.workflow.environment)
     if plain or not console.is_terminal:
@@ -145,9 +145,11 @@ def _ask_if_wanting(items, asked: list[str], cores: int, results: Path, profile:
 
     if "surfaces" in asked:
         items = [item for item in items if item.part == "surfaces"]
-    elif not set(asked) <= set(TARGETS):
+    elif any(each.startswith("results/") for each in asked):
         return  # single files, of which nothing is known
-    lacks = wanting(items, cores, results, profile)
+    # Of the resources that jobs may take together those of the call go before the profile's.
+    resources = [each for each in asked if "=" in each] + profile.get("resources", [])
+    lacks = wanting(items, cores, results, profile | {"resources": resources})
     if not lacks:
         return
     said = "\n".join(["not enough for what is to be done:", *(f"  {lack}" for lack in lacks)])

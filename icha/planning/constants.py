@@ -13,16 +13,18 @@ MiB = 2**20
 class Workflow:
     """What a campaign takes beside its results."""
 
-    start: float = 2.8
+    start: float = 2.6
     """Until the first job: `icha run`, Snakemake, the plan; s."""
     planned: float = 0.0025
     """More for every file of the plan; s."""
-    environment: float = 1.9
+    environment: float = 2
     """Imports of the process that jobs are forked from, once; s."""
-    job: float = 0.16
+    job: float = 0.17
     """What a job takes besides its work: scheduling, fork, log, checksums; s."""
-    own_process: float = 2
+    own_process: float = 1.5
     """More for a job that is no fork: its imports; s."""
+    two_cores: float = 0.6
+    """The part of its time that a job takes on two cores."""
     memory: float = 310 * MiB
     """Snakemake, `icha run` and the process that jobs are forked from; bytes."""
     program: float = 130 * MiB
@@ -35,9 +37,9 @@ class Workflow:
 class Making:
     """Topographies."""
 
-    file: float = 0.025
+    file: float = 0.019
     """A surface file; s."""
-    node: float = 2.9e-07
+    node: float = 2.4e-07
     """Spectral synthesis, statistics and file of a node; s."""
 
 
@@ -45,20 +47,22 @@ class Making:
 class Loading:
     """Asperities on the way in."""
 
-    run: float = 0.15
+    run: float = 0.18
     """Dataset and file of a run; s."""
-    node: float = 2.9e-08
+    node: float = 7.4e-09
     """Search of summits, for a node; s."""
-    field: float = 2.8e-07
+    field: float = 4.2e-08
     """Gaps of a snapshot, for a node; s."""
-    stop: float = 0.0048
+    stop: float = 0.0077
     """A stop, without its spots; s."""
-    spot: float = 1.9e-05
+    spot: float = 8.4e-06
     """A spot at a stop; s."""
     event: float = 0.0013
     """A spot that has come into contact on the way; s."""
-    crowd: float = 22000
+    crowd: float = 20000
     """Spots from which each takes the longer the more there are."""
+    breadth: float = 0.5
+    """The power of the number of summits of a hill with which spots take longer."""
     memory: float = 9 * MiB
     """What any run holds; bytes."""
 
@@ -69,15 +73,15 @@ class Cycle:
 
     way: float = 120
     """Equilibria of a way in and back where nothing jumps, at the usual longest step."""
-    jumps: float = 39
+    jumps: float = 48
     """Equilibria for the jumps of a spot with adhesion."""
-    together: float = 1
+    together: float = 0.96
     """The power of the number of spots with which those grow."""
-    touches: float = 0.38
+    touches: float = 0.75
     """Equilibria for a spot without adhesion."""
-    step: float = 0.0053
+    step: float = 0.006
     """An equilibrium; s."""
-    spot: float = 2.8e-05
+    spot: float = 3e-05
     """A spot of an equilibrium; s."""
 
 
@@ -85,15 +89,17 @@ class Cycle:
 class Patches:
     """Boundary elements in the limit of a short range, on the way in."""
 
-    stop: float = 3.3e-07
-    """A stop without adhesion, over n^2 log2 n of n nodes a side; s."""
-    way: float = 1.6
+    stop: float = 3e-07
+    """A stop without adhesion at p* = 0.01, over n^2 log2 n of n nodes a side; s."""
+    load: float = 0.19
+    """The power of the load with which a stop takes longer."""
+    way: float = 3.1
     """The way to the first stop, in stops."""
-    adhesion: float = 4.4
+    adhesion: float = 5.3
     """How much longer it all takes with adhesion of a strength of 0.01."""
-    strength: float = 0.15
+    strength: float = 0.08
     """The power of that strength with which it does."""
-    density: float = 0.3
+    density: float = 0.44
     """The power of the number of summits in a cell, over 0.01, with which it does: noise makes small patches."""
 
 
@@ -101,11 +107,11 @@ class Patches:
 class PatchCycle:
     """Boundary elements on a way there and back, whose equilibria are counted as those of asperities."""
 
-    step: float = 0.0028
+    step: float = 0.0038
     """An equilibrium; s."""
-    cell: float = 9e-08
+    cell: float = 1.2e-07
     """An equilibrium, over n^2 log2 n; s."""
-    adhesion: float = 3.1
+    adhesion: float = 3
     """How much longer both take with adhesion."""
 
 
@@ -113,15 +119,15 @@ class PatchCycle:
 class FiniteRange:
     """Boundary elements at finite ranges, by Tamaas."""
 
-    run: float = 0.0034
+    run: float = 0.0032
     """Dataset and file; s."""
-    bare: float = 5.3
+    bare: float = 4.8
     """A load on 512 nodes a side without adhesion, at p* = 0.01; s."""
-    adhesive: float = 4.9
+    adhesive: float = 4.2
     """A load on 256 nodes a side with adhesion; s."""
-    loop_step: float = 0.68
+    loop_step: float = 0.76
     """A step of a way there and back, in loads."""
-    sources: float = 0.11
+    sources: float = 0.066
     """Sources of the error at a load, in loads."""
     asperity: float = 240
     """One asperity on 800 nodes a side; s."""
@@ -131,9 +137,9 @@ class FiniteRange:
 class Gathering:
     """What is made of finished runs."""
 
-    theories: float = 0.29
+    theories: float = 0.28
     """Theories and literature of a surface; s."""
-    table: float = 0.072
+    table: float = 0.073
     """A file that holds something of every run; s."""
     dataset_run: float = 0.015
     """A run in the campaign dataset; s."""
@@ -143,17 +149,17 @@ class Gathering:
     """A run that is checked; s."""
     error_run: float = 0.05
     """A run or a solution that is compared with a run; s."""
-    figure: float = 1.4
+    figure: float = 1.3
     """A figure as PNG and PDF; s."""
     figure_run: float = 0.007
     """A run of the studies that it shows; s."""
-    map_node: float = 4.2e-07
+    map_node: float = 9.5e-08
     """A node of a topography that it shows; s."""
-    report: float = 0.2
+    report: float = 0.22
     """The report; s."""
     report_run: float = 0.01
     """A run in it; s."""
-    report_figure: float = 0.015
+    report_figure: float = 0.014
     """A figure in it; s."""
     table_memory: float = 4 * MiB
     """What making a file of all runs takes; bytes."""

@@ -323,6 +323,8 @@ def test_what_exceeds_the_machine_is_refused_where_nobody_can_be_asked(project, 
     assert "MB of memory are needed on 2 cores, and this machine has 1.05 MB" in told
     assert "Nothing was begun; --anyway begins it all the same" in told
     assert "not enough: about" in icha("describe", "tiny.yaml").output
+    assert icha("run", "tiny.yaml", "all", "--", "--forceall", "--resources", "mem_mb=60000").exit_code == 2
+    assert icha("run", "tiny.yaml", "results/tiny/report.html").exit_code == BEGUN
     assert icha("run", "tiny.yaml", "--anyway").exit_code == BEGUN
 
 

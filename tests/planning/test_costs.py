@@ -48,7 +48,7 @@ def test_costs_grow_with_what_is_asked_for():
     many = {"loads": tuple(np.geomspace(1e-3, 0.1, 40))}
     # From here on nothing counts but the spots.
     assert seconds(summits=5e6, hills=1e6) > 5 * seconds(summits=5e5, hills=1e5)
-    assert seconds(hills=400) > seconds()
+    assert costs.spots(rough(hills=400), 0.01) > costs.spots(rough(), 0.01) > costs.spots(rough(), 0.001)
     assert seconds(loads=(1e-3, 0.1)) > seconds(loads=(1e-3, 2e-3))
     assert seconds(**many) > seconds()
     assert seconds(legs=1) > 3 * seconds()

@@ -371,6 +371,9 @@ def test_benchmark_files_of_both_kinds(tmp_path):
     (tmp_path / "b.jsonl").write_text('{"s": 0.25, "max_rss": null}\n')
     found = read_benchmarks({"a": tmp_path / "a.tsv", "b": tmp_path / "b.jsonl", "not there": tmp_path / "c.tsv"})
     assert found == [Benchmark("a", 4.0, 120.5), Benchmark("b", 0.25, None)]
+    # What a job had for itself, where that is known.
+    (tmp_path / "d.jsonl").write_text('{"s": 0.5, "max_rss": 180.0, "max_uss": 20.0}\n')
+    assert read_benchmarks({"d": tmp_path / "d.jsonl"}) == [Benchmark("d", 0.5, 20.0)]
 
 
 def test_interpolation_is_exact_at_the_stops_and_monotone_between():
