@@ -8,12 +8,13 @@ import pytest
 from icha.configuration.load import load_configuration
 from icha.planning import needs
 from icha.planning.constants import FITTED
-from icha.planning.costs import Cost
+from icha.planning.costs import Cost, Sweep, patch_cost, sweep_cost
 from icha.planning.plan import DONE, TO_DO, Item, memory_on, plan, start_up, time_on
 from icha.planning.results import campaign_files
-from icha.planning.roughness import roughness
+from icha.planning.roughness import measured_roughness, roughness
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.summits import find_summits
+from icha.surfaces.surface import Surface
 
 GB = 1e9
 CAMPAIGN = """
@@ -56,6 +57,14 @@ def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
     assert (counted.grid, counted.summits) == (40, len(find_summits(surface)))
     assert roughness(campaign, "map").grid == 30
     assert roughness(campaign, "map").summits != pytest.approx(counted.summits, rel=0.1)
+
+
+def test_a_surface_without_summits_is_planned_all_the_same():
+    x, y = np.mgrid[:16, :16] / 16
+    saddle = Surface((x - 0.5) ** 2 - (y - 0.5) ** 2, 1.0, "free")
+    expected = measured_roughness(saddle)
+    assert sweep_cost(expected, Sweep((1e-2,), 1, 0.0)).seconds > 0 == expected.summits
+    assert patch_cost(expected, Sweep((1e-2,), 1, 1e-3)).seconds > 0
 
 
 def test_every_file_that_costs_something_is_planned(campaign, tmp_path):
