@@ -4,8 +4,12 @@ python benchmarks/costs.py [--fit] [--kept] [--only KIND ...]
 
 Cases are drawn at random (`benchmarks/cost_cases.py`), with some numbers for the group `fitted` and another for
 `others`, which no formula and no constant was made for: after a look at them, draw others. `--fit` measures the group
-`fitted` alone, and writes `icha/planning/constants.py` as fitted to it; then run it without. `--kept` takes what was
-measured before, as after a change of a formula.
+`fitted` and writes `icha/planning/constants.py` as fitted to it. Without, the group `others` is measured, and both are
+compared with what is expected. `--kept` takes what was measured before, as after a change of a formula; with `--only`
+the rest of the constants and of what was measured stays. So after a change of a solver:
+
+    python benchmarks/costs.py --fit --only loading "both ways" patches "patches both ways" campaign
+    python benchmarks/costs.py
 
 Single jobs are forks of this process, which has everything imported, on one thread. Campaigns are run by `icha run`,
 and their time is that of all processes. Linux only. Writes benchmarks/results/costs.json.
@@ -152,10 +156,8 @@ def measured_campaign(configuration: Path, folder: Path) -> dict:
     return found
 
 
-def rows_of_campaign(title: str, text: dict, found: dict, folder: Path) -> Iterator[Row]:
+def rows_of_campaign(title: str, file: Path, found: dict, folder: Path) -> Iterator[Row]:
     """A campaign as a whole, and the jobs that make something of its runs."""
-    file = folder / f"{text['name']}.yaml"
-    file.write_text(yaml.safe_dump(text))
     campaign = load_configuration(file).campaign
 
     def items(constants) -> list[Item]:
@@ -176,8 +178,8 @@ def rows_of_campaign(title: str, text: dict, found: dict, folder: Path) -> Itera
             yield Row(item.part, f"{title}: {item.path}", lambda c, index=index: items(c)[index].cost, took)
 
 
-def rows(group: str, kept: dict, only) -> Iterator[Row]:
-    """The cases of a group, measured unless they were before."""
+def rows(group: str, before: dict, now: dict, only) -> Iterator[Row]:
+    """The cases of a group; what was measured `before` is not measured again, and what is goes to `now`."""
     for number in DRAWS[group]:
         draw = Draw(number)
         with tempfile.TemporaryDirectory() as name:
@@ -185,22 +187,21 @@ def rows(group: str, kept: dict, only) -> Iterator[Row]:
             for case in draw.cases():
                 if only and case.kind not in only:
                     continue
-                found = kept.get(case.title) or measured_fork(case.work, folder)
-                kept[case.title] = found
+                found = now[case.title] = before.get(case.title) or measured_fork(case.work, folder)
                 if "failure" in found or "disk" not in found:
                     print(f"{case.title:<110} failed: {found.get('failure', 'no file')}", flush=True)
                     continue
                 yield Row(case.kind, case.title, case.cost, found)
             for text in draw.campaigns() if not only or "campaign" in only else ():
                 title = f"campaign {text['name']}: {text['title']}"
-                if title not in kept:
-                    file = folder / f"{text['name']}.yaml"
-                    file.write_text(yaml.safe_dump(text))
-                    kept[title] = measured_campaign(file, folder)
-                if "failure" in kept[title]:
-                    print(f"{title:<110} failed: {kept.pop(title)['failure']}", flush=True)
+                file = folder / f"{text['name']}.yaml"
+                file.write_text(yaml.safe_dump(text))
+                found = before.get(title) or measured_campaign(file, folder)
+                if "failure" in found:
+                    print(f"{title:<110} failed: {found['failure']}", flush=True)
                     continue
-                yield from rows_of_campaign(title, text, kept[title], folder)
+                now[title] = found
+                yield from rows_of_campaign(title, file, found, folder)
 
 
 def fitted(constants: Constants, measured: list[Row]) -> Constants:
@@ -252,13 +253,15 @@ def main():
     parser.add_argument("--kept", action="store_true", help="take what was measured before")
     parser.add_argument("--only", nargs="+", metavar="KIND", help="kinds of cases, such as loading or campaign")
     options = parser.parse_args()
-    known = json.loads(RESULT.read_text()) if RESULT.exists() else {"cases": [], "measured": {}}
-    kept = known["measured"] if options.kept else {}
+    known = json.loads(RESULT.read_text()) if RESULT.exists() else {"measured": {}}
+    before = known["measured"]
+    now: dict[str, dict] = {}
     found: dict[str, list[Row]] = {}
     print(f"{'case':<110} {'expected':>8} {'measured':>8}   time memory  disk", flush=True)
     for group in ["fitted"] if options.fit else DRAWS:
         found[group] = []
-        for row in rows(group, kept, options.only):
+        again = not options.kept and (options.fit or group == "others")
+        for row in rows(group, {} if again else before, now, options.only):
             found[group].append(row)
             ratios = " ".join(f"{ratio:6.2f}" for ratio in row.ratios().values())
             print(f"{row.title[:110]:<110} {row.cost(FITTED).seconds:>7.2f}s {row.found['seconds']:>7.2f}s {ratios}")
@@ -268,15 +271,16 @@ def main():
             if ratios:
                 print(f"{group}, {name}: {summary(ratios)}")
     if options.fit:
-        RESULT.write_text(json.dumps(known | {"measured": kept}, indent=1) + "\n")
         write(fitted(FITTED, found["fitted"]))
-        return
-    cases = [
-        {"group": group, "kind": row.kind, "case": row.title, "ratios": row.ratios()}
-        for group, own in found.items()
-        for row in own
-    ]
-    RESULT.write_text(json.dumps({"cases": cases, "measured": kept}, indent=1) + "\n")
+    elif not options.only:
+        before = {}  # nothing is left that was not looked at
+        known["cases"] = [
+            {"group": group, "kind": row.kind, "case": row.title, "ratios": row.ratios()}
+            for group, own in found.items()
+            for row in own
+        ]
+    known["measured"] = before | now
+    RESULT.write_text(json.dumps(known, indent=1) + "\n")
 
 
 def summary(ratios) -> str:
