@@ -37,7 +37,7 @@ class Workflow:
 class Making:
     """Topographies."""
 
-    file: float = 0.019
+    file: float = 0.015
     """A surface file; s."""
     node: float = 2.4e-07
     """Spectral synthesis, statistics and file of a node; s."""
@@ -47,17 +47,17 @@ class Making:
 class Loading:
     """Asperities on the way in."""
 
-    run: float = 0.18
+    run: float = 0.14
     """Dataset and file of a run; s."""
-    node: float = 7.4e-09
+    node: float = 5.1e-09
     """Search of summits, for a node; s."""
-    field: float = 4.2e-08
+    field: float = 3.8e-08
     """Gaps of a snapshot, for a node; s."""
-    stop: float = 0.0077
+    stop: float = 0.0084
     """A stop, without its spots; s."""
-    spot: float = 8.4e-06
+    spot: float = 6.5e-06
     """A spot at a stop; s."""
-    event: float = 0.0013
+    event: float = 0.0012
     """A spot that has come into contact on the way; s."""
     crowd: float = 20000
     """Spots from which each takes the longer the more there are."""
