@@ -89,17 +89,17 @@ class Cycle:
 class Patches:
     """Boundary elements in the limit of a short range, on the way in."""
 
-    stop: float = 3e-07
+    stop: float = 7.6e-08
     """A stop without adhesion at p* = 0.01, over n^2 log2 n of n nodes a side; s."""
-    load: float = 0.19
+    load: float = 0.34
     """The power of the load with which a stop takes longer."""
-    way: float = 3.1
+    way: float = 3.7
     """The way to the first stop, in stops."""
-    adhesion: float = 5.3
+    adhesion: float = 13
     """How much longer it all takes with adhesion of a strength of 0.01."""
-    strength: float = 0.08
+    strength: float = 0.093
     """The power of that strength with which it does."""
-    density: float = 0.44
+    density: float = 0.6
     """The power of the number of summits in a cell, over 0.01, with which it does: noise makes small patches."""
 
 
@@ -107,11 +107,11 @@ class Patches:
 class PatchCycle:
     """Boundary elements on a way there and back, whose equilibria are counted as those of asperities."""
 
-    step: float = 0.0038
+    step: float = 0.0036
     """An equilibrium; s."""
-    cell: float = 1.2e-07
+    cell: float = 8.2e-08
     """An equilibrium, over n^2 log2 n; s."""
-    adhesion: float = 3
+    adhesion: float = 3.6
     """How much longer both take with adhesion."""
 
 
