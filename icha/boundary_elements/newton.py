@@ -39,6 +39,8 @@ COARSE, FINE = 5e-2, 1e-4
 _NET = 0.6
 # A deviation of sqrt(G/dgamma) that keeps the whole front waiting, and of how much of it.
 _RESTLESS, _FEW = 0.03, 0.05
+# So often in turn few places come to rest before all of the front moves.
+_MENDS = 2
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
 _SMALLEST_STEP = 2.0**-12
 
@@ -114,16 +116,16 @@ def front_at_rest(
     tolerance: float,
     *,
     near: bool = False,
-    most_steps: int = _MAX_STEPS,
+    most_steps: int | None = None,
     beyond: np.ndarray | None = None,
     mended: Callable[[Held, np.ndarray], Contact | None] = lambda state, restless: None,
 ) -> Held:
     """The contact in equilibrium at a separation (cells), down in energy from that of a given one.
 
     contact: if it is `Held`, at this separation. tolerance: of sqrt(G/dgamma) along the front. near: whether it is not
-    far from rest. beyond: of a window, what the contact outside adds to the mean fraction around every cell, a field.
-    mended: where few cells, (m,), of a contact are far from rest, the contact with these at rest, if a short way leads
-    there.
+    far from rest. most_steps: after which it is as near to rest as it is. beyond: of a window, what the contact outside
+    adds to the mean fraction around every cell, a field. mended: where few cells, (m,), of a contact are far from rest,
+    the contact with these at rest, if a short way leads there.
 
     Raises
     ------
@@ -144,10 +146,10 @@ def front_at_rest(
     def lower(new, old):
         return energy(new) <= energy(old) + new.unsure + old.unsure + _SAME_ENERGY * abs(energy(old))
 
-    most_off = _NEAR if near else _GAP_TO_FRONT
-    state = contact if isinstance(contact, Held) else at(contact, max(enough, most_off))
-    damping, all_moved = 0.0, True
-    for _ in range(most_steps):
+    coarse = _NEAR if near else _GAP_TO_FRONT
+    state = contact if isinstance(contact, Held) else at(contact, max(enough, coarse))
+    damping, most_off, all_moved = 0.0, coarse, True
+    for _ in range(most_steps or _MAX_STEPS):
         now = moving(front, state)
         error = now.error
         if error <= tolerance:
@@ -161,7 +163,7 @@ def front_at_rest(
             all_moved = False
             contact = mended(state, now.cells[restless])
             if contact is not None:
-                new = at(contact, min(most_off, 0.1 * _GAP_TO_FRONT))
+                new = at(contact, min(coarse, 0.1 * _GAP_TO_FRONT))
                 if lower(new, state):
                     state = new
                     continue
@@ -179,19 +181,22 @@ def front_at_rest(
         part = 1.0
         while part >= _SMALLEST_STEP:
             new = at(now.moved(part * change, part * pressed), off)
-            if lower(new, state) or most_off > _NEAR:
+            down = lower(new, state)
+            if down or most_off > _NEAR:
                 break
             part /= 2
-        if lower(new, state):
+        if down:
             if part == 1.0:
                 damping = damping / 4 if damping > 0.01 else 0.0
-            state, all_moved = new, True
+            state, most_off, all_moved = new, coarse, True
         elif most_off > _NEAR:
             # Energies of coarse pressures are not to be trusted that far.
             most_off = _NEAR
             state = at(state, max(enough, most_off))
         else:
             damping = _more(4 * damping)
+    if most_steps:
+        return state
     raise NotConverged(f"the front did not come to rest (sqrt(G/dgamma) is off by {error:.1e})")
 
 

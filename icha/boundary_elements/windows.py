@@ -21,12 +21,12 @@ from icha.boundary_elements.regions import merged, region
 from icha.contact.failures import FullContact, NotConverged
 
 # Cells a side of a window; half of it may move. So far around a cell that is not at rest others move with it.
-_SIDE, _AROUND = 48, 5
+_SIDE, _AROUND = 64, 5
 # All windows together, over the whole grid: more are no short way.
 _PART = 0.2
 # Deviation of sqrt(G/dgamma) in windows; all of the front comes to rest afterwards.
 _TOLERANCE = 1e-3
-# More of Newton's steps than these are no short way.
+# Of Newton's steps at most, after which windows are as near to rest as they are.
 _STEPS = 12
 
 
@@ -38,9 +38,9 @@ def relaxed_in_windows(
     state: Held,
     restless: np.ndarray,
 ) -> Contact | None:
-    """The contact after its front has come to rest around restless cells (m,), as far as these lie in windows.
+    """The contact after its front has come nearer to rest around restless cells (m,), where these lie in windows.
 
-    None if there are no such windows, or no rest in them.
+    None if there are no such windows, or no way to rest in them.
     """
     windows, free = _windows(region(restless, space.shape))
     if not len(windows):
