@@ -50,7 +50,7 @@ from icha.planning.plan import TO_DO, Item, plan, time_on
 
 RESULT = Path(__file__).parent / "results/costs.json"
 # What the cases of a group are drawn with.
-DRAWS = {"fitted": (1, 2, 3), "others": (4,)}
+DRAWS = {"fitted": (1, 2, 3), "others": (5,)}
 # Which constants are fitted to which kinds of cases.
 FITS = {
     "making": ("surface",),

@@ -198,14 +198,14 @@ WITH = {False: "without adhesion", True: "with adhesion"}
 def verdicts(results) -> list[Verdict]:
     """The targets against what was measured."""
     found = []
-    for adhesion in (False, True):
-        target = f"full challenge surface, {WITH[adhesion]}: at most 5 min and 8 GiB"
+    for adhesion, most in ((False, 2.5), (True, 2)):
+        target = f"full challenge surface by asperities, {WITH[adhesion]}: at most {most:g} min and 8 GiB"
         full = chosen(results, "stages-challenge-", adhesion=adhesion)
         if full and full[0]["outcome"] == "complete":
             (run,) = full[:1]
             # Measuring the stages resets the system's record of the largest memory.
             peak = max([run["peak"], *run["peaks"].values()])
-            reached = run["wall"] <= 5 * MINUTE and peak <= 8 * GIB and run["stops"] == run["stops_asked"]
+            reached = run["wall"] <= most * MINUTE and peak <= 8 * GIB and run["stops"] == run["stops_asked"]
             text = f"{run['wall'] / MINUTE:.1f} min, {peak / GIB:.1f} GiB"
             if run["failure"]:
                 text += f"; {run['stops']} of {run['stops_asked']} stops: {run['failure']}"
@@ -214,12 +214,12 @@ def verdicts(results) -> list[Verdict]:
             text = f"{full[0]['outcome']} after {full[0]['wall'] / MINUTE:.1f} min" if full else ""
             found.append(Verdict(target, text, False if full else None))
     for adhesion in (False, True):
-        target = f"20 loads at 512² by asperities, {WITH[adhesion]}: at most 1 s of computation"
+        target = f"20 loads at 512² by asperities, {WITH[adhesion]}: at most 0.5 s of computation"
         run = chosen(
             results, "sweep-icha-", code="icha", grid=512, adhesion=adhesion, control="load", outcome="complete"
         )
         value = computation(run[0]) if run else None
-        found.append(Verdict(target, seconds(value) if run else "", value <= 1 if run else None))
+        found.append(Verdict(target, seconds(value) if run else "", value <= 0.5 if run else None))
     for adhesion, wanted in ((False, 30), (True, 100)):
         target = f"at 1024², {WITH[adhesion]}: at least {wanted} times faster than the fastest other code"
         best = fastest(results, 1024, adhesion)
@@ -233,13 +233,13 @@ def verdicts(results) -> list[Verdict]:
         found.append(Verdict(target, text, best[0] >= wanted if best else None))
     for adhesion in (False, True):
         value = exponent(results, adhesion, 1)
-        target = f"time over number of spots, {WITH[adhesion]}: exponent at most 1.2"
+        target = f"time over number of spots, {WITH[adhesion]}: exponent at most 1.15"
         failed = [r for r in chosen(results, "scaling-", adhesion=adhesion) if r["outcome"] != "complete"]
         text = "" if value is None else f"{value:.2f}" + (f"; {len(failed)} runs did not end" if failed else "")
-        found.append(Verdict(target, text, None if value is None else value <= 1.2 and not failed))
-    for grid, most in ((512, MINUTE), (1024, 5 * MINUTE)):
-        target = f"20 loads at {grid}² by ICHA's boundary elements, with adhesion: at most {seconds(most)} on one core"
-        run = chosen(results, "sweep-icha-boundary-elements-", grid=grid, adhesion=True)
+        found.append(Verdict(target, text, None if value is None else value <= 1.15 and not failed))
+    for grid, adhesion, most in ((512, False, 5), (512, True, 10), (1024, False, 30), (1024, True, 60)):
+        target = f"20 loads at {grid}² by ICHA's boundary elements, {WITH[adhesion]}: at most {most} s on one core"
+        run = chosen(results, "sweep-icha-boundary-elements-", grid=grid, adhesion=adhesion)
         text = seconds(run[0]["processor"]) if run else ""
         if run and run[0]["outcome"] != "complete":
             text = f"{run[0]['outcome']} after {seconds(run[0]['wall'])}, {len(_stops(run[0]))} stops"

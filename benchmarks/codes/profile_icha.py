@@ -17,6 +17,7 @@ from icha.datasets.files import write_dataset
 from icha.equilibrium import observables
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space import interaction
+from icha.models import asperities
 
 MODULUS, SURFACE_ENERGY, RANGE = 25e6, 0.05, 2.071e-9
 SNAPSHOT = [("reduced_pressure", 0.01)]
@@ -103,7 +104,7 @@ def main(kind, adhesion, answer):
     stages = Stages()
     with contextlib.ExitStack() as watched:
         for owner, name, stage in (
-            (simulation, "find_summits", "summits"),
+            (asperities, "find_summits", "summits"),
             (observables, "gap_distribution", "fields of the snapshot"),
             (observables, "pressure_distribution", "fields of the snapshot"),
         ):
