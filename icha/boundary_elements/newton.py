@@ -39,8 +39,6 @@ COARSE, FINE = 5e-2, 1e-4
 _NET = 0.6
 # A deviation of sqrt(G/dgamma) that keeps the whole front waiting, and of how much of it.
 _RESTLESS, _FEW = 0.03, 0.05
-# So often in turn few places come to rest before all of the front moves.
-_MENDS = 2
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
 _SMALLEST_STEP = 2.0**-12
 
