@@ -23,10 +23,10 @@ rule run:
         "<logs>/runs/<run>.log",
     benchmark:
         "<benchmarks>/runs/<run>.jsonl"
-    conda:
-        "../envs/icha.yaml"
     # The long ones first, or the last of them would keep one core busy at the end.
     priority: by_case(lambda case: int(case.model == BOUNDARY_ELEMENTS))
+    conda:
+        "../envs/icha.yaml"
     threads: by_case(lambda case: run_threads(CAMPAIGN, case))
     resources:
         mem_mb=by_case(lambda case: run_memory(CAMPAIGN, case)),
