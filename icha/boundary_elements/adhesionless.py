@@ -51,7 +51,7 @@ def pressed(
         height = exactly.ravel()[cells]
         if load is not None:
             pressure = pressure * (load * exactly.size / np.sum(pressure))
-        pressure, displaced, left = solve_bonds(
+        pressure, left = solve_bonds(
             space,
             cells,
             np.zeros(len(cells)),
@@ -62,9 +62,9 @@ def pressed(
             gain=_COARSE,
             balanced=load is not None,
         )
+        gap = space.displacement(cells, pressure.astype(np.float32 if rough else float))
         if load is not None:
-            separation = float(np.mean(height - displaced.ravel()[cells]))
-        gap = displaced
+            separation = float(np.mean(height - gap.ravel()[cells]))
         gap -= singly if rough else exactly
         gap += gap.dtype.type(separation)
         gap.ravel()[cells] = -left

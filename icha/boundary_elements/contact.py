@@ -143,8 +143,8 @@ class BoundaryElements:
 
     def gap(self, state: CellState) -> np.ndarray:
         """Gap at the nodes, (n, n), m; zero in contact but for what bonds are drawn out."""
-        pressure = self.space.on_grid(state.cells, state.pressure / self.contact_modulus)
-        return self.space.displacement(pressure) * self.spacing + state.separation - self.heights
+        displaced = self.space.displacement(state.cells, state.pressure / self.contact_modulus)
+        return displaced * self.spacing + state.separation - self.heights
 
     def fractions(self, state: CellState) -> np.ndarray:
         """Fraction of every cell that is in contact, (n, n)."""

@@ -80,8 +80,8 @@ def solve_bonds(
     *,
     gain: float = 0.0,
     balanced: bool = False,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pressures p with (K + bonds) p = wanted on cells, zero elsewhere; K p everywhere; and what is left of `wanted`.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pressures p with (K + bonds) p = wanted on cells, zero elsewhere; and what is left of `wanted`.
 
     Corrections are found in single precision, and what they leave is found in double.
 
@@ -99,55 +99,48 @@ def solve_bonds(
     """
     p, before = pressure, np.inf
     while True:
-        displaced = space.displacement(space.on_grid(cells, p, kind))
-        r = wanted - displaced.ravel()[cells] - bonds * p
+        r = wanted - space.displacement(cells, p.astype(kind), cells) - bonds * p
         if balanced:
             r -= np.mean(r)
         error = np.abs(r).max(initial=0.0)
         if error <= tolerance:
-            return p, displaced, r
+            return p, r
         if not error <= _LEAST_GAIN * before:
             raise NotConverged(f"pressures at a given contact were not found (displacement off by {error:.1e} cells)")
         before = error
         accuracy = max(gain if kind == np.float32 else _GAIN, _MARGIN * tolerance / error)
-        change, left, moved = _correction(space, cells, bonds, r / error, accuracy, balanced, kind == np.float32)
+        change, left = _correction(space, cells, bonds, r / error, accuracy, balanced)
         p = p + error * change
         if kind == np.float32:
             if np.abs(left).max() > accuracy:
                 raise NotConverged(f"pressures at a given contact were not found (to {accuracy:.1e})")
-            displaced += np.float32(error) * moved
-            return p, displaced, error * left
+            return p, error * left
 
 
-def _correction(space, cells, bonds, wanted, accuracy, balanced, everywhere):
-    """The pressure p with (K + bonds) p = wanted on cells, (k,), to an accuracy of that; what is left; K p if asked.
+def _correction(space, cells, bonds, wanted, accuracy, balanced):
+    """The pressure p with (K + bonds) p = wanted on cells, (k,), to an accuracy of that; and what is left.
 
     Conjugate gradients, with the inverse of the free half-space as preconditioner. Single precision.
     """
     scale, bonds = np.sqrt(_CELL / (_CELL + bonds)).astype(np.float32), bonds.astype(np.float32)
     r = wanted.astype(np.float32)
     p, way, rho = np.zeros_like(r), np.zeros_like(r), np.float32(1.0)
-    moved = np.zeros(space.shape, np.float32) if everywhere else None
     for count in range(_MAX_ITERATIONS):
         if np.abs(r).max() <= accuracy:
             break
-        z = scale * space.pressure(space.on_grid(cells, scale * r, np.float32)).ravel()[cells]
+        z = scale * space.pressure(cells, scale * r)
         if balanced:
             z -= np.mean(z)
         new = np.vdot(r, z)
         way = z + (new / rho) * way if count else z
         rho = new
-        displaced = space.displacement(space.on_grid(cells, way, np.float32))
-        image = displaced.ravel()[cells] + bonds * way
+        image = space.displacement(cells, way, cells) + bonds * way
         step = rho / np.vdot(way, image)
         p += step * way
         r -= step * image
         if balanced:
             r -= np.mean(r)
-        if everywhere:
-            displaced *= step
-            moved += displaced
-    return p, r, moved
+    return p, r
 
 
 def held(
@@ -183,10 +176,8 @@ def held(
             raise FullContact("the contact runs over the whole surface")
         overlap = heights[np.dtype(float)].ravel()[cells] - separation
         bonds = COMPLIANCE * (1 / fraction - 1)
-        pressure, displaced, left = solve_bonds(
-            space, cells, bonds, overlap, pressure, tolerance, kind, gain=_WHILE_CHANGING
-        )
-        gap = displaced
+        pressure, left = solve_bonds(space, cells, bonds, overlap, pressure, tolerance, kind, gain=_WHILE_CHANGING)
+        gap = space.displacement(cells, pressure.astype(kind))
         gap -= heights[np.dtype(kind)]
         gap += kind(separation)
         # Of cells in contact the gap is known better than from a difference of displacements.
@@ -214,10 +205,13 @@ def held(
     if kind == np.float32:
         unsure += 0.2 * _ROUNDING * float(np.sum(np.abs(pressure * overlap)))
     rim = beside(cells, space.shape)
-    around = neighbours(space, cells, fraction, kind).ravel()
+    near, order = merged(cells, rim)
+    around = np.empty(len(near))
+    around[order] = neighbours(space, cells, fraction.astype(kind), near)
     if beyond is not None:
-        around = around + beyond.ravel()
-    return Held(cells, fraction, pressure, gap, tolerance, energy, unsure, around[cells], rim, around[rim])
+        around += beyond.ravel()[near[np.argsort(order)]]
+    around, around_rim = around[: len(cells)], around[len(cells) :]
+    return Held(cells, fraction, pressure, gap, tolerance, energy, unsure, around, rim, around_rim)
 
 
 def tension(front: Front, held: Held) -> tuple[np.ndarray, np.ndarray]:

@@ -46,16 +46,18 @@ STENCIL = _profile / _profile.sum()
 
 
 @cache
-def _neighbour_modes(grid: int, kind: type) -> np.ndarray:
+def _neighbour_modes(grid: int, kind: np.dtype) -> np.ndarray:
     """Factors, (n, n//2 + 1), of Fourier modes that make `neighbours`."""
     way = np.arange(-_REACH, _REACH + 1)
     along = np.cos(2 * np.pi * np.outer(np.fft.fftfreq(grid), way)) @ STENCIL
     return np.outer(along, along[: grid // 2 + 1]).astype(kind)
 
 
-def neighbours(space: HalfSpace, cells: np.ndarray, fraction: np.ndarray, kind: type = float) -> np.ndarray:
-    """w*f: mean fraction of contact around every cell, (n, n), periodic; in a precision, of fractions on cells (k,)."""
-    return filtered(space.on_grid(cells, fraction, kind), _neighbour_modes(space.grid, kind))
+def neighbours(
+    space: HalfSpace, cells: np.ndarray, fraction: np.ndarray, at: np.ndarray | None = None
+) -> np.ndarray:
+    """w*f: mean fraction of contact around cells (m,), rising, or around all; of fractions on cells (k,), rising."""
+    return filtered(space.shape, cells, fraction, _neighbour_modes(space.grid, fraction.dtype), at)
 
 
 def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.fft
 
-from icha.support.parallel import blocks, cores, on_cores
+from icha.support.parallel import blocks, on_cores
 
 # The inverse of the kernel for the mean, in parts of that of the longest wave.
 _MEAN = 0.3
-# Bytes of modes from which it pays to transform, multiply and transform back some columns at a time, while they are in
-# the cache; nodes a side from which several threads do.
+# Bytes of a field from which it pays to transform some rows or columns at a time, so many columns; nodes a side from
+# which several threads do.
 _CACHE, _COLUMNS, _LARGE = 2_000_000, 32, 2048
 
 
@@ -56,13 +56,19 @@ class HalfSpace:
         """Number of cells."""
         return math.prod(self.shape)
 
-    def displacement(self, pressure: np.ndarray) -> np.ndarray:
-        """Displacement away from the load, in cells, of zero mean, under pressures in E*; fields."""
-        return filtered(pressure, self.compliance[pressure.dtype])
+    def displacement(self, cells: np.ndarray, pressure: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
+        """Displacement away from the load, in cells, of zero mean, under pressures in E* on cells (k,), rising.
 
-    def pressure(self, displacement: np.ndarray) -> np.ndarray:
-        """The pressure in E* that makes a displacement; its mean is made up, for conditioning alone."""
-        return filtered(displacement, self.stiffness)
+        At cells (m,), rising, or everywhere.
+        """
+        return filtered(self.shape, cells, pressure, self.compliance[pressure.dtype], at)
+
+    def pressure(self, cells: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+        """The pressures in E* on cells (k,), rising, that displace them so if nothing else is displaced; nearly.
+
+        Their mean is made up, for conditioning alone.
+        """
+        return filtered(self.shape, cells, displacement, self.stiffness, cells)
 
     def on_grid(self, cells: np.ndarray, values: np.ndarray | float, kind: type = float) -> np.ndarray:
         """A field of given values on cells (k,), counted through, and zero elsewhere."""
@@ -76,25 +82,58 @@ def in_both_precisions(field: np.ndarray) -> dict[np.dtype, np.ndarray]:
     return {np.dtype(kind): field.astype(kind, copy=False) for kind in (np.float64, np.float32)}
 
 
-def filtered(field: np.ndarray, factor: np.ndarray) -> np.ndarray:
-    """Periodic fields, (..., n, n), with their Fourier modes times factors (n, n//2 + 1), in the precision of both."""
-    grid = field.shape[-1]
-    if field.ndim > 2 or field.nbytes < _CACHE:
+def filtered(
+    shape: tuple[int, ...], cells: np.ndarray, values: np.ndarray, factor: np.ndarray, at: np.ndarray | None = None
+) -> np.ndarray:
+    """Periodic fields of a shape, (..., n, n), with their Fourier modes times factors, (n, n//2 + 1), in that precision.
+
+    The field has values (k,) on cells, rising, and is zero elsewhere. It is told at cells (m,), rising, or everywhere.
+    """
+    grid = shape[-1]
+    if len(shape) > 2 or grid**2 * values.itemsize < _CACHE:
+        field = np.zeros(shape, values.dtype)
+        field.ravel()[cells] = values
         modes = scipy.fft.rfft2(field, workers=1)
         modes *= factor
-        return scipy.fft.irfft2(modes, s=(grid, grid), overwrite_x=True, workers=1)
-    workers = cores() if grid >= _LARGE else 1
-    modes = scipy.fft.rfft(field, axis=1, workers=workers)
+        field = scipy.fft.irfft2(modes, s=(grid, grid), overwrite_x=True, workers=1)
+        return field if at is None else field.ravel()[at]
+
+    # Some rows or columns at a time, while they are in the cache, and rows without any of the cells not at all.
+    each = on_cores if grid >= _LARGE else _one_by_one
+    modes = np.empty((grid, grid // 2 + 1), np.result_type(values.dtype, np.complex64))
+    found = np.empty(shape if at is None else len(at), values.dtype)
+    rows = blocks(grid, max(_CACHE // (2 * grid * values.itemsize), 1))
+    starts = grid * np.array([some.start for some in rows] + [grid])
+    given, asked = np.searchsorted(cells, starts), None if at is None else np.searchsorted(at, starts)
+
+    def along_rows(block):
+        mine = slice(given[block], given[block + 1])
+        if mine.start == mine.stop:
+            modes[rows[block]] = 0
+            return
+        some = np.zeros((rows[block].stop - rows[block].start, grid), values.dtype)
+        some.ravel()[cells[mine] - starts[block]] = values[mine]
+        modes[rows[block]] = scipy.fft.rfft(some, axis=1, overwrite_x=True, workers=1)
 
     def along_columns(columns):
         some = scipy.fft.fft(modes[:, columns], axis=0, workers=1)
         some *= factor[:, columns]
         modes[:, columns] = scipy.fft.ifft(some, axis=0, overwrite_x=True, workers=1)
 
-    all_columns = blocks(modes.shape[1], _COLUMNS)
-    if workers > 1:
-        on_cores(along_columns, all_columns)
-    else:
-        for columns in all_columns:
-            along_columns(columns)
-    return scipy.fft.irfft(modes, n=grid, axis=1, overwrite_x=True, workers=workers)
+    def back_along_rows(block):
+        if asked is None:
+            found[rows[block]] = scipy.fft.irfft(modes[rows[block]], n=grid, axis=1, workers=1)
+        elif asked[block] < asked[block + 1]:
+            mine = slice(asked[block], asked[block + 1])
+            some = scipy.fft.irfft(modes[rows[block]], n=grid, axis=1, workers=1)
+            found[mine] = some.ravel()[at[mine] - starts[block]]
+
+    each(along_rows, range(len(rows)))
+    each(along_columns, blocks(modes.shape[1], _COLUMNS))
+    each(back_along_rows, range(len(rows)))
+    return found
+
+
+def _one_by_one(function, items):
+    for item in items:
+        function(item)

@@ -219,7 +219,7 @@ def _step(space, front, now, damping, accuracy):
     # To the tension that the law wants at the present fraction, and from there with the law.
     strengths = front.strengths(now.around)
     missing = np.where(now.front, strengths * now.fraction + now.pressure, 0.0)
-    moved = space.displacement(space.on_grid(now.cells, missing, np.float32)).ravel()[now.cells]
+    moved = space.displacement(now.cells, missing.astype(np.float32), now.cells)
     bond = np.where(now.front, COMPLIANCE * strengths * (1 - now.fraction), 0.0)
     change, pressure = linear.solve(moved + bond - now.gap, accuracy)
     return change, pressure - missing
@@ -277,12 +277,11 @@ class Linearised:
 
     def _displaced(self, unknowns):
         pressure, stronger, pull = self._spread(unknowns)
-        moved = self.space.displacement(self.space.on_grid(self.cells, pressure, np.float32)).ravel()[self.cells]
+        moved = self.space.displacement(self.cells, pressure, self.cells)
         moved[self.at_front] += np.float32(COMPLIANCE) * (self.soft * pull - stronger)
         return moved
 
     def _nearly_inverse(self, right):
-        field = self.space.on_grid(self.cells, np.where(self.closed, right, np.float32(0)), np.float32)
-        result = self.space.pressure(field).ravel()[self.cells]
+        result = self.space.pressure(self.cells, np.where(self.closed, right, np.float32(0)))
         result[self.at_front] = right[self.at_front] / np.float32(_NET * COMPLIANCE)
         return result

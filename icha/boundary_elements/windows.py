@@ -53,10 +53,10 @@ def relaxed_in_windows(
     small = HalfSpace(windows.shape, *_kernel(space.grid))
 
     # What pressures outside displace is there for good, as if the surface had it; what may not move is far away.
-    own = small.displacement(small.on_grid(inside, contact.pressure))
+    own = small.displacement(inside, contact.pressure)
     far = separation - 10 * COMPLIANCE * front.strength - 2 * np.abs(own).max()
     level = np.where(free, own + separation - state.gap.ravel()[windows], far)
-    around = neighbours(space, state.cells, state.fraction, np.float32).ravel()[windows]
+    around = neighbours(space, state.cells, state.fraction.astype(np.float32)).ravel()[windows]
     around = around - neighbours(small, inside, contact.fraction)
     try:
         rest = front_at_rest(
