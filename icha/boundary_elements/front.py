@@ -53,9 +53,7 @@ def _neighbour_modes(grid: int, kind: np.dtype) -> np.ndarray:
     return np.outer(along, along[: grid // 2 + 1]).astype(kind)
 
 
-def neighbours(
-    space: HalfSpace, cells: np.ndarray, fraction: np.ndarray, at: np.ndarray | None = None
-) -> np.ndarray:
+def neighbours(space: HalfSpace, cells: np.ndarray, fraction: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
     """w*f: mean fraction of contact around cells (m,), rising, or around all; of fractions on cells (k,), rising."""
     return filtered(space.shape, cells, fraction, _neighbour_modes(space.grid, fraction.dtype), at)
 

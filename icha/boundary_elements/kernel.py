@@ -85,7 +85,7 @@ def in_both_precisions(field: np.ndarray) -> dict[np.dtype, np.ndarray]:
 def filtered(
     shape: tuple[int, ...], cells: np.ndarray, values: np.ndarray, factor: np.ndarray, at: np.ndarray | None = None
 ) -> np.ndarray:
-    """Periodic fields of a shape, (..., n, n), with their Fourier modes times factors, (n, n//2 + 1), in that precision.
+    """Periodic fields of a shape, (..., n, n), their Fourier modes times factors, (n, n//2 + 1), in that precision.
 
     The field has values (k,) on cells, rising, and is zero elsewhere. It is told at cells (m,), rising, or everywhere.
     """

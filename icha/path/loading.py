@@ -2,12 +2,18 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel, State
 from icha.path.bracketing import SAME_SEPARATION, InsideJump, first_passed
 from icha.path.course import Course, halved
 from icha.path.stops import SAME_EXCESS, Stop
 from icha.path.waypoints import Waypoint
+
+# How often a stop is gone to straight. A way that is no short one, in longest steps. How steps grow again near the
+# length that has failed.
+_TRIALS, _LONG, _GROWTH = 2, 0.1, 1.2
 
 
 def first_loading(contact: ContactModel, stops: list[Stop], longest: float, course: Course) -> Iterator[Waypoint]:
@@ -19,42 +25,57 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
         As `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
-    waiting, step = list(stops), longest
+    waiting, step, failed, missed = list(stops), longest, np.inf, 0
     while waiting:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
             state = first_contact  # nothing happens on the way there
+        nearest, way = _nearest(waiting, state)
         try:
-            stop, beyond = _straight(waiting, state, step) or _one_step(contact, waiting, state, step)
+            if way <= step and missed < _TRIALS:
+                stop, beyond = nearest, _straight(nearest, waiting, state, step)
+                if beyond is None:
+                    # Half of the way helps; if it does not, the stop is looked for between two states.
+                    missed = missed + 1 if way > _LONG * longest else _TRIALS
+                    if missed < _TRIALS:
+                        failed, step = way, way / 2
+                    continue
+            else:
+                beyond = contact.equilibrium(state, state.separation - step)
+                stop, beyond = first_passed(waiting, state, beyond, -1)
         except InsideJump as jump:
             waiting.remove(jump.stop)
-            course, state = course.without(jump), jump.before
+            course, state, missed = course.without(jump), jump.before, 0
             continue
         except NotConverged as failure:
             try:
-                step = halved(step, longest, failure)
+                failed, step = step, halved(step, longest, failure)
             except NotConverged:
                 raise course.ended(state, True, failure) from failure
             continue
-        step = min(longest, 2 * step)
+        step = min(longest, 2 * step, max(failed / 2, _GROWTH * step))
         course.require_covered(state, beyond, stop, waiting, True)
         state = beyond
         if stop is None:
             continue
         waiting.remove(stop)
+        missed = 0
         course = course.met(stop.target, state)
         yield Waypoint(stop.target, state)
     if course.missed:
         raise course.ended(state, True)
 
 
-def _straight(waiting: list[Stop], state: State, step: float) -> tuple[Stop, State] | None:
-    """The next stop and its state, if it seems no farther than a step; None if it is not met there after all."""
+def _nearest(waiting: list[Stop], state: State) -> tuple[Stop, float]:
+    """The stop that seems to come next, and how far away it seems, m."""
     expected = {stop: stop.expected_separation(state) for stop in waiting}
     stop = max(expected, key=expected.get)
-    if expected[stop] < state.separation - step:
-        return None
+    return stop, state.separation - expected[stop]
+
+
+def _straight(stop: Stop, waiting: list[Stop], state: State, step: float) -> State | None:
+    """The state at a stop that seems no farther than a step; None if it is not met there after all, or not first."""
     try:
-        met = stop.meet(state, expected[stop])
+        met = stop.meet(state, stop.expected_separation(state))
     except NotConverged:
         return None
     same = SAME_SEPARATION * stop.contact.rms_height
@@ -62,10 +83,4 @@ def _straight(waiting: list[Stop], state: State, step: float) -> tuple[Stop, Sta
         return None
     if any(other.excess(met) > SAME_EXCESS for other in waiting if other is not stop):
         return None
-    return stop, met
-
-
-def _one_step(contact, waiting, state, step):
-    """A step of the separation: the stop that it passes first, and its state; or None and the state after it."""
-    beyond = contact.equilibrium(state, state.separation - step)
-    return first_passed(waiting, state, beyond, -1)
+    return met
