@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from icha.boundary_elements.elasticity import Contact, rounding, solve_bonds
+from icha.boundary_elements.elasticity import Contact, Topography, solve_bonds
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.regions import merged
 from icha.contact.failures import FullContact, NotConverged
@@ -17,7 +17,7 @@ _MAX_CHANGES = 200
 
 def pressed(
     space: HalfSpace,
-    heights: dict[np.dtype, np.ndarray],
+    topography: Topography,
     contact: Contact,
     *,
     separation: float | None = None,
@@ -37,37 +37,34 @@ def pressed(
     NotConverged
         If the contact does not settle.
     """
-    exactly, singly = heights[np.dtype(float)], heights[np.dtype(np.float32)]
-    exact = _EXACT * float(np.abs(exactly).max())
+    heights, exact = topography.double, _EXACT * topography.largest
     cells, pressure, rough = contact.cells, contact.pressure, True
     if not len(cells):
-        cells = np.flatnonzero(exactly > separation)
+        cells = np.flatnonzero(heights > separation)
         pressure = np.zeros(len(cells))
     for _ in range(_MAX_CHANGES):
         if not len(cells):
-            return Contact(cells, pressure, pressure), separation - exactly, separation
-        if len(cells) == exactly.size:
+            return Contact(cells, pressure, pressure), separation - heights, separation
+        if len(cells) == space.size:
             raise FullContact("every cell touches")
-        height = exactly.ravel()[cells]
+        height = heights.ravel()[cells]
         if load is not None:
-            pressure = pressure * (load * exactly.size / np.sum(pressure))
+            pressure = pressure * (load * space.size / np.sum(pressure))
         pressure, left = solve_bonds(
             space,
             cells,
             np.zeros(len(cells)),
             height - (separation or 0.0),
             pressure,
-            rounding(exactly) if rough else exact,
+            topography.rounding if rough else exact,
             np.float32 if rough else float,
             gain=_COARSE,
             balanced=load is not None,
         )
-        gap = space.displacement(cells, pressure.astype(np.float32 if rough else float))
+        displaced = space.displacement(cells, pressure.astype(np.float32 if rough else float))
         if load is not None:
-            separation = float(np.mean(height - gap.ravel()[cells]))
-        gap -= singly if rough else exactly
-        gap += gap.dtype.type(separation)
-        gap.ravel()[cells] = -left
+            separation = float(np.mean(height - displaced.ravel()[cells]))
+        gap = topography.gap(displaced, separation, cells, -left)
         off = max(float(np.abs(left).max()), exact)
         # Less pressure than makes up for the error of a gap is none.
         staying = pressure >= (0.0 if rough else off)
@@ -75,7 +72,7 @@ def pressed(
         if staying.all() and not len(joining):
             if not rough:
                 return Contact(cells, np.ones(len(cells)), pressure), gap, separation
-            rough = off > rounding(exactly)
+            rough = off > topography.rounding
             continue
         cells, order = merged(cells[staying], joining)
         pressure = np.concatenate([pressure[staying], np.zeros(len(joining))])[order]

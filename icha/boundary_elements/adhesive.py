@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.boundary_elements.elasticity import Contact, Held
+from icha.boundary_elements.elasticity import Contact, Held, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import front_at_rest
@@ -49,7 +49,7 @@ class Summits:
 def settled(
     space: HalfSpace,
     front: Front,
-    heights: dict[np.dtype, np.ndarray],
+    topography: Topography,
     summits: Summits,
     separation: float,
     contact: Contact,
@@ -80,13 +80,13 @@ def settled(
         del stages[:2]
 
     def mended(state, restless):
-        return relaxed_in_windows(space, front, heights, separation, state, restless)
+        return relaxed_in_windows(space, front, separation, state, restless)
 
     tried = np.zeros(space.size, dtype=bool)
     stage = 0
     while True:
         accuracy, beyond = stages[stage]
-        contact = front_at_rest(space, front, heights, separation, contact, accuracy, near=near, mended=mended)
+        contact = front_at_rest(space, front, topography, separation, contact, accuracy, near=near, mended=mended)
         if np.sum(contact.fraction) > _NEARLY_ALL * space.size:
             raise FullContact("the contact runs over the whole surface")
         within, overlapping = _within_reach(summits, contact, beyond)

@@ -10,10 +10,10 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.boundary_elements.adhesionless import pressed
 from icha.boundary_elements.adhesive import Summits, settled
-from icha.boundary_elements.elasticity import Contact
+from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, areas, contact_area_gradient, contact_areas
 from icha.boundary_elements.held_load import held
-from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
+from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import COARSE, FINE, FRONT_TOLERANCE, front_residual, tangent
 from icha.boundary_elements.patch_events import patch_events
 from icha.boundary_elements.patches import BEYOND_EDGES, edges, labelled
@@ -34,7 +34,7 @@ class BoundaryElements:
     """A periodic rough surface against a half-space, cell by cell: a `ContactModel`.
 
     heights: (n, n), m. spacing: m. law: of one summit, for how far its attraction reaches. The solver works in cells
-    and E*: `space`, `levels`, which are heights by precision, `front` and `summits` are in these units.
+    and E*: `space`, `topography`, `front` and `summits` are in these units.
     """
 
     heights: np.ndarray
@@ -43,7 +43,7 @@ class BoundaryElements:
     rms_height: float
     asperities: Asperities
     space: HalfSpace
-    levels: dict[np.dtype, np.ndarray]
+    topography: Topography
     front: Front
     summits: Summits
 
@@ -74,8 +74,8 @@ class BoundaryElements:
                 "needed: none at all, or more"
             )
         space = HalfSpace.of(surface.grid)
-        levels = in_both_precisions(surface.heights / h)
-        return cls(surface.heights, h, law, surface.rms_height, asperities, space, levels, front, summits)
+        topography = Topography.of(surface.heights / h)
+        return cls(surface.heights, h, law, surface.rms_height, asperities, space, topography, front, summits)
 
     # --- what a path asks of every model --------------------------------------------------------------------------
 
@@ -200,7 +200,7 @@ class BoundaryElements:
         cells, pending = settled(
             self.space,
             self.front,
-            self.levels,
+            self.topography,
             self.summits,
             separation / self.spacing,
             self._towards(state, separation),
@@ -225,7 +225,7 @@ class BoundaryElements:
     def _pressed(self, state, **given):
         """The equilibrium without adhesion at a separation (cells) or under a load (E*)."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
-        contact, gap, separation = pressed(self.space, self.levels, contact, **given)
+        contact, gap, separation = pressed(self.space, self.topography, contact, **given)
         new = CellState(
             separation * self.spacing,
             contact.cells,

@@ -64,9 +64,36 @@ class Held(Contact):
     around_rim: np.ndarray = field(repr=False)
 
 
-def rounding(heights: np.ndarray) -> float:
-    """By how much displacements in single precision are off on a surface of given heights (n, n), both in cells."""
-    return _ROUNDING * float(max(heights.max(), -heights.min()))
+@dataclass(frozen=True, eq=False)
+class Topography:
+    """Heights of a surface, (n, n) or (t, n, n), in cells, in both precisions that gaps are computed in.
+
+    largest: height, up or down.
+    """
+
+    double: np.ndarray
+    single: np.ndarray
+    largest: float
+
+    @classmethod
+    def of(cls, heights: np.ndarray) -> Topography:
+        """The topography of heights in double precision."""
+        return cls(heights, heights.astype(np.float32), float(max(heights.max(), -heights.min())))
+
+    @property
+    def rounding(self) -> float:
+        """By how much displacements in single precision are off, in cells."""
+        return _ROUNDING * self.largest
+
+    def gap(self, displaced: np.ndarray, separation: float, cells: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """The gap at a separation, in the place and precision of the displacements, a field.
+
+        known: gap on cells in contact, (k,), where it is known better than from a difference of displacements.
+        """
+        displaced -= self.single if displaced.dtype == np.float32 else self.double
+        displaced += displaced.dtype.type(separation)
+        displaced.ravel()[cells] = known
+        return displaced
 
 
 def solve_bonds(
@@ -145,7 +172,7 @@ def _correction(space, cells, bonds, wanted, accuracy, balanced):
 
 def held(
     space: HalfSpace,
-    heights: dict[np.dtype, np.ndarray],
+    topography: Topography,
     separation: float,
     contact: Contact,
     tolerance: float,
@@ -158,7 +185,7 @@ def held(
 
     Parameters
     ----------
-    heights : (n, n), cells, by precision. contact : with pressures to start from. tolerance : as of `solve_bonds`.
+    contact : with pressures to start from. tolerance : as of `solve_bonds`.
     beyond : what contact outside of these cells adds to the mean fraction around every one, (n, n).
 
     Raises
@@ -168,20 +195,17 @@ def held(
     NotConverged
         If pressures or the contact under pressure are not found.
     """
-    kind = np.float32 if tolerance > rounding(heights[np.dtype(float)]) else float
+    kind = np.float32 if tolerance > topography.rounding else float
     cells, fraction, pressure = contact.cells, contact.fraction, contact.pressure
     given = np.ones(len(cells), dtype=bool)
     for _ in range(_MAX_CHANGES):
         if len(cells) == space.size:
             raise FullContact("the contact runs over the whole surface")
-        overlap = heights[np.dtype(float)].ravel()[cells] - separation
+        overlap = topography.double.ravel()[cells] - separation
         bonds = COMPLIANCE * (1 / fraction - 1)
         pressure, left = solve_bonds(space, cells, bonds, overlap, pressure, tolerance, kind, gain=_WHILE_CHANGING)
-        gap = space.displacement(cells, pressure.astype(kind))
-        gap -= heights[np.dtype(kind)]
-        gap += kind(separation)
-        # Of cells in contact the gap is known better than from a difference of displacements.
-        gap.ravel()[cells] = -left - bonds * pressure
+        displaced = space.displacement(cells, pressure.astype(kind))
+        gap = topography.gap(displaced, separation, cells, -left - bonds * pressure)
         closing = (pressure > 0) & (fraction < 1)
         leaving = ~given & (pressure < 0)
         overlapping = gap < -max(tolerance, float(np.abs(left).max(initial=0.0)))

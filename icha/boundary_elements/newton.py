@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from icha.boundary_elements.elasticity import Contact, Held, held, tension
+from icha.boundary_elements.elasticity import Contact, Held, Topography, held, tension
 from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_weights
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.regions import adjacent, region
@@ -108,7 +108,7 @@ def front_residual(front: Front, state: Held) -> float:
 def front_at_rest(
     space: HalfSpace,
     front: Front,
-    heights: dict[np.dtype, np.ndarray],
+    topography: Topography,
     separation: float,
     contact: Contact,
     tolerance: float,
@@ -134,7 +134,7 @@ def front_at_rest(
     enough = max(GAP_TOLERANCE, _GAP_TO_TENSION * tolerance)
 
     def at(contact, off):
-        return held(space, heights, separation, contact, off * reach, beyond)
+        return held(space, topography, separation, contact, off * reach, beyond)
 
     def energy(state):
         # What lies beyond loses perimeter where it meets what lies here, as this does.

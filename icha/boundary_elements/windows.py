@@ -13,7 +13,7 @@ import numpy as np
 import scipy.fft
 from scipy.ndimage import find_objects, label, maximum_filter
 
-from icha.boundary_elements.elasticity import Contact, Held
+from icha.boundary_elements.elasticity import Contact, Held, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
@@ -33,7 +33,6 @@ _STEPS = 12
 def relaxed_in_windows(
     space: HalfSpace,
     front: Front,
-    heights: dict[np.dtype, np.ndarray],
     separation: float,
     state: Held,
     restless: np.ndarray,
@@ -60,7 +59,7 @@ def relaxed_in_windows(
     around = around - neighbours(small, inside, contact.fraction)
     try:
         rest = front_at_rest(
-            small, front, in_both_precisions(level), separation, contact, _TOLERANCE, most_steps=_STEPS, beyond=around
+            small, front, Topography.of(level), separation, contact, _TOLERANCE, most_steps=_STEPS, beyond=around
         )
     except (NotConverged, FullContact):
         return None
