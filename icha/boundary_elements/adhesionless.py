@@ -74,6 +74,5 @@ def pressed(
                 return Contact(cells, np.ones(len(cells)), pressure), gap, separation
             rough = off > topography.rounding
             continue
-        cells, order = merged(cells[staying], joining)
-        pressure = np.concatenate([pressure[staying], np.zeros(len(joining))])[order]
+        cells, pressure = merged(cells[staying], joining, (pressure[staying], 0.0))
     raise NotConverged("the contact did not settle")

@@ -215,11 +215,9 @@ def held(
             if np.abs(left).max(initial=0.0) <= tolerance:
                 break
             continue
-        fraction = np.where(closing, 1.0, fraction)
-        cells, order = merged(cells[~leaving], joining)
-        fraction, pressure, given = (
-            np.concatenate([values[~leaving], np.full(len(joining), new, values.dtype)])[order]
-            for values, new in ((fraction, 1.0), (pressure, 0.0), (given, False))
+        fraction, staying = np.where(closing, 1.0, fraction), ~leaving
+        cells, fraction, pressure, given = merged(
+            cells[staying], joining, (fraction[staying], 1.0), (pressure[staying], 0.0), (given[staying], False)
         )
     else:
         raise NotConverged("the contact under pressure did not settle")

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from icha.boundary_elements.elasticity import Contact, Held, Topography, held, tension
 from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_weights
 from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.regions import adjacent, region
+from icha.boundary_elements.regions import adjacent, merged, region
 from icha.contact.failures import NotConverged
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
@@ -85,18 +85,15 @@ def moving(front: Front, state: Held) -> Moving:
     opening[opening] = ~np.all(closed[around], axis=0) | (state.fraction[opening] < 1)
     free = opening | ((inside < 1) & (state.fraction < 1))
     closing = outside < 1
-    nothing = np.zeros(np.count_nonzero(closing))
-    cells = np.concatenate([state.cells, state.rim[closing]])
-    order = np.argsort(cells, kind="stable")
-    cells = cells[order]
-    parts = (
-        (state.fraction, nothing),
-        (state.pressure, nothing),
+    cells, fraction, pressure, around, off, free = merged(
+        state.cells,
+        state.rim[closing],
+        (state.fraction, 0.0),
+        (state.pressure, 0.0),
         (state.around, state.around_rim[closing]),
         (inside, outside[closing]),
-        (free, nothing == 0),
+        (free, True),
     )
-    fraction, pressure, around, off, free = (np.concatenate(part)[order] for part in parts)
     return Moving(cells, fraction, pressure, state.gap.ravel()[cells], around, off, free)
 
 

@@ -7,7 +7,7 @@ from scipy.ndimage import label
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from icha.boundary_elements.regions import adjacent, region
+from icha.boundary_elements.regions import adjacent, among, region
 
 # Nodes along an edge overestimate an area by so much of the edges of cells (Yastrebov, Anciaux & Molinari, Tribol. Int.
 # 114 (2017) 161, eq. 9).
@@ -33,10 +33,10 @@ def labelled(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
 
 def labels_at(places: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.ndarray:
     """Number of the patch at some places, cells (m,) of any kind; 0 where there is none."""
-    if not len(cells):
-        return np.zeros(len(places), dtype=int)
-    at = np.minimum(np.searchsorted(cells, places), len(cells) - 1)
-    return np.where(cells[at] == places, labels[at], 0)
+    result = np.zeros(len(places), dtype=int)
+    there, at = among(places, cells)
+    result[there] = labels[at]
+    return result
 
 
 def edges(cells: np.ndarray, grid: int) -> np.ndarray:

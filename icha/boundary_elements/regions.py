@@ -37,8 +37,23 @@ def adjacent(cells: np.ndarray, grid: int) -> np.ndarray:
     return first + np.stack(around)
 
 
-def merged(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two rising lists of cells without a common one as one list, and the order in which it takes them."""
+def merged(
+    one: np.ndarray, other: np.ndarray, *values: tuple[np.ndarray, np.ndarray | float]
+) -> tuple[np.ndarray, ...]:
+    """Two lists of cells without a common one as one that rises, and values on them in its order.
+
+    values: pairs, on the cells of one, (k,), and on those of the other, (m,) or the same on all.
+    """
     cells = np.concatenate([one, other])
     order = np.argsort(cells, kind="stable")
-    return cells[order], order
+    return cells[order], *(
+        np.concatenate([first, np.broadcast_to(second, len(other))])[order] for first, second in values
+    )
+
+
+def among(places: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which places, cells of any kind (m,), are among rising cells (k,), and where in their list these stand."""
+    at = np.searchsorted(cells, places)
+    # Beyond the last there is no cell.
+    there = np.append(cells, -1)[at] == places
+    return there, at[there]

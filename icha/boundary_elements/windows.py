@@ -17,7 +17,7 @@ from icha.boundary_elements.elasticity import Contact, Held, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
-from icha.boundary_elements.regions import merged, region
+from icha.boundary_elements.regions import among, merged, region
 from icha.contact.failures import FullContact, NotConverged
 
 # Cells a side of a window; half of it may move. So far around a cell that is not at rest others move with it.
@@ -45,10 +45,9 @@ def relaxed_in_windows(
     if not len(windows):
         return None
     cells = windows[free]
-    among = np.minimum(np.searchsorted(state.cells, cells), len(state.cells) - 1)
-    touching = state.cells[among] == cells
+    touching, at = among(cells, state.cells)
     inside = np.flatnonzero(free)[touching]
-    contact = Contact(inside, state.fraction[among[touching]], state.pressure[among[touching]])
+    contact = Contact(inside, state.fraction[at], state.pressure[at])
     small = HalfSpace(windows.shape, *_kernel(space.grid))
 
     # What pressures outside displace is there for good, as if the surface had it; what may not move is far away.
@@ -65,14 +64,14 @@ def relaxed_in_windows(
         return None
     moved = region(cells, (space.size,))
     staying = ~moved[state.cells]
-    found = windows.ravel()[rest.cells]
-    in_order = np.argsort(found, kind="stable")
-    together, order = merged(state.cells[staying], found[in_order])
-    fraction, pressure = (
-        np.concatenate([old[staying], new[in_order]])[order]
-        for old, new in ((state.fraction, rest.fraction), (state.pressure, rest.pressure))
+    return Contact(
+        *merged(
+            state.cells[staying],
+            windows.ravel()[rest.cells],
+            (state.fraction[staying], rest.fraction),
+            (state.pressure[staying], rest.pressure),
+        )
     )
-    return Contact(together, fraction, pressure)
 
 
 def _windows(restless):
