@@ -127,72 +127,98 @@ def front_at_rest(
     NotConverged
         If it is not found.
     """
-    reach = COMPLIANCE * front.strength
+    given = _Given(space, front, topography, separation, beyond)
     enough = max(GAP_TOLERANCE, _GAP_TO_TENSION * tolerance)
-
-    def at(contact, off):
-        return held(space, topography, separation, contact, off * reach, beyond)
-
-    def energy(state):
-        # What lies beyond loses perimeter where it meets what lies here, as this does.
-        around = state.around if beyond is None else state.around + beyond.ravel()[state.cells]
-        return state.energy - front.adhesion_length * float(np.sum(areas(state.fraction, around)))
-
-    def lower(new, old):
-        return energy(new) <= energy(old) + new.unsure + old.unsure + _SAME_ENERGY * abs(energy(old))
-
     coarse = _NEAR if near else _GAP_TO_FRONT
-    state = contact if isinstance(contact, Held) else at(contact, max(enough, coarse))
+    state = contact if isinstance(contact, Held) else given.at(contact, max(enough, coarse))
     damping, most_off, all_moved = 0.0, coarse, True
     for _ in range(most_steps or _MAX_STEPS):
         now = moving(front, state)
         error = now.error
         if error <= tolerance:
-            if state.off <= enough * reach:
+            if state.off <= enough * given.reach:
                 return state
             # The pressures are still those of a coarse beginning, and the error theirs.
-            state = at(state, enough)
+            state = given.at(state, enough)
             continue
         restless = now.free & (np.abs(now.tension - 1) > _RESTLESS)
         if all_moved and 0 < np.count_nonzero(restless) <= _FEW * np.count_nonzero(now.front):
             all_moved = False
             contact = mended(state, now.cells[restless])
             if contact is not None:
-                new = at(contact, min(coarse, 0.1 * _GAP_TO_FRONT))
-                if lower(new, state):
+                new = given.at(contact, min(coarse, 0.1 * _GAP_TO_FRONT))
+                if given.is_lower(new, state):
                     state = new
                     continue
         accuracy = min(COARSE, max(FINE, error))
         step = _down(space, front, now, damping, accuracy)
         if step is None:
-            if state.off > enough * reach:
+            if state.off > enough * given.reach:
                 # Or tensions of pressures that are not good enough say so.
-                state = at(state, max(enough, _FINER * state.off / reach))
+                state = given.at(state, max(enough, _FINER * state.off / given.reach))
             else:
                 damping = _more(damping)
             continue
-        change, pressed = step
         off = max(enough, min(most_off, error * min(_GAP_TO_FRONT, max(error, FINE))))
-        part = 1.0
-        while part >= _SMALLEST_STEP:
-            new = at(now.moved(part * change, part * pressed), off)
-            down = lower(new, state)
-            if down or most_off > _NEAR:
-                break
-            part /= 2
-        if down:
+        smallest = _SMALLEST_STEP if most_off <= _NEAR else 1.0
+        lower = _lower_along(given, state, now, step, off, smallest)
+        if lower is not None:
+            state, part = lower
             if part == 1.0:
                 damping = damping / 4 if damping > 0.01 else 0.0
-            state, most_off, all_moved = new, coarse, True
+            most_off, all_moved = coarse, True
         elif most_off > _NEAR:
             # Energies of coarse pressures are not to be trusted that far.
             most_off = _NEAR
-            state = at(state, max(enough, most_off))
+            state = given.at(state, max(enough, most_off))
         else:
             damping = _more(4 * damping)
     if most_steps:
         return state
     raise NotConverged(f"the front did not come to rest (sqrt(G/dgamma) is off by {error:.1e})")
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What a front on its way to rest is given, as `front_at_rest` is."""
+
+    space: HalfSpace
+    front: Front
+    topography: Topography
+    separation: float
+    beyond: np.ndarray | None
+
+    @property
+    def reach(self):
+        """Gap at which a cell is free, in cells."""
+        return COMPLIANCE * self.front.strength
+
+    def at(self, contact, off):
+        """A contact in elastic equilibrium; its displacement to so much of the reach."""
+        return held(self.space, self.topography, self.separation, contact, off * self.reach, self.beyond)
+
+    def energy(self, state):
+        """Elastic energy less that of adhesion, in E* cells^3."""
+        # What lies beyond loses perimeter where it meets what lies here, as this does.
+        around = state.around if self.beyond is None else state.around + self.beyond.ravel()[state.cells]
+        return state.energy - self.front.adhesion_length * float(np.sum(areas(state.fraction, around)))
+
+    def is_lower(self, new, old):
+        """Whether a state is not above another in energy, as far as this is known."""
+        energy = self.energy(old)
+        return self.energy(new) <= energy + new.unsure + old.unsure + _SAME_ENERGY * abs(energy)
+
+
+def _lower_along(given, state, now, step, off, smallest):
+    """A state lower in energy after all of a step, half of it, a quarter ..., and after which part; None if none is."""
+    change, pressed = step
+    part = 1.0
+    while part >= smallest:
+        new = given.at(now.moved(part * change, part * pressed), off)
+        if given.is_lower(new, state):
+            return new, part
+        part /= 2
+    return None
 
 
 def _more(damping):
