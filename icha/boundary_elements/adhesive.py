@@ -100,7 +100,7 @@ def settled(
         stage = 0
         made = np.union1d(summits.contacts(within & ~tried[summits.cell], space.grid), new)
         tried[new] = True
-        contact = Contact(contact.cells, contact.fraction, contact.pressure).with_closed(made)
+        contact = contact.with_closed(made)
 
 
 def _within_reach(summits, state, margin):
