@@ -12,7 +12,7 @@ from icha.boundary_elements.adhesionless import pressed
 from icha.boundary_elements.adhesive import Summits, settled
 from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, areas, contact_area_gradient, contact_areas
-from icha.boundary_elements.held_load import held
+from icha.boundary_elements.held_load import under_control
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import COARSE, FINE, FRONT_TOLERANCE, front_residual, tangent
 from icha.boundary_elements.patch_events import patch_events
@@ -118,7 +118,7 @@ class BoundaryElements:
         elif not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
             new = self._pressed(state, load=control.target / self.contact_modulus)
         else:
-            new = held(self, state, separation, control, self._at, self._events)
+            new = under_control(self, state, separation, control, self._at, self._events)
         return replace(new, history=(*state.history, self._events(state, new)))
 
     def released(self, region: np.ndarray, separation: float) -> CellState:

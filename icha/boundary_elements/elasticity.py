@@ -236,7 +236,7 @@ def held(
     return Held(cells, fraction, pressure, gap, tolerance, energy, unsure, around, rim, around_rim)
 
 
-def tension(front: Front, held: Held) -> tuple[np.ndarray, np.ndarray]:
+def tension(front: Front, state: Held) -> tuple[np.ndarray, np.ndarray]:
     """sqrt(G/dgamma): of cells in contact, (k,), which open above 1, and of those beside, (m,), which close below."""
-    inside = -held.pressure / (held.fraction * front.strengths(held.around))
-    return inside, held.gap.ravel()[held.rim] / (COMPLIANCE * front.strengths(held.around_rim))
+    inside = -state.pressure / (state.fraction * front.strengths(state.around))
+    return inside, state.gap.ravel()[state.rim] / (COMPLIANCE * front.strengths(state.around_rim))

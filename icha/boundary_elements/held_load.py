@@ -27,7 +27,7 @@ _NO_LOAD = 1e-6
 _CELLS = 2.0
 
 
-def held(
+def under_control(
     contact: ContactModel[CellState],
     state: CellState,
     separation: float,
