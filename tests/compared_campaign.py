@@ -73,7 +73,6 @@ def own_patches(run, *, area=1.0, separation=1.0):
         reduced_separation=run["reduced_separation"] * separation,
         front_residual=step + 1e-4,
         gap_residual=step,
-        pressure_residual=step,
         contact_map=(("snapshot", "row", "column"), np.array(maps, np.float32)),
         contact_pressure=(("snapshot", "row", "column"), np.zeros((len(maps), GRID, GRID), np.float32)),
     ).assign_attrs(contact_model="boundary_elements")

@@ -112,7 +112,6 @@ def _fronts(run) -> Iterator[Finding]:
     for name, short, limit in (
         ("front_residual", "front", FRONT_LIMIT),
         ("gap_residual", "gap", RESIDUAL_LIMIT),
-        ("pressure_residual", "pressure outside", RESIDUAL_LIMIT),
     ):
         if name in run:
             yield short, np.max(run[name]), limit, PATCHES[name].long_name

@@ -42,8 +42,6 @@ class PatchObservables:
             "residual": state.gap_residual / contact.rms_height,
             "front_residual": state.front_residual,
             "gap_residual": state.gap_residual / contact.rms_height,
-            # Where there is no contact there is no pressure, by construction.
-            "pressure_residual": 0.0,
             "pending_count": state.pending,
             "outside_wu_fraction": outside if contact.adhesive else 0.0,
         }

@@ -48,7 +48,7 @@ RUN_NAMES = {
         *("pressure_bin_edges", "pressure_bin_centre", "pressure_bin_bounds"),
         *("spot_snapshot", "spot_x", "spot_y", "spot_radius", "spot_area", "spot_perimeter", "spot_force"),
     ),
-    PATCHES: ("front_residual", "gap_residual", "pressure_residual"),
+    PATCHES: ("front_residual", "gap_residual"),
     MAPS: ("contact_map", "contact_pressure"),
     WAY_BACK: (
         *("work", "stored_energy", "dissipated_by_jump_in", "dissipated_by_jump_off", "dissipated_by_coalescence"),

@@ -115,7 +115,6 @@ PATCHES = {
         "largest deviation from 1 along the edges of contact of the root of energy release rate over surface energy",
     ),
     "gap_residual": Variable(_STEP, "1", "largest gap in contact, or overlap out of it, over h_rms"),
-    "pressure_residual": Variable(_STEP, "1", "largest pressure out of contact over contact modulus and rms slope"),
     "contact_map": Variable((*_SNAPSHOT, *CELLS), "1", "part of the cell that is in contact", np.float32),
     "contact_pressure": Variable((*_SNAPSHOT, *CELLS), "Pa", "pressure in the cell, negative in tension", np.float32),
 }
