@@ -227,11 +227,11 @@ def held(
     if kind == np.float32:
         unsure += 0.2 * _ROUNDING * float(np.sum(np.abs(pressure * overlap)))
     rim = beside(cells, space.shape)
-    near, order = merged(cells, rim)
+    near, order = merged(cells, rim, (np.arange(len(cells)), len(cells) + np.arange(len(rim))))
     around = np.empty(len(near))
     around[order] = neighbours(space, cells, fraction.astype(kind), near)
     if beyond is not None:
-        around += beyond.ravel()[near[np.argsort(order)]]
+        around += beyond.ravel()[np.concatenate([cells, rim])]
     around, around_rim = around[: len(cells)], around[len(cells) :]
     return Held(cells, fraction, pressure, gap, tolerance, energy, unsure, around, rim, around_rim)
 

@@ -31,8 +31,10 @@ from icha.equilibrium.states import ContactState
 # Error in h_rms below which jumps and unions happen; one that hangs by less than ten times the error waits.
 _EVENT_TOLERANCE = 3e-4
 _EVENT_MARGIN = 10.0
-# Newton steps between two events.
+# Newton steps between two events; and of those that take exact solutions of the linear equations in all: where many are
+# needed, the step of the path is too long.
 _MAX_NEWTON_STEPS = 60
+_MAX_EXACT_STEPS = 4
 # Contact area fraction at which the spots have lost all meaning.
 _FULL_CONTACT = 0.5
 
@@ -55,7 +57,7 @@ def equilibrium(
     if spots_let_go:
         search = let_go(search, separation, spots_let_go)
     point = Equations(problem, search.sites, control).at(search.sites.approach, separation)
-    steps, quiet = 0, False
+    steps, exact_steps, quiet = 0, 0, False
     while True:
         search, point = _without_swallowed(search, point, control)
         equations = Equations(problem, search.sites, control)
@@ -72,9 +74,10 @@ def equilibrium(
             search, changed = happen(search, point, margin)
             quiet = not changed  # what hangs by less waits for the equilibrium
         if not changed:
-            if steps == _MAX_NEWTON_STEPS:
+            if steps == _MAX_NEWTON_STEPS or exact_steps == _MAX_EXACT_STEPS:
                 raise NotConverged(f"equilibrium error {size:.2e} h_rms after {steps} Newton steps")
-            point, nearer = descend(equations, point, size)
+            point, nearer, exact = descend(equations, point, size)
+            exact_steps += exact
             if nearer:
                 steps += 1
                 continue

@@ -29,8 +29,11 @@ _NEAR_JUMP_OFF = 1.5
 _NEXT_TO_JUMP_OFF = 0.2
 
 
-def descend(equations: Equations, point: Point, size: float) -> tuple[Point, bool]:
-    """A Newton step, shortened until the error falls below its `size`; or, where it does not, the point as it was."""
+def descend(equations: Equations, point: Point, size: float) -> tuple[Point, bool, bool]:
+    """A Newton step, shortened until the error falls below its `size`; or, where it does not, the point as it was.
+
+    Whether it falls, and whether a rough solution of the linear equations was not enough.
+    """
     for exact in (False, True):
         step, du = _step(equations, point, exact)
         for halving in range(_MAX_HALVINGS):
@@ -38,9 +41,9 @@ def descend(equations: Equations, point: Point, size: float) -> tuple[Point, boo
             approach = _moved(equations, point, fraction * step)
             new = equations.at(approach, point.separation + fraction * du, point.interaction)
             if equations.size(new) < (1 - 0.1 * fraction) * size:
-                return new, True
+                return new, True, exact
             point = replace(point, interaction=new.interaction)
-    return point, False
+    return point, False, True
 
 
 def response(equations: Equations, point: Point) -> np.ndarray:
