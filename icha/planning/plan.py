@@ -248,6 +248,8 @@ def read_attributes(file: Path) -> dict[str, str]:
 
 
 def _text(attribute) -> str:
+    if not isinstance(attribute, bytes | str):
+        (attribute,) = attribute  # so the library of netCDF keeps text beyond ASCII
     return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
 
 
