@@ -5,7 +5,7 @@ missing or has no more steps, and has the same bytes whenever it is written from
 """
 
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Container, Hashable, Iterator
 from contextlib import contextmanager
 
 import netCDF4
@@ -33,9 +33,6 @@ from icha.support.atomic_files import whole_file
 _COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 # Bytes of an array from which on it is not read as a whole.
 _LEFT_IN_FILE = 2**26
-
-# Dimensions and values of variables by name; texts are characters, along a last dimension without a name.
-Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
@@ -172,33 +169,12 @@ def read_run(path: str | os.PathLike) -> xr.Dataset:
         If the file cannot be read or is not a run dataset.
     """
     run = read_dataset(path)
-    _check_is_run(run.variables, path)
+    check_is_run(run.variables, path)
     return run
 
 
-def read_run_values(path: str | os.PathLike, without: Collection[str] = ()) -> tuple[Values, dict]:
-    """Read the values of a run dataset and its attributes, without those of its variables: quickly.
-
-    Variables along the dimensions `without` are left out.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or is not a run dataset.
-    """
-    with readable(path), netCDF4.Dataset(path) as file:
-        file.set_auto_maskandscale(False)
-        file.set_auto_chartostring(False)
-        _check_is_run(file.variables, path)
-        values = {
-            name: (variable.dimensions[: -1 if variable.dtype == "S1" else None], variable[...])
-            for name, variable in file.variables.items()
-            if not set(without) & set(variable.dimensions)
-        }
-        return values, {name: file.getncattr(name) for name in file.ncattrs()}
-
-
-def _check_is_run(variables, path):
+def check_is_run(variables: Container[Hashable], path: str | os.PathLike) -> None:
+    """Refuse a file without the variables that all runs have; `variables` are the names of its own."""
     for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
         if name not in variables:
             raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")

@@ -51,8 +51,9 @@ class Column(NamedTuple):
         if dims != self.own:
             values = np.moveaxis(values, [dims.index(dim) for dim in self.own], range(len(self.own)))
         if values.dtype.kind == "S":
-            room = self.variable.shape[-1] - values.shape[-1]
-            values = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, room)], constant_values=b"")
+            whole = np.zeros((*values.shape[:-1], self.variable.shape[-1]), "S1")
+            whole[..., : values.shape[-1]] = values
+            return whole
         return values
 
     def places(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:

@@ -9,9 +9,9 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.datasets.files import Values, read_run_values
 from icha.datasets.labels import RunLabels
 from icha.datasets.netcdf import characters, is_text, not_finite
+from icha.datasets.run_values import Values, read_run_values
 from icha.datasets.variables.run import CELLS
 
 
@@ -95,7 +95,7 @@ def plain(labels: RunLabels | tuple) -> RunLabels:
 
 
 def _values_of(run: xr.Dataset) -> tuple[Values, dict]:
-    """What `icha.datasets.files.read_run_values` gives of a run's file, of the run itself."""
+    """What `icha.datasets.run_values.read_run_values` gives of a run's file, of the run itself."""
     values = {
         name: (variable.dims, characters(variable.values) if is_text(variable.dtype) else variable.values)
         for name, variable in run.drop_dims(CELLS, errors="ignore").variables.items()

@@ -25,6 +25,8 @@ from icha.datasets.netcdf import characters
 from icha.datasets.variables.campaign import RAGGED
 from icha.support.atomic_files import whole_file
 
+# Of what runs share, values at so many places are kept at most.
+_LATEST = 256
 _STUDIES = "The runs of every study, a group for each."
 
 
@@ -149,9 +151,14 @@ class _Common:
         self.held = column.variable
         if not column.own or not column.along:
             self.held = np.full(shape, column.fill, column.variable.dtype)
+        # What was last taken or found to agree, by place.
+        self.latest: dict[tuple[int, ...], tuple[tuple, np.ndarray]] = {}
 
     def put(self, labels: RunLabels, place: tuple[int, ...], own: tuple, values: np.ndarray) -> None:
         """Take the values of a run, or compare them."""
+        latest = self.latest.get(place)
+        if latest and latest[0] == own and np.array_equal(latest[1], values):
+            return
         known = self.known[(*place, *own)[: self.known.ndim]]
         if np.any(known):
             there = self.held[(*place, *own)]
@@ -162,6 +169,9 @@ class _Common:
         if not np.all(known):
             self.held[(*place, *own)] = values
             self.known[(*place, *own)[: self.known.ndim]] = True
+        if len(self.latest) == _LATEST:
+            self.latest.clear()
+        self.latest[place] = own, values
 
     def flush(self) -> None:
         """Write what is kept in memory."""

@@ -1,0 +1,45 @@
+"""What is read quickly of a run's file is what the file holds."""
+
+import netCDF4
+import numpy as np
+import pytest
+import small_campaign as small
+
+from icha.datasets.files import write_dataset
+from icha.datasets.netcdf import characters, is_text
+from icha.datasets.run_values import read_run_values
+
+
+def written(run, path):
+    write_dataset(run, path)
+    return path
+
+
+@pytest.mark.parametrize("spots", [None, 0])
+def test_all_values_come_back_with_their_dimensions(tmp_path, spots):
+    run = small.run().isel(spot=slice(spots))
+    values, attrs = read_run_values(written(run, tmp_path / "run.nc"))
+    assert values.keys() == set(run.variables)
+    for name, (dims, own) in values.items():
+        given = run[name].values
+        assert dims == run[name].dims
+        np.testing.assert_array_equal(own, characters(given) if is_text(given.dtype) else given, strict=True)
+    assert attrs == {"contact_model": run.attrs["contact_model"]}
+
+
+def test_why_a_run_is_incomplete_is_read_and_variables_can_be_left_out(tmp_path):
+    path = written(small.run().assign_attrs(incomplete="lost at 3 µm"), tmp_path / "run.nc")
+    values, attrs = read_run_values(path, ("spot", "snapshot"))
+    assert attrs["incomplete"] == "lost at 3 µm"
+    assert "mean_separation" in values
+    assert not {"spot_x", "gap_density"} & set(values)
+
+
+def test_files_of_other_variables_or_dimensions_are_refused(tmp_path):
+    run = small.run()
+    with pytest.raises(ValueError, match=r"run\.nc: not a run dataset, it has a variable 'colour'"):
+        read_run_values(written(run.assign(colour=run["residual"]), tmp_path / "run.nc"))
+    with netCDF4.Dataset(written(run.drop_vars("residual"), tmp_path / "other.nc"), "a") as file:
+        file.createVariable("residual", "f8", ("snapshot",))[:] = 0
+    with pytest.raises(ValueError, match=r"other\.nc: not a run dataset, 'residual' does not have the dimensions"):
+        read_run_values(tmp_path / "other.nc")
