@@ -26,6 +26,7 @@ if workflow.is_main_process:
 
 
 onstart:
+    before_jobs.collect_again()
     before_jobs.start_without_limit(workflow)
     here.refuse_second()
     here.refuse_unwritable()

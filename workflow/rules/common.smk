@@ -14,6 +14,8 @@ from icha.configuration.named_files import with_files_beside_it
 from icha.datasets import results
 from icha.planning.results import campaign_files
 
+before_jobs.plan_without_collecting()
+
 CONFIGURATION = campaign_configuration(workflow)
 CAMPAIGN = CONFIGURATION.campaign
 PUBLICATION = CAMPAIGN.published()
