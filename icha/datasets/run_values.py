@@ -15,6 +15,7 @@ import numpy as np
 
 from icha.datasets.files import check_is_run, readable
 from icha.datasets.variables.run import CYCLE, LOOP, PATCHES, RUN
+from icha.support.hdf5 import text
 
 if TYPE_CHECKING:
     import h5py
@@ -47,19 +48,13 @@ def read_run_values(path: str | os.PathLike, without: Collection[str] = ()) -> t
             raise ValueError(f"{path}: not a run dataset, it has a variable {min(odd)!r}")
         wanted = [name for name in names if not set(without) & set(_DIMS[name])]
         values = {name: (_DIMS[name], _read(file, name)) for name in wanted}
-        attrs = {name: _text(file.attrs[name]) for name in ("contact_model", "incomplete") if name in file.attrs}
+        attrs = {name: text(file.attrs[name]) for name in ("contact_model", "incomplete") if name in file.attrs}
     _check_sizes(values, path)
     return values, attrs
 
 
 def _is_dimension(name):
     return name in _DIMENSIONS or _WIDTH_OF_TEXT.fullmatch(name)
-
-
-def _text(attribute):
-    if not isinstance(attribute, bytes | str):
-        (attribute,) = attribute  # so the library of netCDF keeps text beyond ASCII
-    return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
 
 
 def _read(file: h5py.File, name: str) -> np.ndarray:

@@ -20,6 +20,7 @@ from icha.planning.resources import run_threads
 from icha.planning.results import CampaignFiles, campaign_files
 from icha.planning.roughness import roughness
 from icha.support.checksums import is_whole
+from icha.support.hdf5 import text
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
 # So many of the files that are there are compared with what was expected of them.
@@ -240,17 +241,11 @@ def read_attributes(file: Path) -> dict[str, str]:
 
     try:
         with h5py.File(file, "r") as data:
-            return {name: _text(data.attrs[name]) for name in ("config_sha256", "incomplete") if name in data.attrs}
+            return {name: text(data.attrs[name]) for name in ("config_sha256", "incomplete") if name in data.attrs}
     except OSError as error:
         if error.errno is not None:  # no permission, for one: that says nothing of the content
             raise
         raise DamagedFile(file) from None
-
-
-def _text(attribute) -> str:
-    if not isinstance(attribute, bytes | str):
-        (attribute,) = attribute  # so the library of netCDF keeps text beyond ASCII
-    return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
 
 
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
