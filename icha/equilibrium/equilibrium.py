@@ -74,8 +74,10 @@ def equilibrium(
             search, changed = happen(search, point, margin)
             quiet = not changed  # what hangs by less waits for the equilibrium
         if not changed:
-            if steps == _MAX_NEWTON_STEPS or exact_steps == _MAX_EXACT_STEPS:
+            if steps == _MAX_NEWTON_STEPS:
                 raise NotConverged(f"equilibrium error {size:.2e} h_rms after {steps} Newton steps")
+            if exact_steps == _MAX_EXACT_STEPS:
+                raise NotConverged(f"equilibrium error {size:.2e} h_rms after {exact_steps} exact Newton steps")
             point, nearer, exact = descend(equations, point, size)
             exact_steps += exact
             if nearer:
