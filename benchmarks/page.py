@@ -245,6 +245,13 @@ def verdicts(results) -> list[Verdict]:
             text = f"{run[0]['outcome']} after {seconds(run[0]['wall'])}, {len(_stops(run[0]))} stops"
         reached = run[0]["outcome"] == "complete" and run[0]["processor"] <= most if run else None
         found.append(Verdict(target, text, reached))
+    for grid, adhesion, wanted in ((512, False, 1), (512, True, 8), (1024, False, 1), (1024, True, 8)):
+        target = f"at {grid}², ICHA's boundary elements {WITH[adhesion]}: at least {wanted} times as fast as "
+        target += "the fastest other code" + (", whose range is far longer" if adhesion else "")
+        best = _boundary_elements_against_others(results, grid, adhesion)
+        found.append(
+            Verdict(target, f"{best[0]:.1f} times ({best[1]})" if best else "", best[0] >= wanted if best else None)
+        )
     residuals = [
         stop["residual"] for name, result in results.items() for stop in _stops(result) if "residual" in stop
     ] + [result["residual"] for result in chosen(results, "stages-") if "residual" in result]
@@ -282,6 +289,14 @@ def verdicts(results) -> list[Verdict]:
         reached = run.get("outcome", "complete") == "complete" and _processor(run) <= most if run else None
         found.append(Verdict(f"{what}: at most {most:g} s of processor", text, reached))
     return found
+
+
+def _boundary_elements_against_others(results, grid, adhesion) -> tuple[float, str] | None:
+    """The smallest ratio of processor times of another code and of ICHA's boundary elements, and that code."""
+    runs = chosen(results, "sweep-", grid=grid, adhesion=adhesion, threads=1, outcome="complete")
+    own = [run for run in runs if run["code"] == "icha-boundary-elements"]
+    ratios = [(run["processor"] / own[0]["processor"], run["code"]) for run in runs if own and run["code"] not in OWN]
+    return min(ratios, default=None)
 
 
 # What people wait for, by the name of its result, with the processor time that it may take, s.

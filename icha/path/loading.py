@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel, State
 from icha.path.bracketing import SAME_SEPARATION, InsideJump, first_passed
@@ -11,9 +9,11 @@ from icha.path.course import Course, halved
 from icha.path.stops import SAME_EXCESS, Stop
 from icha.path.waypoints import Waypoint
 
-# How often a stop is gone to straight. A way that is no short one, in longest steps. How steps grow again near the
-# length that has failed.
-_TRIALS, _LONG, _GROWTH = 2, 0.1, 1.2
+# How often a stop is gone to straight; and how much of a way that was too long is gone first, so that less is left, if
+# that is no short one, in longest steps.
+_TRIALS, _FIRST_PART, _LONG = 2, 0.6, 0.1
+# How many equilibria after one that was not found steps become longer again: what was too long once mostly is again.
+_PATIENCE = 8
 
 
 def first_loading(contact: ContactModel, stops: list[Stop], longest: float, course: Course) -> Iterator[Waypoint]:
@@ -25,7 +25,7 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
         As `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
-    waiting, step, failed, missed = list(stops), longest, np.inf, 0
+    waiting, step, missed, found = list(stops), longest, 0, 0
     while waiting:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
             state = first_contact  # nothing happens on the way there
@@ -34,10 +34,10 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
             if way <= step and missed < _TRIALS:
                 stop, beyond = nearest, _straight(nearest, waiting, state, step)
                 if beyond is None:
-                    # Half of the way helps; if it does not, the stop is looked for between two states.
+                    # A shorter way helps; if it does not, the stop is looked for between two states.
                     missed = missed + 1 if way > _LONG * longest else _TRIALS
                     if missed < _TRIALS:
-                        failed, step = way, way / 2
+                        step, found = _FIRST_PART * way, 0
                     continue
             else:
                 beyond = contact.equilibrium(state, state.separation - step)
@@ -48,11 +48,12 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
             continue
         except NotConverged as failure:
             try:
-                failed, step = step, halved(step, longest, failure)
+                step, found = halved(step, longest, failure), 0
             except NotConverged:
                 raise course.ended(state, True, failure) from failure
             continue
-        step = min(longest, 2 * step, max(failed / 2, _GROWTH * step))
+        found += 1
+        step = min(longest, 2 * step) if found >= _PATIENCE else step
         course.require_covered(state, beyond, stop, waiting, True)
         state = beyond
         if stop is None:
