@@ -15,7 +15,7 @@ class Workflow:
 
     start: float = 2.6
     """Until the first job: `icha run`, Snakemake, the plan; s."""
-    planned: float = 0.0025
+    planned: float = 0.0012
     """More for every file of the plan; s."""
     environment: float = 2
     """Imports of the process that jobs are forked from, once; s."""
