@@ -54,9 +54,9 @@ def nearer_rule(overlap: xr.Dataset, detachment: xr.Dataset, truth: xr.Dataset) 
         nearer = ["both" if np.isclose(*each, rtol=_TIE) else _RULES[int(np.argmin(each))] for each in away]
         for rule in _RULES:
             if count := nearer.count(rule):
-                words.append(f"in {what} `{rule}` is nearer in {count} of {len(cases)}")
+                words.append(f"in {what} `{rule}` is nearer in {count} of {len(cases)} cases")
         if count := nearer.count("both"):
-            words.append(f"in {what} both are as near in {count} of {len(cases)}")
+            words.append(f"in {what} both are equally near in {count} of {len(cases)} cases")
     return "; ".join(words)
 
 

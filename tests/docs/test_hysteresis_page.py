@@ -95,10 +95,10 @@ def test_rules_are_beside_the_truth_and_the_nearer_one_is_named(campaign):
     assert area[-2:] == ["+0 ± 0", "+0 ± 0"]
     assert pull[-2:] == ["-20 ± 0", "+0 ± 0"] and loss[-2:] == ["+25 ± 0", "-50 ± 0"]
     assert rules.nearer_rule(overlap, detachment, truth) == (
-        "in pull-off `detachment` is nearer in 2 of 2; in loss `overlap` is nearer in 2 of 2"
+        "in pull-off `detachment` is nearer in 2 of 2 cases; in loss `overlap` is nearer in 2 of 2 cases"
     )
     assert rules.nearer_rule(overlap, overlap, truth) == (
-        "in pull-off both are as near in 2 of 2; in loss both are as near in 2 of 2"
+        "in pull-off both are equally near in 2 of 2 cases; in loss both are equally near in 2 of 2 cases"
     )
 
 
@@ -107,6 +107,6 @@ def test_the_page_can_be_written(campaign):
     studies |= {"detachment": studies["other"], "load_control": studies["other"]}
     loads = [studies[name] for name in DEPTHS]
     text = render("hysteresis", campaign=campaign, studies=studies, load_studies=loads, command="make it")
-    assert "of the two rules in pull-off both are as near in 2 of 2" in text
+    assert "On this grid, in pull-off both are equally near in 2 of 2 cases" in text
     assert text.startswith("# Pull-off") and "`make it`" in text and "](images/fig13_loops.png)" in text
     assert "nan" not in text.lower() and "{" not in text
