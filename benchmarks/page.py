@@ -270,7 +270,7 @@ def verdicts(results) -> list[Verdict]:
     text = f"{plan['wall']:.0f} s, {plan['peak'] / GIB:.1f} GiB" if plan else ""
     reached = plan["outcome"] == "complete" and plan["wall"] <= 15 and plan["peak"] <= 2 * GIB if plan else None
     found.append(Verdict(target, text, reached))
-    target = "1 000 runs at 128² on two cores: at least 60 % of their time the contact solver's"
+    target = "1 000 runs at 128² on two cores: at least 60 % of the time in the contact solver"
     shares = {runs["grid"]: solver_share(runs) for runs in chosen(results, "campaign-runs-")}
     text = ", ".join(f"{shares[grid]:.0%} at {grid}²" for grid in sorted(shares))
     found.append(Verdict(target, text, shares[128] >= 0.6 if 128 in shares else None))
@@ -287,7 +287,7 @@ def verdicts(results) -> list[Verdict]:
         run = results.get(name)
         text = f"{_processor(run):.2f} s" if run else ""
         reached = run.get("outcome", "complete") == "complete" and _processor(run) <= most if run else None
-        found.append(Verdict(f"{what}: at most {most:g} s of processor", text, reached))
+        found.append(Verdict(f"{what}: at most {most:g} s of processor time", text, reached))
     return found
 
 
@@ -337,10 +337,10 @@ def page(results: dict[str, dict]) -> str:
     }
     parts = [
         "# Benchmarks",
-        "Measured by `make benchmarks`, which installs the boundary-element codes in an environment of their own "
-        "(`.venv-benchmarks`; `aspher` is built from its source and needs a C++17 compiler and Eigen, on Debian "
-        "`apt install libeigen3-dev`), runs one process at a time, keeps what it measured in `benchmarks/results` and "
-        "writes this page from it. Part of it is measured again by, say, "
+        "`make benchmarks` measures all numbers on this page. It installs the boundary-element codes in an environment "
+        "of their own (`.venv-benchmarks`; `aspher` is built from its source and needs a C++17 compiler and Eigen, on "
+        "Debian `apt install libeigen3-dev`), runs one process at a time, keeps the results in `benchmarks/results` "
+        "and writes this page from them. To measure a part again, use, for example, "
         "`make benchmarks OPTIONS='--only icha --parts sweep'`.",
         f"Machine: {machine['processor']}, {machine['cores']} cores, {machine['memory'] / GIB:.0f} GiB, "
         f"{machine['system']}, Python {machine['python']}; "
@@ -375,7 +375,7 @@ def _campaigns(results) -> list[str]:
     if plan := results.get("campaign-plan"):
         rows.append([f"plan (`-n`) of {plan['runs']} runs", seconds(plan["wall"]), mib(plan["peak"]), ""])
     for runs in sorted(chosen(results, "campaign-runs-"), key=lambda runs: runs["grid"]):
-        share = f"{solver_share(runs):.0%} the contact solver's ({runs['seconds_a_run']:.2f} s a run)"
+        share = f"{solver_share(runs):.0%} in the contact solver ({runs['seconds_a_run']:.2f} s a run)"
         rows.append(
             [
                 f"{runs['runs']} runs at {runs['grid']}² on {runs['cores']} cores",
@@ -394,7 +394,7 @@ def _campaigns(results) -> list[str]:
     parts.append(table(["", "time", "memory", "of the time"], rows))
     if costs := results.get("costs"):
         lines = []
-        for group, what in (("fitted", "to which the model was fitted"), ("others", "that it had not seen")):
+        for group, what in (("fitted", "to which the model was fitted"), ("others", "to which it was not fitted")):
             ratios = [case["ratios"]["time"] for case in costs["cases"] if case["group"] == group]
             if ratios:
                 within = sum(0.5 <= ratio <= 2 for ratio in ratios)
@@ -402,7 +402,7 @@ def _campaigns(results) -> list[str]:
                     f"- {len(ratios)} cases {what}: expected over measured time {min(ratios):.2f} to "
                     f"{max(ratios):.2f}, {within} within a factor of two"
                 )
-        parts += ["What `icha describe` expects (`benchmarks/costs.py`):", "\n".join(lines) + "."]
+        parts += ["How good the estimates of `icha describe` are (`benchmarks/costs.py`):", "\n".join(lines) + "."]
     return parts
 
 
@@ -422,57 +422,57 @@ def _starts(results) -> list[str]:
 
 
 STARTS_TEXT = """\
-What the command line takes before anything is computed, the quickest of three calls: all processes of a call
-together. Modules are compiled, as they are from the second call on, and what Snakemake's fingerprints need of them was
-read once. `make` itself adds some hundredths of a second to `icha run`."""
+The table shows what the command line takes before anything is computed: the quickest of three calls, all processes of a
+call together. As in every call but the first, modules are compiled already, and what Snakemake's fingerprints need to
+know of them has been read once. `make` itself adds some hundredths of a second to `icha run`."""
 
 CAMPAIGNS_TEXT = """\
-Campaigns of small runs: 7 loads, five surface energies on 200 random surfaces of 128² or 256² nodes. *The contact
-solver's* part is the time that 100 of the runs take again in two processes side by side (`icha.simulate`), for all
-runs, over the time of both cores from the call of Snakemake to its end: surfaces, runs, dataset, comparison, checks,
-figure and report. The plan is that of 10 000 such runs. The campaign dataset is written, and checked, of files of runs
-of 15 loads."""
+These are campaigns of small runs: 7 loads and five surface energies on 200 random surfaces of 128² or 256² nodes. For
+the share of the contact solver, 100 of the runs are computed again in two processes side by side (`icha.simulate`).
+Their time, scaled to all runs, is divided by the time of both cores from the call of Snakemake to its end, which
+includes surfaces, runs, dataset, comparison, checks, figure and report. The plan is that of 10 000 such runs. The
+campaign dataset is written from, and checked with, files of runs of 15 loads."""
 
 SWEEP_TEXT = """\
-Every code is given the same heights and the same 20 stops and is measured as a whole process, imports and reading
-included, on one thread unless the table says otherwise. *Computation* is the time from when everything is imported
-to the last stop. *Time / ICHA's* is the ratio of processor times of whole processes, which on one thread is the wall
-time of a quiet machine, and that of the computations alone (wall time); *memory* is the largest resident memory. ICHA
-and `aspher` had the machine to themselves; where the wall time of another code is longer than its processor time, it
-had not, and the ratio of the computations flatters ICHA by as much. ICHA is asked for bare numbers, as the others are
-(`icha.path.follow`); the labelled dataset of `icha.simulate` costs another 1.5 s, nearly all of it the import of
-xarray. At 256² and 512² ICHA's time is mostly that of its imports. The loads are 20 reduced pressures
+Every code is given the same heights and the same 20 stops. It is measured as a whole process, with imports and reading,
+on one thread unless the table says otherwise. *Computation* is the wall time from the end of the imports to the last
+stop. *Time / ICHA's* is the ratio of the processor times of whole processes; on one thread and a quiet machine this is
+the same as the ratio of wall times. *Computation / ICHA's* is the ratio of the computations alone. *Memory* is the
+largest resident memory. ICHA and `aspher` had the machine to themselves. Another code had not, where its wall time is
+longer than its processor time; there the ratio of the computations flatters ICHA by as much. Like the other codes, ICHA
+is asked for bare numbers (`icha.path.follow`). The labelled dataset of `icha.simulate` costs another 1.5 s, nearly all
+of it for the import of xarray. At 256² and 512² most of ICHA's time goes into its imports. The loads are 20 reduced
+pressures
 p\\* = p/(E\\* h'_rms) from 5e-4 to 8e-2 in geometric progression. The surfaces have
-the challenge's spectrum (period 100 µm, roll-off 20 µm, Hurst exponent 0.8, rms slope 1) down to waves of eight grid
-cells, so that every grid carries all the waves that it can hold at the resolution recommended for ICHA.
+the spectrum of the challenge (period 100 µm, roll-off 20 µm, Hurst exponent 0.8, rms slope 1) down to waves of eight
+grid cells, so that every grid has all the waves that it can resolve as recommended for ICHA.
 
-Speed is worth something only beside the error: the last two columns say how far ICHA's area lies from the other
-code's at the same stop, and its mean gap (in h_rms) or, where the gap is given, its load; the median over the stops
-and the range. The areas of the boundary-element codes are corrected by the perimeter of the contact (Yastrebov,
-Anciaux & Molinari, Tribol. Int. 114 (2017) 161-171).
+Speed must be seen together with the error. The last two columns say how far the area of ICHA is from that of the other
+code at the same stop, and the same for the mean gap (in h_rms) or, where the gap is given, for the load: the median
+over the stops and the range. The areas of the boundary-element codes are corrected by the perimeter of the contact
+(Yastrebov, Anciaux & Molinari, Tribol. Int. 114 (2017) 161-171).
 
-With adhesion, a boundary-element code has to resolve the range ρ of the attraction (exponential, energy 50 mJ/m²,
+With adhesion, a boundary-element code must resolve the range ρ of the attraction (exponential, energy 50 mJ/m²,
 E\\* = 25 MPa): on a grid of spacing Δ, Δ ≤ 8 ρ² E\\*/(3π γ) and √(γ Δ/E\\*)/ρ < 0.5. These grids resolve only ranges
 much longer than the challenge's 2.07 nm, and all codes are given the same one. The Tabor parameter is then far below
-2, where ICHA's law of jump-in was not verified, which is part of the differences in area. `adhesion` is given the
-loads; `tamaas`, which at a given load does not find the adhesive equilibria reliably, the mean gaps of ICHA's states
-at those loads, and ICHA is measured with both. `icha-boundary-elements`, ICHA's other model, is the limit of a short
-range ([short range](short_range.md)): it has no range to resolve, so that with adhesion its area, like that of ICHA's
-asperities, is not what the codes with a range this long have."""
+2, where ICHA's law of jump-in was not verified; this causes part of the differences in area. `adhesion` is given the
+loads. `tamaas` does not find adhesive equilibria reliably at a given load, and is therefore given the mean gaps of
+ICHA's states at those loads; ICHA is measured with both. `icha-boundary-elements`, ICHA's other model, is the limit of
+a short range ([short range](short_range.md)). It has no range to resolve, so that with adhesion its area, like that of
+ICHA's asperities, differs from that of the codes with so long a range."""
 
 SCALING_TEXT = """\
-The solver alone, from asperities to the last of the same 20 loads, on one thread, with the challenge's material. The
-surfaces are k × k patches of asperities side by side: a patch is a realisation of the spectrum above cut at 1/64 of
-its period (512², period 100 µm), shifted at random, 16 realisations serving in turn, so that the surfaces differ in
-size only. Heights do not join at the seams, of which a solver that is given asperities knows nothing. *Memory* is
-what the sweep adds to the process that has read the asperities."""
+The solver alone is measured, from the asperities to the last of the same 20 loads, on one thread, with the material of
+the challenge. The surfaces are k × k patches of asperities side by side. A patch is a realisation of the spectrum
+above, cut off at 1/64 of its period (512², period 100 µm), and shifted at random; 16 realisations are used in turn. So
+the surfaces differ only in size. Heights do not join at the seams, but a solver that is given asperities does not see
+this. *Memory* is what the sweep adds to the process after the asperities have been read."""
 
 STAGES_TEXT = """\
 One process, two threads unless said otherwise: the surface, its summits, the path, the fields of a snapshot at p\\*
-= 0.01 (challenge only), and the rest, which is the dataset, tangents for the stiffness and the file. At 512² the
-path has the 20 loads above; on the full challenge surface (8192², all waves from 100 µm to 0.1 µm, challenge's
-material) 20 contact areas from 0.1 % to 10 % of the nominal one. Memory is the largest resident memory during the
-stage."""
+= 0.01 (challenge only), and the rest: the dataset, the tangents for the stiffness, and the file. At 512² the path has
+the 20 loads above. On the full challenge surface (8192², all waves from 100 µm to 0.1 µm, the challenge's material) it
+has 20 contact areas from 0.1 % to 10 % of the nominal one. Memory is the largest resident memory during the stage."""
 
 
 def _surfaces(results) -> str:

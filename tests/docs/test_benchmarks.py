@@ -168,8 +168,8 @@ def test_what_people_wait_for_is_held_against_processor_times(page):
         "start-simulate": {"first": 1.2, "again": 0.2, "overhead": 1.0},
     }
     rows = {verdict.target: verdict.row()[1:] for verdict in page.verdicts(results)}
-    assert rows["`icha --help`: at most 0.3 s of processor"] == ["0.10 s", "reached"]
-    assert rows["`icha show` of a run: at most 1 s of processor"] == ["1.50 s", "**not reached**"]
+    assert rows["`icha --help`: at most 0.3 s of processor time"] == ["0.10 s", "reached"]
+    assert rows["`icha show` of a run: at most 1 s of processor time"] == ["1.50 s", "**not reached**"]
     (first,) = [row for target, row in rows.items() if "first `icha.simulate`" in target]
     assert first == ["1.00 s", "reached"]
 
