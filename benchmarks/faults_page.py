@@ -13,58 +13,59 @@ HEAD = """# What becomes of a campaign that is disturbed
 
 <!-- Written by benchmarks/faults_page.py from benchmarks/results/faults.json. -->
 
-Programs are killed, disks fill up and files get damaged. What must not come of it is a wrong number that nobody
-notices. So a campaign of {results} files with every kind of result, its deposit among them, was disturbed
-{trials} times. These have to hold:
+Programs are killed, disks fill up and files get damaged. This must not lead to wrong numbers that nobody notices. To
+test this, a campaign of {results} files with every kind of result, including its deposit, was disturbed
+{trials} times. After each disturbance these statements must hold:
 
-- no result is there that is not, byte for byte, that of an undisturbed campaign: nothing half-written passes for whole;
+- every result that is there is, byte for byte, that of an undisturbed campaign: no half-written file passes for whole;
 - after kills and on full disks, no process of the disturbed call is left running after {moment:.0f} s;
 - after kills, what was complete is not computed again;
 - the same command, given again with nothing else done, goes on to the end, and all results have the bytes of the
-  undisturbed campaign; or, where it cannot, it says what is to be done.
+  undisturbed campaign; or, where this is impossible, it says what you have to do.
 
 {verdict}
 
 {table}
 
-*Went on*: it ended, or was ended by the next call, with identical bytes. *Said what to do*: it was refused or failed
-with a message that names the reason; once that was gone, the same command ended with identical bytes. *Wrong*: any
-other end.
+*Went on*: the call, or the next one, finished with identical bytes. *Said what to do*: the call was refused or failed
+with a message that names the reason; once the reason was removed, the same command finished with identical bytes.
+*Wrong*: anything else.
 """
 
 PARTS = {
     "kill": """## Kills
 
-`kill -9`, which no program can heed, at random moments: of Snakemake alone, of Snakemake with all of its session, of a
-job, and of the process from which jobs are forked. Calls that go on after a kill are killed in their turn, up to three
-times in a row. A job ends with the Snakemake that wants it, so the next call never meets jobs of the last one.""",
+`kill -9`, to which no program can react, at random moments: of Snakemake alone, of Snakemake with its whole session, of
+a job, and of the process from which jobs are forked. Calls that go on after a kill are killed again, up to three times
+in a row. A job ends when its Snakemake ends, so the next call never meets jobs of the last one.""",
     "full disk": """## Full disks
 
-Results, or the whole working folder, on a disk that is full from the start, too small for what is computed, or filled
-by something else while the campaign runs.""",
+The results, or the whole working folder, are on a disk that is full from the start, too small for what is computed, or
+filled by something else while the campaign runs.""",
     "read-only": """## Where nothing can be written
 
-Results, or the whole working folder, on a disk that is mounted read-only, and results without permission to write. A
-finished campaign is found finished; what is missing or damaged there is a message, and nothing is computed. Where
-Snakemake's own records are read-only, there is a message in any case, for it cannot start without writing there.""",
+The results, or the whole working folder, are on a disk that is mounted read-only, or the results may not be written to.
+A finished campaign is recognised as finished. If something is missing or damaged, there is a message and nothing is
+computed. Where Snakemake's own records are read-only, there is always a message, since Snakemake cannot start without
+writing there.""",
     "damage": """## Damaged files
 
 A file of a finished campaign is emptied, cut in half, loses its last byte, or has one bit flipped at its start, in its
-middle or at its end; each kind by itself in some of these ways, and all at once. Whatever was damaged is set aside
-under another name. *By the disk* means that size and time of the file do not betray it: the job that reads it finds
-out.""",
+middle or at its end. This is done to each kind of file alone, in some of these ways, and to all kinds at once. A
+damaged file is set aside under another name. *By the disk* means that the size and the time of the file do not show the
+damage; the job that reads the file finds it.""",
     "two at once": """## Two calls at once
 
-Of one campaign in one folder, the second call after a random pause, and of two campaigns in one folder.""",
+Two calls of one campaign in one folder, the second after a random pause; and calls of two campaigns in one folder.""",
 }
 
 TAIL = """## How
 
-`make faults` makes all trials, from the committed state of the program, and writes this page; it takes most of an hour
+`make faults` makes all trials, from the committed state of the program, and writes this page. It takes most of an hour
 on two cores and needs Linux and the right to mount disks (root, or user namespaces). The parts can be run one by one,
-as they were here: `make faults OPTIONS='--parts kill'`. Moments and bits are drawn at random with seed {seed}. Power
-cuts are not among the trials: files are not forced to the disk one by one, and whether what a power cut leaves of them
-is always found by its checksum was not tried.
+as was done here: `make faults OPTIONS='--parts kill'`. Moments and bits are drawn at random with seed {seed}. Power
+cuts are not among the trials. Files are not forced to the disk one by one, and it was not tried whether the checksums
+find everything that a power cut damages.
 """
 
 
@@ -74,7 +75,7 @@ def page(kept: dict) -> str:
     trials = sum(row["trials"] for row in rows)
     wrong = sum(_wrong(row) for row in rows)
     verdict = (
-        f"All {trials} trials ended so." if not wrong else f"**{wrong} of {trials} trials did not end so:** see below."
+        f"They held in all {trials} trials." if not wrong else f"**They failed in {wrong} of {trials} trials:** see below."
     )
     text = HEAD.format(
         results=kept["results"], trials=trials, moment=kept["moment"], verdict=verdict, table=_totals(rows)
