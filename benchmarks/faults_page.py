@@ -74,9 +74,8 @@ def page(kept: dict) -> str:
     rows = kept["rows"]
     trials = sum(row["trials"] for row in rows)
     wrong = sum(_wrong(row) for row in rows)
-    verdict = (
-        f"They held in all {trials} trials." if not wrong else f"**They failed in {wrong} of {trials} trials:** see below."
-    )
+    failed = f"**They failed in {wrong} of {trials} trials:** see below."
+    verdict = failed if wrong else f"They held in all {trials} trials."
     text = HEAD.format(
         results=kept["results"], trials=trials, moment=kept["moment"], verdict=verdict, table=_totals(rows)
     )
