@@ -42,7 +42,7 @@ def icha(
 
     Start with `icha new NAME`, look with `icha describe NAME`, compute with `icha run NAME`.
 
-    Exit status: 0 if all went well, 1 if something failed, 2 if what was asked for is wrong.
+    Exit status: 0 if all went well, 1 if something failed, 2 if the call or the configuration is wrong.
     """
 
 

@@ -12,10 +12,10 @@ from icha.support.in_words import counted
 def check(
     files: Annotated[list[Path], typer.Argument(help="Runs, surfaces or campaign datasets (.nc).")],
 ) -> None:
-    """Check files: names, dimensions, units and attributes that are documented, and what every result must satisfy.
+    """Check files: documented names, dimensions, units and attributes, and the physics that every result must satisfy.
 
-    Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is none of those. All files are
-    checked in any case.
+    Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is no run, surface or campaign
+    dataset. All files are checked in any case.
     """
     from icha.datasets.format import CAMPAIGN, RUN, UnknownFile, flaws, kind_of
 

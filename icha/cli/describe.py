@@ -14,14 +14,15 @@ from icha.support.in_words import counted
 
 def describe(
     config: Config = None,
-    runs: Annotated[bool, typer.Option("--runs", help="List every file, not only sums.")] = False,
+    runs: Annotated[bool, typer.Option("--runs", help="List every file, not only the sums.")] = False,
     cores: Cores = None,
     folder: Folder = None,
 ) -> None:
     """Show what a campaign computes: its runs, what is there already, and expected time, memory and disk of the rest.
 
-    Nothing is computed. Times are estimates, good to a factor of two or so; once some runs are done, theirs are used.
-    A run counts as done if its file was made with the present settings; `icha run -n` also knows of changed programs.
+    Nothing is computed. Times are estimates, good to about a factor of two; once some runs are done, their times are
+    used. A run counts as done if its file was made with the present settings; `icha run -n` also sees changes of the
+    program.
     """
     from rich.console import Console
 
@@ -89,7 +90,7 @@ def _summary(console, items, damaged, cores) -> None:
             in_words.size(sums.disk),
         )
     if around:
-        table.add_row("start and handing out", "", "", "", "", "", in_words.duration(around))
+        table.add_row("starting and scheduling", "", "", "", "", "", in_words.duration(around))
     console.print(table)
     runs = [item for item in items if item.is_run]
     changed = sum(item.state == "changed" for item in runs)

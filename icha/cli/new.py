@@ -23,24 +23,24 @@ def new(
     name: Annotated[str, typer.Argument(help="Name of the campaign: lower-case letters, digits, `_`, `-`.")],
     measured: Annotated[
         Path | None,
-        typer.Option(help="File of a measured topography; what it says of itself is filled in.", show_default=False),
+        typer.Option(help="File of a measured topography; what the file says is filled in.", show_default=False),
     ] = None,
     data: Annotated[
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Which variable, dataset or channel of the measured file, if it has several.",
+            help="Variable, dataset or channel of the measured file, if it has several.",
             show_default=False,
         ),
     ] = None,
-    pull_off: Annotated[bool, typer.Option("--pull-off", help="With a study of pull-off and hysteresis.")] = False,
+    pull_off: Annotated[bool, typer.Option("--pull-off", help="Add a study of pull-off and hysteresis.")] = False,
     boundary_elements: Annotated[
-        bool, typer.Option("--boundary-elements", help="With boundary elements beside the runs.")
+        bool, typer.Option("--boundary-elements", help="Add runs by boundary elements.")
     ] = False,
 ) -> None:
     """Write a commented campaign, config/campaigns/NAME.yaml, and say how to go on.
 
-    It runs as it is; with a measured file, once what that does not say of itself is filled in, which is listed.
+    It runs as it is. With a measured file, first fill in what the file does not say; the command lists these keys.
     """
     from icha.support.values import NAME_PATTERN
 
@@ -51,9 +51,12 @@ def new(
     if file.exists():
         raise Mistake(f"{shown(file)} is there already; choose another name, or remove it")
     if measured is not None and boundary_elements:
-        raise Mistake("--boundary-elements with --measured: they are periodic, and the template's surface is free")
+        raise Mistake(
+            "--boundary-elements and --measured cannot be combined: boundary elements need a periodic surface, and "
+            "the measured surface of the template is free"
+        )
     if data is not None and measured is None:
-        raise Mistake("--data: is of a measured file; allowed: with --measured")
+        raise Mistake("--data: names data in a measured file; allowed: only with --measured")
     surface, section, to_fill_in = ("rough", _part("self_affine"), [])
     if measured is not None:
         surface, section, to_fill_in = _measured(measured, data, file.parent)
@@ -62,7 +65,7 @@ def new(
         "campaign",
         name=name,
         title=name.replace("_", " ").replace("-", " ").capitalize(),
-        runs="It runs once the keys marked `to fill in` have their values." if to_fill_in else "It runs as it is.",
+        runs="It runs once the keys marked `to fill in` have values." if to_fill_in else "It runs as it is.",
         schema=_relative(folder / "workflow/schemas/config.schema.json", file.parent),
         readme=_relative(folder / "config/README.md", folder),
         surface=surface,
@@ -89,7 +92,7 @@ def new(
     typer.echo(f"{shown(file)} written")
     for line in to_fill_in:
         typer.secho(f"to fill in: {line}", fg="yellow")
-    typer.echo(f"next:  icha describe {name}    what it asks for\n       icha run {name}         compute it")
+    typer.echo(f"next:  icha describe {name}    what it will compute\n       icha run {name}         compute it")
 
 
 def _part(template: str, **values: str) -> str:
@@ -137,7 +140,7 @@ def _measured(path: Path, data: str | None, start: Path) -> tuple[str, str, list
     examples = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
     for key in missing:
         empty = " (empty: that of the heights)" if key == "lateral_unit" else ""
-        lines.append(f"{key}:        # to fill in, for the file does not say it{empty}: such as {examples[key]}")
+        lines.append(f"{key}:        # to fill in, since the file does not say it{empty}: such as {examples[key]}")
     if gaps := int(np.count_nonzero(~np.isfinite(scan.heights))):
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
     found = "".join(f"    {line}\n" for line in lines)

@@ -31,6 +31,6 @@ Cores = Annotated[
 Folder = Annotated[
     Path | None,
     typer.Option(
-        "--directory", "-d", help="Folder in which results/ stands. Left out: the project's.", show_default=False
+        "--directory", "-d", help="Folder that holds results/. Left out: that of the project.", show_default=False
     ),
 ]

@@ -27,23 +27,23 @@ def reproduce(
         list[str] | None,
         typer.Option(
             metavar="RUN",
-            help="Only this run, and the surface that it needs; may be given several times. "
-            "study/surface/seed1/slope1/material, or `smallest`: that of the complete ones with the least data.",
+            help="Only this run and the surface that it needs; can be given several times. Either "
+            "study/surface/seed1/slope1/material or `smallest`, the complete run with the least data.",
             show_default=False,
         ),
     ] = None,
     folder: Annotated[
         Path | None,
         typer.Option(
-            help="Where it is computed; the same folder again goes on. Left out: a temporary one, removed if all is "
-            "reproduced.",
+            help="Folder to compute in; the same folder again continues. Left out: a temporary one, which is removed "
+            "if everything is reproduced.",
             show_default=False,
         ),
     ] = None,
     cores: Cores = None,
     environment: Annotated[
         Literal["lock", "here"],
-        typer.Option(help="Install what the deposit's lock file says, or take what is installed here, if it agrees."),
+        typer.Option(help="lock: install what the deposit's lock file says; here: use what is there, if it agrees."),
     ] = "lock",
     json: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the comparison to this file.", show_default=False)
@@ -54,9 +54,9 @@ def reproduce(
 
     The deposit is verified and only read. Its source is copied, its environment is installed from the lock file (that
     needs network, make and Python), its configuration is run, and everything that was computed is compared, variable by
-    variable: identical, within tolerance, or different. With `--only smallest`, that takes minutes.
+    variable: identical, within tolerance, or different. With `--only smallest` this takes minutes.
 
-    Exit status: 0 if all is identical or within tolerance, 1 if not, 2 if the deposit is damaged or there is none.
+    Exit status: 0 if all is identical or within tolerance, 1 if not, 2 if the deposit is damaged or not there.
     """
     from icha.publication.deposit_files import contents, verify_deposit
     from icha.publication.rerun import Refused, asked_runs, begin, campaign_of
@@ -163,13 +163,13 @@ def _program(project: Path, folder: Path, environment: str) -> tuple[list[str], 
                 stderr=subprocess.STDOUT,
             )
         except FileNotFoundError:
-            _fail("there is no `make`, which installs the environment; needed: it, or --environment here")
+            _fail("`make`, which installs the environment, was not found; needed: make, or --environment here")
     if status:
         lines = [line for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
         last = "\n".join(f"    {line}" for line in lines[-_LAST_LINES:])
         _fail(
-            f"the environment could not be installed; without network, --environment here takes the one that is "
-            f"installed, if it agrees with the lock file:\n{last}\n    log: {shown(log)}"
+            f"the environment could not be installed; without network, --environment here uses what is installed, if "
+            f"it agrees with the lock file:\n{last}\n    log: {shown(log)}"
         )
     return [str(project / ".venv/bin/icha")], surroundings()
 
@@ -179,7 +179,7 @@ def _run(program, project: Path, targets: list[str], cores: str | None) -> int:
     from icha.datasets.results import CONFIGURATION
 
     command, variables = program
-    typer.echo(f"computing in {shown(project)}, which paths are relative to")
+    typer.echo(f"computing in {shown(project)}; paths are relative to it")
     asked = ["run", CONFIGURATION, *targets, *(["--cores", cores] if cores else [])]
     sys.stdout.flush()
     return _call([*command, *asked], cwd=project, env=variables, stdin=subprocess.DEVNULL)

@@ -41,7 +41,7 @@ def run(
         list[str] | None,
         typer.Argument(
             metavar="[TARGET]...",
-            help=f"What is made: {', '.join(TARGETS)}, or a file. Left out: all. After `--`, options of Snakemake.",
+            help=f"What to make: {', '.join(TARGETS)}, or a file. Left out: all. After `--`: options of Snakemake.",
             show_default=False,
         ),
     ] = None,
@@ -53,22 +53,22 @@ def run(
         ),
     ] = None,
     folder: Folder = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="Only say which jobs would run.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="Only show which jobs would run.")] = False,
     plain: Annotated[
         bool, typer.Option("--plain", help="Print a line for every job instead of the live view.")
     ] = False,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Run it even if memory or disk are not expected to suffice.")
+        bool, typer.Option("--anyway", help="Run even if more memory or disk is expected to be needed than there is.")
     ] = False,
 ) -> None:
     """Run a campaign; what is there and up to date is not computed again.
 
-    Ends with what failed, and where figures, dataset and report are. Exit status: 0 if everything was made, 1 if
-    something failed (the rest is made all the same), 2 if the campaign cannot be run.
+    At the end it lists what failed, and where figures, dataset and report are. Exit status: 0 if everything was made,
+    1 if something failed (the rest is made all the same), 2 if the campaign cannot be run.
 
-    What needs more memory or disk than is there is not begun without asking, or, where nobody can be asked, not at all.
+    If more memory or disk is needed than there is, it asks before it begins; without a terminal it does not begin.
 
-    Ctrl-C stops it; the next call goes on where it was.
+    Ctrl-C stops it; the next call continues from there.
     """
     home = project()
     asked = list(targets or [])
@@ -306,7 +306,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
             reason = [line for line in reason_of(job, folder) if not any(line.startswith(path) for path in incomplete)]
             _reason(
                 job.title,
-                reason or [f"it ended without a word, killed perhaps (for want of memory?); see {logs or log}"],
+                reason or [f"it ended without a message, perhaps killed (out of memory?); see {logs or log}"],
             )
             if logs:
                 typer.echo(f"    log: {logs}")
@@ -320,7 +320,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
         _heading("Snakemake could not go on:" if ended else "Snakemake could not start:")
         _reason(None, _last_words(log.read_text(encoding="utf-8", errors="replace")))
     elif status and kept_back:
-        typer.echo(f"{counted(kept_back, 'job')} not done, for want of what failed")
+        typer.echo(f"{counted(kept_back, 'job')} not done, since they need what failed")
     # Where nothing was made, what is there is of another day.
     made = (
         ("figures", results / "figures"),

@@ -15,13 +15,13 @@ _CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_s
 def show(
     file: Annotated[Path, typer.Argument(help="A run, surface or campaign dataset (.nc).")],
     plot: Annotated[
-        Path | None, typer.Option(help="Draw it into this file (.png, .pdf or .svg).", show_default=False)
+        Path | None, typer.Option(help="Draw a plot into this file (.png, .pdf or .svg).", show_default=False)
     ] = None,
     study: Annotated[
         str | None, typer.Option(help="Study of a campaign dataset. Left out: all of them.", show_default=False)
     ] = None,
 ) -> None:
-    """Show what is in a file: a run, a surface or a campaign dataset; --plot draws it."""
+    """Show what is in a file: a run, a surface or a campaign dataset. --plot draws it."""
     if plot is not None and plot.suffix not in (".png", ".pdf", ".svg"):
         raise Mistake(f"--plot {plot}: ends in {plot.suffix!r}; allowed: .png, .pdf, .svg")
     from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, kind_of

@@ -47,19 +47,19 @@ def simulate(
     surface: Annotated[
         Path | None,
         _unset(
-            "Topography: a surface file of a campaign, or heights in m as .npy with --period. Left out: one is made."
+            "Topography: a surface file of a campaign, or heights in m as .npy with --period. Left out: a random one."
         ),
     ] = None,
     period: Annotated[str, typer.Option(help="Side of the periodic cell.", callback=_length)] = "100 um",
     rolloff: Annotated[
         str | None,
-        _unset("Roll-off wavelength. Left out: a fifth of the period, at least twice the short one.", _length),
+        _unset("Roll-off wavelength. Left out: a fifth of the period, but at least twice the short cut-off.", _length),
     ] = None,
     short: Annotated[str | None, _unset("Short cut-off wavelength. Left out: 8 grid cells.", _length)] = None,
     hurst: Annotated[float, typer.Option(help="Hurst exponent.")] = 0.8,
     grid: Annotated[int, typer.Option(help="Grid points along a side.")] = 128,
     seed: Annotated[int, typer.Option(help="Seed of the random phases.")] = 1,
-    rms_slope: Annotated[float | None, _unset("Rms slope to scale to. Left out: 1, or the file's own.")] = None,
+    rms_slope: Annotated[float | None, _unset("Rms slope to scale to. Left out: 1, or that of the file.")] = None,
     modulus: Annotated[str, typer.Option(help="Contact modulus E*.", callback=_modulus)] = "25 MPa",
     energy: Annotated[str, typer.Option(help="Surface energy.", callback=_energy)] = "50 mJ/m^2",
     interaction_range: Annotated[
@@ -68,12 +68,10 @@ def simulate(
     pressures: Annotated[
         str | None, _unset("Stops p/(E* h'rms), increasing. Left out: 1e-3,3e-3,1e-2,3e-2.", _numbers)
     ] = None,
-    areas: Annotated[str | None, _unset("Stops instead: contact area fractions A/A0, increasing.", _numbers)] = None,
-    model: Annotated[
-        str, typer.Option(help=f"Model of contact: {' or '.join(MODELS)}, which are slower.")
-    ] = ASPERITIES,
+    areas: Annotated[str | None, _unset("Stops at contact area fractions A/A0 instead, increasing.", _numbers)] = None,
+    model: Annotated[str, typer.Option(help=f"Contact model: {' or '.join(MODELS)}, which are slower.")] = ASPERITIES,
     unload: Annotated[bool, typer.Option("--unload", help="Pull the surfaces apart again.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace the file if it is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
 ) -> None:
     """Press one surface against one material and write the run, without a campaign.
 

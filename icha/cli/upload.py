@@ -25,44 +25,44 @@ def upload(
         Path, typer.Argument(help="A deposit's .zip, or its folder with the .zip beside it.", show_default=False)
     ],
     sandbox: Annotated[
-        bool, typer.Option("--sandbox", help="To sandbox.zenodo.org, for trying; it has tokens of its own.")
+        bool, typer.Option("--sandbox", help="Upload to sandbox.zenodo.org, for trials; it needs a token of its own.")
     ] = False,
     url: Annotated[
         str | None,
-        typer.Option(help="To another server that speaks Zenodo's deposit API: https://….", show_default=False),
+        typer.Option(help="Upload to another server with Zenodo's deposit API: https://….", show_default=False),
     ] = None,
     new_version_of: Annotated[
         str | None,
-        typer.Option(metavar="ID", help="As a new version of this published record of yours.", show_default=False),
+        typer.Option(metavar="ID", help="Upload as a new version of this record of yours.", show_default=False),
     ] = None,
     draft: Annotated[
         str | None,
         typer.Option(
             metavar="ID",
-            help="Into this draft, such as one that an upload left behind; what is there already is not sent again.",
+            help="Upload into this draft, such as one that a failed upload left; files in it are not sent again.",
             show_default=False,
         ),
     ] = None,
     publish: Annotated[
-        bool, typer.Option("--publish", help="Publish it, too. That cannot be taken back, so it is asked for again.")
+        bool, typer.Option("--publish", help="Also publish it. This cannot be undone, so you are asked again.")
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
 ) -> None:
-    """Send a deposit to Zenodo as a draft; say before what is sent where, and ask.
+    """Send a deposit to Zenodo as a draft, after showing what is sent where, and asking.
 
-    The deposit is verified first. Sent are the zip and, beside it, its README.md and ro-crate-metadata.json; title,
-    authors, licence and so on are those of the deposit. Without --publish it stays a draft, which you look at, change
-    and publish on its page. Needs a token with the scopes deposit:write and deposit:actions in the environment
-    variable ZENODO_TOKEN. Nothing is sent before you agree.
+    The deposit is verified first. The zip is sent and, beside it, its README.md and ro-crate-metadata.json. Title,
+    authors, licence and so on are those of the deposit. Without --publish it stays a draft, which you can look at,
+    change and publish on its page. The environment variable ZENODO_TOKEN must hold a token with the scopes
+    deposit:write and deposit:actions. Nothing is sent before you agree.
 
     Exit status: 0 if everything was sent, 1 if not, 2 if it cannot be sent.
     """
     from icha.publication.zenodo import SANDBOX, ZENODO, server_address
 
     if sandbox and url:
-        raise Mistake("--sandbox and --url are two servers; allowed: one of them")
+        raise Mistake("--sandbox and --url name two servers; allowed: only one of them")
     if draft and new_version_of:
-        raise Mistake("--draft and --new-version-of are two places; allowed: one of them")
+        raise Mistake("--draft and --new-version-of name two places; allowed: only one of them")
     try:
         address = server_address(url or (SANDBOX if sandbox else ZENODO))
     except ValueError as error:
@@ -85,7 +85,7 @@ def _number(option: str, text: str | None) -> str | None:
         return None
     found = re.fullmatch(r"(?:\S*[./])?(\d+)/?", text)
     if not found:
-        raise Mistake(f"{option} {text!r}: is no number of a record; allowed: a number such as 1234567")
+        raise Mistake(f"{option} {text!r}: is not the number of a record; allowed: a number such as 1234567")
     return found[1]
 
 
@@ -97,7 +97,7 @@ def _token(address: str) -> str:
             f"{address}/account/settings/applications/tokens/new/, in that environment variable"
         )
     if not re.fullmatch(r"[!-~]+", token):
-        raise Mistake(f"{TOKEN} is no token: it has characters in it that none has")
+        raise Mistake(f"{TOKEN} is not a token: it contains characters that no token has")
     return token
 
 
@@ -114,7 +114,7 @@ def _archive(deposit: Path) -> Path:
         raise Mistake(f"{deposit}: no such file or folder")
     wrong = verify_deposit(archive)
     if not wrong and deposit.is_dir() and read_file(archive, CHECKSUMS) != read_file(deposit, CHECKSUMS):
-        wrong = ["its zip has other checksums than the folder has"]
+        wrong = ["its zip and its folder have different checksums"]
     if wrong:
         raise Mistake(f"{deposit}: the deposit is damaged, and nothing is sent:\n" + "\n".join(wrong))
     return archive
@@ -163,7 +163,7 @@ def _ask(yes: bool) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
-        raise Mistake("there is nobody to ask, and nothing is sent; needed: --yes, or a terminal")
+        raise Mistake("there is no terminal to ask at, so nothing is sent; needed: --yes, or a terminal")
     if not _confirmed("Send it?"):
         typer.echo("Nothing was sent.")
         raise typer.Exit(FAILED)
@@ -196,10 +196,10 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
                 typer.echo(f"{path.name}: is there already")
                 continue
             confirmed = server.upload(draft, path, sums[path.name])
-            checked = "its checksum is right" if confirmed else "the server tells no checksum"
+            checked = "its checksum is right" if confirmed else "the server gives no checksum"
             typer.echo(f"{path.name}: sent, {checked}")
         if others:
-            typer.echo(f"The draft has other files, too, which are left there: {', '.join(others)}")
+            typer.echo(f"The draft also has other files, which stay there: {', '.join(others)}")
         if draft.doi:
             typer.echo(f"DOI:       {draft.doi} (reserved)")
         if publish and (yes or _confirmed("Publish it? What is published cannot be deleted.")):
@@ -213,7 +213,7 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
         if draft is not None:
             server_option = "" if address == ZENODO else f" --url {address}"
             typer.echo(
-                f"A draft is left behind: {draft.page}\nThis goes on with it:   icha upload {shown(archive)}"
+                f"A draft is left: {draft.page}\nTo continue with it:   icha upload {shown(archive)}"
                 f"{server_option} --draft {draft.number}",
                 err=True,
             )

@@ -12,7 +12,7 @@ from icha.support import in_words
 def verify(
     deposit: Annotated[Path, typer.Argument(help="Folder of a deposit, or its zip.", show_default=False)],
 ) -> None:
-    """Verify a deposit: every file is there, has its checksum, and there are no others.
+    """Verify a deposit: all its files must be there with the right checksums, and no others.
 
     Exit status: 0 if it is whole, 1 if not (each flaw is printed), 2 if there is no such file or folder.
     """

@@ -67,7 +67,7 @@ def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
     assert "1 job failed:\n  Sweep load: rough, seed 1, slope 1, bare" in done.stdout
     assert "RuntimeError('a bug in the program')" in done.stdout
     assert "log: results/tiny/logs/runs/load/rough/seed1/slope1/bare.log" in done.stdout
-    assert "not done, for want of what failed" in done.stdout and "Traceback" not in done.stdout
+    assert "not done, since they need what failed" in done.stdout and "Traceback" not in done.stdout
     assert (project / "results/tiny/runs/load/rough/seed1/slope1/sticky.nc").is_file()
     assert not (project / "results/tiny/dataset/tiny.nc").exists()
     # All that Snakemake said is kept, and it is told where.

@@ -217,7 +217,7 @@ def test_it_stays_a_draft_that_another_call_publishes_without_sending_it_twice(s
     server.files["photo.jpg"] = b"of the author's"
     status, said = upload(deposit, "--url", server.address, "--draft", "10.5072/zenodo.77", "--publish", "--yes")
     assert status == 0 and server.published and f"{deposit.name}: is there already" in said
-    assert "other files, too, which are left there: photo.jpg" in said
+    assert "The draft also has other files, which stay there: photo.jpg" in said
     sent = [path for method, path, _ in server.requests if method == "PUT" and "/files/" in path]
     assert sent == ["/api/files/b-77/README.md"] and server.files["README.md"] == FILES["README.md"]
     assert set(server.files) == SENT | {"photo.jpg"}
@@ -265,11 +265,11 @@ def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit
 
     url = ("--url", server.address)
     assert "ZENODO_TOKEN is not set" in refused(deposit, *url, token="")
-    assert "is no token" in refused(deposit, *url, token="two words")
+    assert "is not a token" in refused(deposit, *url, token="two words")
     assert "no such file" in refused(tmp_path / "none.zip", *url)
     assert "one of them" in refused(deposit, "--sandbox", *url)
     assert "one of them" in refused(deposit, "--draft", "1", "--new-version-of", "2", *url)
-    assert "is no number of a record" in refused(deposit, "--draft", "mine", *url)
+    assert "is not the number of a record" in refused(deposit, "--draft", "mine", *url)
     assert "over http" in refused(deposit, "--url", "http://zenodo.org")
     (tmp_path / "reserved").mkdir()
     reserved = make_deposit(tmp_path / "reserved", doi="10.5281/zenodo.5")
