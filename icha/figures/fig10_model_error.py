@@ -14,17 +14,17 @@ DECLARATION = Declaration(
         "or an entry of `boundary_elements`."
     ),
     caption=(
-        "Error of the model: contact area and mean separation of ICHA over those of boundary elements, less one, in "
-        "per cent, against the reduced pressure F/(E* h'rms A0). Both press the same topographies. The boundary "
-        "elements are those in the limit of a short range of attraction, unless the legend says otherwise. Points: "
-        "mean over the seeds; bars: the 95 % confidence of that mean (Student's t); open markers are without adhesion. "
-        "At a finite range they are an independent code with the interaction range of the material, and their contact "
-        "area is corrected by the perimeter of the contact (Yastrebov et al., 2017); with adhesion that contact is "
-        "where the gap is zero, and a zone around it attracts as well: dotted lines, where there are any, are errors "
-        "against the energetic area, energy of adhesion over that of full contact, which tends to the area of JKR "
-        "sooner as the range vanishes. At the ranges of attraction that a grid resolves they show practically no "
-        "hysteresis between loading and unloading: with adhesion they bound the error in the limit of short ranges, "
-        "they do not prove it."
+        "Error of the model: contact area and mean separation of ICHA divided by those of boundary elements, minus "
+        "one, in per cent, against the reduced pressure F/(E* h'rms A0). Topographies and loads are the same. The "
+        "boundary elements are those in the limit of a short range of attraction, unless the legend says otherwise. "
+        "Points are means over the seeds, and bars are 95 % confidence intervals of the mean (Student's t); open "
+        "markers are without adhesion. Boundary elements at a finite range are those by an independent code at the "
+        "interaction range of the material; their contact area is corrected by the perimeter of the contact (Yastrebov "
+        "et al., 2017). With adhesion, their contact is where the gap is zero, but a zone around it attracts as well. "
+        "Dotted lines, if there are any, are errors relative to the energetic area, which is the energy of adhesion "
+        "over that of full contact and tends to the area of JKR sooner as the range vanishes. At ranges that a grid "
+        "resolves, these boundary elements show practically no hysteresis between loading and unloading; with adhesion "
+        "they therefore bound the error in the limit of short ranges, but do not determine it."
     ),
     options=ComparedFigure,
     inputs=model_error_only,

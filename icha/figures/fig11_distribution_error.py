@@ -14,15 +14,16 @@ DECLARATION = Declaration(
         "needs both `models`, or an entry of `boundary_elements`."
     ),
     caption=(
-        "How the states of ICHA differ from those of boundary elements of the same topographies and loads, in the "
-        "limit of a short range of attraction unless the legend says otherwise, against the reduced pressure "
-        "F/(E* h'rms A0): first Wasserstein distance (area between the cumulative distributions) between the P(p), in "
-        "units of the nominal pressure, and between the P(u), in units of the rms height, both over the nominal area; "
-        "and the overlap of the contact maps, area in contact in both over area in contact in either, on the nodes of "
-        "the boundary elements. Points: mean over the seeds; bars: the 95 % confidence of that mean (Student's t); "
-        "open markers are without adhesion. Where boundary elements have a finite range they are an independent code: "
-        "at the ranges that a grid resolves they show practically no hysteresis, so that with adhesion they bound the "
-        "limit of short ranges (JKR), and do not prove it."
+        "Difference between the states of ICHA and those of boundary elements, on the same topographies and at the "
+        "same loads, against the reduced pressure F/(E* h'rms A0). The boundary elements are those in the limit of a "
+        "short range of attraction, unless the legend says otherwise. First Wasserstein distances (areas between the "
+        "cumulative distributions) over the nominal area are shown for the contact pressure, P(p), in units of the "
+        "nominal pressure, and for the gap, P(u), in units of the rms height. The overlap of the contact maps is the "
+        "area in contact in both divided by the area in contact in at least one, on the nodes of the boundary "
+        "elements. Points are means over the seeds, and bars are 95 % confidence intervals of the mean (Student's t); "
+        "open markers are without adhesion. Boundary elements at a finite range are those by an independent code. At "
+        "ranges that a grid resolves they show practically no hysteresis; with adhesion they therefore bound the "
+        "difference in the limit of short ranges (JKR), but do not determine it."
     ),
     options=ComparedFigure,
     inputs=model_error_only,

@@ -77,15 +77,16 @@ def inputs(campaign: Campaign, options: SourcesFigure, files: results.ResultFile
 DECLARATION = Declaration(
     description="From the model to boundary elements, one thing at a time.",
     caption=(
-        "Where the model's error comes from: between ICHA and boundary elements (BEM) one thing is switched at a time, "
-        "on the same topographies, without adhesion. (a) Contact area and (b) mean separation over those of boundary "
-        "elements on the true topography, against the reduced pressure F/(E* h'rms A0); paraboloids: boundary elements "
-        "on the upper envelope of the summits' paraboloids instead of the topography. (c) What every step from "
-        "boundary elements to the model adds to the logarithm of the area; the steps add up to the black line. (d) "
-        "Spots of one summit: area of the patch over Hertz's area at the patch's own force, against the patch's radius "
-        "a times the wave number q = (mean q^4 / mean q^2)^(1/2) of the surface; line: medians; dashed: medians of "
-        "what the summits' fourth-order terms alone give; a few points lie above the frame. In (a) and (b) mean and "
-        "standard deviation over the seeds; in (c) means."
+        "Sources of the model's error: between ICHA and boundary elements (BEM) one thing is changed at a time, on the "
+        "same topographies, without adhesion. Panels (a) and (b) show contact area and mean separation over those of "
+        "boundary elements on the true topography, against the reduced pressure F/(E* h'rms A0). The curves named "
+        "paraboloids are boundary elements on the upper envelope of the paraboloids of the summits instead of the "
+        "topography. Panel (c) shows what every step from boundary elements to the model adds to the logarithm of the "
+        "area; the steps add up to the black line. Panel (d) is for spots of one summit: it shows the area of the "
+        "patch over Hertz's area at the force of the patch itself, against the radius a of the patch times the wave "
+        "number q = (mean q^4 / mean q^2)^(1/2) of the surface. Its solid line joins medians, its dashed line medians "
+        "of what the fourth-order terms of the summits alone give; a few points lie above the frame. Panels (a) and "
+        "(b) have the mean and standard deviation over the seeds, panel (c) the means."
     ),
     options=SourcesFigure,
     inputs=inputs,

@@ -59,17 +59,17 @@ DECLARATION = Declaration(
     description="Pressure and contact area against mean separation, both ways.",
     caption=(
         "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over "
-        "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed); tension is "
-        "negative. Symbols with a black edge: pull-off, the largest tension on the last way back, where there is any; "
-        "where slopes share a panel, symbols without it mark where the first way in ends. Insets enlarge the "
-        "surroundings of zero load where the tension is small beside the largest load. The energy lost per nominal "
-        "area is the area between the ways, of the pressure against the mean separation. Where several seeds are drawn "
-        "the lines are means at common displacements from the turning point, with the 95 % band of confidence of the "
-        "mean (Student's t), and the marks means over the seeds. Steps are jumps of single spots or of several. Dots "
-        "and rings, where given: boundary elements at some of their states, of the same topography and half-space, "
-        "dots on the way in and rings on the way back: those in the limit of a short range of attraction or, where the "
-        "legend says so, an independent code at the finite range of the material, with the area corrected by the "
-        "perimeter of the contact."
+        "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed). Tension is "
+        "negative. Symbols with a black edge mark pull-off, the largest tension on the last way back, if there is any. "
+        "Where slopes share a panel, symbols without an edge mark where the first way in ends. Insets enlarge the "
+        "region around zero load where the tension is small compared with the largest load. The energy lost per "
+        "nominal area is the area between the two ways in the plot of pressure against mean separation. Where several "
+        "seeds are drawn, the lines are means at common displacements from the turning point, with the 95 % confidence "
+        "band of the mean (Student's t), and the marks are means over the seeds. Steps are jumps of one spot or of "
+        "several. Dots (way in) and rings (way back), if there are any, are boundary elements at some of their states, "
+        "of the same topography and half-space. They are those in the limit of a short range of attraction or, where "
+        "the legend says so, those by an independent code at the finite range of the material, with the area corrected "
+        "by the perimeter of the contact."
     ),
     options=LoopsFigure,
     inputs=inputs,

@@ -65,13 +65,13 @@ DECLARATION = Declaration(
     description="Pull-off against rms slope, and against the largest load.",
     caption=(
         "Pull-off, the largest tension on the way back to complete separation, against the rms slope (a) and, where "
-        "studies of several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached "
-        "before (b). It is drawn as nominal pressure, or over the strength of the interface (the largest attraction of "
-        "the Lennard-Jones traction), or over all summits pulling their most, 3/2 pi dgamma R, at once; the axis says "
-        "which. Points are means over the seeds, bars the 95 % confidence of that mean (Student's t) where there are "
-        "several seeds. Without adhesion (open markers) there is no pull-off. Where the values span decades the axis "
-        "is logarithmic down to the decade of the smallest, and linear from there to zero. Runs that were not "
-        "separated completely are left out."
+        "studies with several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached "
+        "before (b). It is drawn as nominal pressure, or divided by the strength of the interface (the largest "
+        "attraction of the Lennard-Jones traction), or divided by the tension of all summits that pull their most, 3/2 "
+        "pi dgamma R, at once; the axis says which. Points are means over the seeds. Where there are several seeds, "
+        "bars are 95 % confidence intervals of the mean (Student's t). Without adhesion (open markers) there is no "
+        "pull-off. Where the values span decades, the axis is logarithmic down to the decade of the smallest value, "
+        "and linear from there to zero. Runs that were not separated completely are left out."
     ),
     options=PullOffFigure,
 )

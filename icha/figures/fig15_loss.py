@@ -41,18 +41,19 @@ class LossFigure(FigureOptions):
 DECLARATION = Declaration(
     description="Energy lost in a loop against contact area, and what it was lost in.",
     caption=(
-        "(a) Hysteresis loss, the energy per nominal area that a path from first contact to the largest load and back "
-        "to separation dissipates, against the contact area over the nominal area, the largest on the path. Points: "
-        "means over the seeds, bars the 95 % confidence of that mean (Student's t) where there are several seeds. "
-        "Lines: least squares of a straight line through the points that differ in their largest load only, three at "
-        "least; the legend gives its coefficient of determination r² and the exponent of a power law through the same "
-        "points, 1 where the loss is proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found it "
-        "to grow linearly). The axes are logarithmic where both quantities span decades. Runs without adhesion have no "
-        "value where the loss is drawn over the surface energy, and are left out there. (b) What the loss consists of "
-        "at the largest load of every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and "
-        "their undoing (a property of the model, of either sign), jumps at controlled load, and what none of them "
-        "explains; parts are over the sum of their magnitudes, and those below zero are gains. Bars carry the markers "
-        "of (a). Runs that were not separated completely are left out."
+        "Panel (a) shows the hysteresis loss, which is the energy per nominal area that is dissipated on a path from "
+        "first contact to the largest load and back to separation, against the largest contact area on the path over "
+        "the nominal area. Points are means over the seeds. Where there are several seeds, bars are 95 % confidence "
+        "intervals of the mean (Student's t). Lines are least-squares fits of a straight line to the points that "
+        "differ only in their largest load, if there are at least three. The legend gives its coefficient of "
+        "determination r² and the exponent of a power law through the same points, which is 1 where the loss is "
+        "proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found a linear growth). The axes are "
+        "logarithmic where both quantities span decades. Runs without adhesion have no value where the loss is divided "
+        "by the surface energy, and are left out there. Panel (b) shows what the loss consists of at the largest load "
+        "of every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and their undoing (a "
+        "property of the model, of either sign), jumps at controlled load, and the rest. The parts are divided by the "
+        "sum of their magnitudes; those below zero are gains. Bars carry the markers of (a). Runs that were not "
+        "separated completely are left out."
     ),
     options=LossFigure,
 )

@@ -30,10 +30,11 @@ def no_inputs(campaign: Campaign, options: JKRFigure, files: ResultFiles) -> Inp
 DECLARATION = Declaration(
     description="Force and radius of one asperity against approach.",
     caption=(
-        "Force F (a) and contact radius a (b) of one asperity against its approach δ by the theory of Johnson, Kendall "
-        "and Roberts, for a Tabor parameter of 3. On loading (solid) the asperity snaps into contact at A, where the "
-        "gap falls to Wu's jump-in distance; on unloading (dashed) it follows the stable branch to C, the jump-off "
-        "point, and detaches. B is the pull-off point under load control. Dotted: unstable branch. Negative forces are "
+        "Force F (a) and contact radius a (b) of one asperity against its approach δ, by the theory of Johnson, "
+        "Kendall and Roberts. On loading (solid) the asperity snaps into contact at A, where the gap falls to Wu's "
+        "jump-in distance; this distance depends on the Tabor parameter, which is 3 unless the configuration gives "
+        "another. On unloading (dashed) the asperity follows the stable branch to C, the jump-off point, and detaches. "
+        "B is the pull-off point under load control. The dotted line is the unstable branch. Negative forces are "
         "tensile."
     ),
     options=JKRFigure,

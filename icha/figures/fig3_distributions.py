@@ -29,16 +29,17 @@ DECLARATION = Declaration(
     description="Distributions of gap and pressure of every material, on the study's first surface.",
     caption=(
         "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure "
-        "p (b), at the load given in the figure; open markers are without adhesion. Where there are several seeds the "
-        "lines are means over them, with the 95 % band of confidence of the mean (Student's t). Gaps are in units of "
-        "the rms height, pressures of E* h'rms. Only contact carries pressure in this model, so the integral of (b) is "
-        "A/A0 and that of (a) is 1 - A/A0 less the overlap fraction; adhesion gives the tensile tail at negative "
-        "pressures. Broad pale lines, where there are any: boundary elements in the limit of a short range of "
-        "attraction, on the same topographies (means over those seeds that have them), in the colour of the material; "
-        "gaps out of contact and pressures in contact. Where there are only those of an independent code at the finite "
-        "interaction range of the material, it is these, as the legend says: at the ranges that a grid resolves they "
-        "show practically no hysteresis, so that with adhesion they bound the limit of short ranges (JKR), and do not "
-        "prove it. Line: Persson's theory of adhesionless contact."
+        "p (b), at the load given in the figure; open markers are without adhesion. Where there are several seeds, the "
+        "lines are means over them, with the 95 % confidence band of the mean (Student's t). Gaps are in units of the "
+        "rms height, pressures in units of E* h'rms. Only contact carries pressure in this model, so the integral of "
+        "(b) is A/A0, and that of (a) is 1 - A/A0 minus the overlap fraction. Adhesion gives the tensile tail at "
+        "negative pressures. Broad pale lines, if there are any, are boundary elements in the limit of a short range "
+        "of attraction, on the same topographies (means over the seeds that have them), in the colour of the material; "
+        "their gaps are those out of contact, their pressures those in contact. Where the legend says so, they are "
+        "instead boundary elements by an independent code at the finite interaction range of the material. At ranges "
+        "that a grid resolves these show practically no hysteresis; with adhesion they therefore bound the result in "
+        "the limit of short ranges (JKR), but do not determine it. The line is Persson's theory of adhesionless "
+        "contact."
     ),
     options=SnapshotFigure,
     inputs=inputs,

@@ -78,14 +78,14 @@ DECLARATION = Declaration(
     description="Contact area against load for all slopes and materials, with measurements.",
     caption=(
         "Real contact area over nominal area against the reduced pressure F/(E* h'rms A0) (a) and against F/(E* A0) "
-        "(b) for several surfaces and rms slopes (shape of the markers) and materials (colour and size). Where there "
-        "are several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
-        "(Student's t). Without adhesion the curves of one topography, scaled to different slopes, are one curve in "
-        "(a); what adhesion adds depends on the material and grows as the slope falls. In (b) the slope orders the "
-        "curves: at a given load the area falls as the slope rises. Upright crosses, where there are any: boundary "
-        "elements in the limit of a short range of attraction, on the same topographies, in the colour of the "
-        "material. Thin dashed lines, where there are any: the way back, unloading, while the load is compressive. "
-        "Measurements, where given, are drawn as lines."
+        "(b), for several surfaces and rms slopes (shape of the markers) and materials (colour and size). Where there "
+        "are several seeds, the lines are means over them at common loads, with the 95 % confidence band of the mean "
+        "(Student's t). Without adhesion, the curves of one topography that is scaled to different slopes are one "
+        "curve in (a). What adhesion adds depends on the material and grows as the slope falls. In (b) the curves are "
+        "ordered by slope: at a given load the area falls as the slope rises. Upright crosses, if there are any, are "
+        "boundary elements in the limit of a short range of attraction, on the same topographies, in the colour of the "
+        "material. Thin dashed lines, if there are any, show unloading as long as the load is compressive. "
+        "Measurements, if there are any, are drawn as lines."
     ),
     options=TruthFigure,
     inputs=inputs,

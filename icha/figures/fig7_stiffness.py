@@ -27,14 +27,14 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 DECLARATION = Declaration(
     description="Contact stiffness against load, with theory.",
     caption=(
-        "Contact stiffness K = -dp/du, nominal pressure p over mean separation u, against the reduced pressure F/(E* "
-        "h'rms A0): in units of E* h'rms/h_rms (a) and of p/h_rms (b), where the law K = p/u0 is a constant. Markers: "
-        "ICHA, from the tangent of the equilibrium with the present spots; open ones are without adhesion. Where there "
-        "are several seeds the lines are means over them at common loads, with the 95 % band of confidence of the mean "
-        "(Student's t). States under tension or of negative stiffness have no place on these axes. Line: derivative of "
-        "the adhesionless separation of Yang and Persson for an infinite surface. On a finite surface the stiffness at "
-        "small loads lies above the proportional law, as only its highest parts touch (Pastewka et al., Phys. Rev. E "
-        "87 (2013) 062809)."
+        "Contact stiffness K = -dp/du, the derivative of the nominal pressure p with respect to the mean separation u, "
+        "against the reduced pressure F/(E* h'rms A0). It is in units of E* h'rms/h_rms (a) and of p/h_rms (b), where "
+        "the law K = p/u0 is a constant. Markers are results of ICHA, from the tangent of the equilibrium with the "
+        "present spots; open markers are without adhesion. Where there are several seeds, the lines are means over "
+        "them at common loads, with the 95 % confidence band of the mean (Student's t). States under tension or with "
+        "negative stiffness cannot be shown on these axes. The line is the derivative of the adhesionless separation "
+        "of Yang and Persson for an infinite surface. On a finite surface, the stiffness at small loads lies above the "
+        "proportional law, since only its highest parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
     ),
     options=StudyFigure,
     inputs=inputs,

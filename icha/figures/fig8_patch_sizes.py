@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 DECLARATION = Declaration(
     description="Sizes of the contact patches of every material, on the study's first surface.",
     caption=(
-        "Sizes of the contact patches, the areas A of the spots (united ones count as one), at the load given in the "
-        "figure; open markers are without adhesion. Where there are several seeds the lines are means over them, with "
-        "the 95 % band of confidence of the mean (Student's t). Number density n(A) per area of a patch and nominal "
-        "area (a), bins with few patches being joined; number of patches larger than A per nominal area (b), down to "
-        "the largest one."
+        "Sizes of the contact patches, which are the areas A of the spots (united spots count as one), at the load "
+        "given in the figure; open markers are without adhesion. Panel (a) shows the number density n(A) per area of a "
+        "patch and per nominal area, where bins with few patches are joined. Panel (b) shows the number of patches "
+        "larger than A per nominal area, down to the largest patch. Where there are several seeds, the lines are means "
+        "over them, with the 95 % confidence band of the mean (Student's t)."
     ),
     options=SnapshotFigure,
 )

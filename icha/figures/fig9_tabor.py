@@ -38,13 +38,14 @@ DECLARATION = Declaration(
         "differ in their `interaction_range`."
     ),
     caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b) at the load given in the "
-        "figure, against the Tabor parameter of the surface, (R_c Δγ²/E*²)^(1/3) over the range of attraction, with "
-        "R_c = 1/rms curvature. Runs that differ only in the range are joined by a line: at a given surface energy a "
-        "longer range (smaller Tabor parameter) lets asperities jump into contact from farther away. Where there are "
-        "several seeds the points are means over them, and the bars the 95 % confidence of that mean (Student's t). "
-        "Dashed: without adhesion. Shaded: outside the Tabor parameters for which the jump-in distance was verified; "
-        "single asperities, whose radii differ, can lie there for every value of the surface's."
+        "Real contact area over nominal area (a) and mean separation over rms height (b), at the load given in the "
+        "figure, against the Tabor parameter of the surface, which is (R_c Δγ²/E*²)^(1/3) over the range of "
+        "attraction, with R_c = 1/rms curvature. Runs that differ only in the range are joined by a line: at a given "
+        "surface energy a longer range (smaller Tabor parameter) lets asperities jump into contact from farther away. "
+        "Where there are several seeds, the points are means over them, and the bars are 95 % confidence intervals of "
+        "the mean (Student's t). Dashed lines are without adhesion. Shaded regions are outside the Tabor parameters "
+        "for which the jump-in distance was verified. Single asperities, whose radii differ, can be outside for every "
+        "value of the surface's Tabor parameter."
     ),
     options=TaborFigure,
 )
