@@ -36,16 +36,16 @@ class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
     study: Name = Field(description="Name of the study on whose topographies they are solved.")
-    surfaces: list_of_names("Surfaces, of the study's. Left out: all.", Label) | None = Field(
-        default=None, description="Surfaces, of the study's. Left out: all."
+    surfaces: list_of_names("Surfaces, from those of the study. Left out: all.", Label) | None = Field(
+        default=None, description="Surfaces, from those of the study. Left out: all."
     )
-    seeds: Seeds | None = Field(default=None, description="Seeds, of the study's. Left out: all.")
+    seeds: Seeds | None = Field(default=None, description="Seeds, from those of the study. Left out: all.")
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
-        default=None, description="Rms slopes, of the study's. Left out: all."
+        default=None, description="Rms slopes, from those of the study. Left out: all."
     )
-    materials: list_of_names("Materials, of the study's. Left out: all.", Label) | None = Field(
+    materials: list_of_names("Materials, from those of the study. Left out: all.", Label) | None = Field(
         default=None,
-        description="Materials, of the study's. Left out: all. With adhesion the grid must resolve their "
+        description="Materials, from those of the study. Left out: all. With adhesion the grid must resolve their "
         "`interaction_range`.",
     )
     tolerance: number(TOLERANCE) = Field(default=1e-8, description="Relative error at which the solver may stop.")
@@ -104,19 +104,19 @@ Loads = Annotated[
 ]
 Refinement = Annotated[
     integer(REFINEMENT),
-    Field(description="Cells per cell of the surface's own grid, along a side; heights are interpolated."),
+    Field(description="Cells per cell of the surface's grid, along a side; heights are interpolated."),
 ]
 
 
 class BoundaryElements(BesideStudy):
-    """Boundary elements at a finite range of attraction on a study's own topographies, beside its runs."""
+    """Boundary elements at a finite range of attraction on the topographies of a study, to compare with its runs."""
 
     reduced_pressures: Loads
     refinement: Refinement = 1
 
 
 class BoundaryElementLoops(BesideStudy):
-    """Boundary elements at a finite range of attraction, both ways, to the largest load of a study's runs."""
+    """Boundary elements at a finite range of attraction, loaded to the largest load of a study's runs and unloaded."""
 
     refinement: Refinement = 1
     separation_step: number(STEP) = Field(
@@ -139,7 +139,8 @@ class ErrorSources(BesideStudy):
 
     reduced_pressures: Loads
     refinement: integer(REFINEMENT) = Field(
-        default=2, description="Cells per cell of the surface's own grid, along a side: even, since half is tried too."
+        default=2,
+        description="Cells per cell of the surface's grid, along a side. Even, since half as many are tried as well.",
     )
 
     @field_validator("refinement")
@@ -161,6 +162,6 @@ class OneAsperity(Section):
     tabor_parameters: Annotated[
         list[number(Real(least=1.5, most=6))], Field(min_length=1), AfterValidator(increasing)
     ] = Field(
-        description="Tabor parameters, increasing; boundary elements take a grid that grows with their square, 800 "
-        "nodes a side and some minutes at 4. Hertz's contact is always computed."
+        description="Tabor parameters, increasing. The grid of the boundary elements grows with their square; at 4 it "
+        "has 800 nodes along a side and takes some minutes. Hertz's contact is always computed."
     )

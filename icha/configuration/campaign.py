@@ -77,7 +77,7 @@ class Defaults(Section):
 
 
 class Campaign(Section):
-    """A campaign: everything that one configuration file asks for."""
+    """A campaign: everything that one configuration file describes."""
 
     name: Name = Field(description="Name of the campaign; results go to `results/<name>/`.")
     title: Text = Field(description="One line that says what the campaign is.")
@@ -95,20 +95,22 @@ class Campaign(Section):
         default={}, description="Boundary-element solutions by name, compared with the runs of a study."
     )
     boundary_element_loops: dict[Name, BoundaryElementLoops] = Field(
-        default={}, description="Boundary elements both ways by name, beside the runs of a study that unload."
+        default={},
+        description="Boundary elements in loading and unloading by name, to compare with the runs of a "
+        "study that unloads.",
     )
     error_sources: dict[Name, ErrorSources] = Field(
-        default={}, description="Studies of where the model's error comes from, by name."
+        default={}, description="Studies of the sources of the model's error, by name."
     )
     one_asperity: OneAsperity | None = Field(
         default=None, description="One asperity by the model and by boundary elements."
     )
     measurements: dict[Name, Measurement] = Field(
-        default={}, description="Measurements by name, overlaid on figure 5. None are shipped with ICHA."
+        default={}, description="Measurements by name, drawn over figure 5. None come with ICHA."
     )
     figures: Figures = Field(default=Figures(), description="Figures and what they show.")
     publication: Publication = Field(
-        default=Publication(), description="What a deposit says of itself; nothing else depends on it."
+        default=Publication(), description="Metadata of a deposit; nothing else depends on them."
     )
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})

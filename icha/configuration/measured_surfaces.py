@@ -82,66 +82,69 @@ class MeasuredSurface(Section):
     path: File = Field(description="File of the topography. Relative to the configuration file.")
     format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = Field(
         default="auto",
-        description="What the file is: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y z "
-        "per line in any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a microscope's own "
-        "format, of those that SurfaceTopography reads). `auto` tells by the name's ending and, for text, by the "
-        "number of columns.",
+        description="Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y "
+        "z per line in any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a format "
+        "of a microscope that SurfaceTopography can read). `auto` decides by the ending of the file's name "
+        "and, for text, by the number of columns.",
     )
     data: Text | None = Field(
         default=None,
-        description="Which of several: name of the variable (netcdf), path of the dataset (hdf5), name of the channel "
-        "(instrument). Left out: the only one, or the file's own default.",
+        description="Which data to use, if the file has several: name of the variable (netcdf), path of the dataset "
+        "(hdf5), name of the channel (instrument). Left out: the only one, or the default of the file.",
     )
     first_axis: Literal["y", "x"] = Field(
         default="y",
-        description="Which way the rows of npy, netcdf, hdf5 and matrix files go: `y`, a row is a line along x, or "
-        "`x`. Dimensions that are named x and y speak for themselves.",
+        description="First axis of the array in npy, netcdf, hdf5 and matrix files: `y`, so that a row is a line along "
+        "x, or `x`. Not used where the dimensions in the file are named x and y.",
     )
     height_unit: UnitOfLength | None = Field(
         default=None,
-        description="Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file says it; goes before what "
-        "the file says.",
+        description="Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file has it; replaces what the "
+        "file says.",
     )
     lateral_unit: UnitOfLength | None = Field(
         default=None,
-        description="Unit of the coordinates x and y, for fourier of 1/q. Left out: what the file says, or the "
-        "height's.",
+        description="Unit of the coordinates x and y; for fourier, of 1/q. Left out: what the file says, or the unit "
+        "of the heights.",
     )
     size: Sides | None = Field(
         default=None,
-        description="Size of the whole scan: one length, or two, along x and y. A pixel is this over the number of "
-        "pixels. Needed unless the file says it; goes before what the file says.",
+        description="Size of the whole scan: one length, or two, along x and y. The size of a pixel is this divided by "
+        "the number of pixels. Needed unless the file has it; replaces what the file says.",
     )
     touches_first: Literal["high", "low"] = Field(
         default="high",
-        description="Which points touch first: those of the largest numbers in the file, or of the smallest.",
+        description="Which points touch first: those with the largest numbers in the file (`high`), or with the "
+        "smallest (`low`).",
     )
     missing: Literal["refuse", "fill"] = Field(
         default="refuse",
-        description="What to do about points without a height: `refuse` the file, or `fill` them by the solution of "
+        description="What to do with points without a height: `refuse` the file, or `fill` them by the solution of "
         "Laplace's equation.",
     )
     crop: Crop | None = Field(
-        default=None, description="The square that is used. Left out: the largest, in the middle."
+        default=None, description="The square that is used. Left out: the largest one, in the middle."
     )
     detrend: Literal["none", "tilt", "curvature"] | None = Field(
         default=None,
-        description="What is removed beside the mean height: `none`, the mean plane (`tilt`), or the best paraboloid "
-        "(`curvature`). Left out: `tilt`; of a periodic topography `none`.",
+        description="What is removed besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid "
+        "(`curvature`). Left out: `tilt`, or `none` for a periodic topography.",
     )
     boundary: Literal["periodic", "window", "mirror", "free"] = Field(
-        description="What lies beyond the edges: `periodic`, the topography repeats by itself; `window`, its heights "
-        "fall smoothly to their mean towards the edges, and it is repeated; `mirror`, it and its mirror images make a "
-        "periodic cell of twice the side; `free`, nothing: one square on a half-space that goes on beyond it."
+        description="What lies beyond the edges: `periodic`: the topography repeats as it is; `window`: its heights "
+        "fall smoothly to their mean towards the edges, and it repeats; `mirror`: the topography and its "
+        "mirror images form a periodic cell of twice the side; `free`: nothing, that is, one square on a "
+        "half-space that extends beyond it."
     )
     taper: number(Real(above=0, most=0.5)) | None = Field(
         default=None,
-        description="With `window`: the part of the side on which heights fall, at either edge. Left out: 0.1.",
+        description="With `window`: the part of the side, at each edge, over which heights fall. Left out: 0.1.",
     )
     grid: integer(GRID) | None = Field(
         default=None,
-        description="Nodes along a side of the prepared surface, to which it is resampled by Fourier interpolation; a "
-        "coarser one loses the shorter waves. Left out: those of the scan (`mirror`: twice).",
+        description="Nodes along a side of the prepared surface, which is resampled by Fourier interpolation; a "
+        "coarser grid loses the shortest waves. Left out: as many as the scan has (`mirror`: twice as "
+        "many).",
     )
 
     @model_validator(mode="after")

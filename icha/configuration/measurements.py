@@ -35,7 +35,7 @@ class Measurement(Section):
     """Measured contact areas, drawn over the figure of the study that they belong to."""
 
     path: File = Field(description="CSV file with a line of headings. Relative to the configuration file.")
-    label: Text = Field(description="What the legend calls it.")
+    label: Text = Field(description="Its name in the legend.")
     citation: Text = Field(description="Where the numbers come from; printed in the report.")
     study: Name = Field(description="Name of the study that it is compared with.")
     load: Column = Field(

@@ -309,7 +309,7 @@ class Author(Section):
 
 
 class Funding(Section):
-    """Who paid."""
+    """Sources of funding."""
 
     funder: Line = Field(description="Name of the funder.")
     funder_id: FunderId | None = Field(
@@ -321,11 +321,11 @@ class Funding(Section):
 
 
 class RelatedIdentifier(Section):
-    """Something else that the deposit belongs to: the paper that it supplements, data that it was made from."""
+    """Something that the deposit is related to: the paper that it supplements, data that it was made from."""
 
     identifier: Identifier = Field(description="A DOI, `arXiv:…`, or a web address.")
     relation: Literal[RELATIONS] = Field(
-        description="How the deposit stands to it, by DataCite's names, such as `IsSupplementTo` or `Cites`."
+        description="Relation of the deposit to it, by DataCite's names, such as `IsSupplementTo` or `Cites`."
     )
     resource: Literal[RESOURCES] | None = Field(
         default=None, description="What it is, by DataCite's names, such as `JournalArticle`."
@@ -336,7 +336,9 @@ class KnownFailure(Section):
     """A run with a failed check that is published nevertheless, and why."""
 
     run: Line = Field(description="The run as the verdict names it: `study/surface/seed1/slope1/material`.")
-    reason: Prose = Field(description="What readers are told: why it failed, and why the data are published.")
+    reason: Prose = Field(
+        description="Explanation for readers: why it failed, and why the data are published nevertheless."
+    )
 
 
 def _same_author(one: Author, other: Author) -> bool:
@@ -385,7 +387,7 @@ Failures = Annotated[
 
 
 class Publication(Section):
-    """What a deposit says of itself. Nothing of it is needed before something is to be published."""
+    """Metadata of a deposit. They are only needed when something is to be published."""
 
     version: Version | None = Field(
         default=None, description="Version of the data, such as `1.0.0`; needed to publish."
@@ -398,13 +400,13 @@ class Publication(Section):
         default=None, description="Licence of the data, an SPDX identifier; that of the campaign if left out."
     )
     keywords: Annotated[list[Line], AfterValidator(distinct)] = Field(default=[], description="Keywords.")
-    funding: Fundings = Field(default=[], description="Who paid.")
+    funding: Fundings = Field(default=[], description="Sources of funding.")
     related_identifiers: Related = Field(
-        default=[], description="Papers, data and programs that the deposit belongs to."
+        default=[], description="Papers, data and programs that the deposit is related to."
     )
     doi: Doi | None = Field(default=None, description="DOI of this version, if one is reserved for it.")
     communities: Annotated[list[Community], AfterValidator(distinct)] = Field(
-        default=[], description="Communities of Zenodo to which it is proposed."
+        default=[], description="Communities of Zenodo to which the deposit is submitted."
     )
     known_failures: Failures = Field(
         default=[], description="Runs whose checks fail and that are published nevertheless."

@@ -101,7 +101,7 @@ def _of_scalars(name, kind, doc, fields=None):
 
 
 Vary = _of_scalars(
-    "Vary", Values, "Parameters of a study's surfaces and materials that it varies: a value each, or a list of them."
+    "Vary", Values, "Parameters of surfaces and materials that a study varies: one value each, or a list."
 )
 Scalar = Annotated[Any, WithJsonSchema(SCALAR_SCHEMA)]
 Case = _of_scalars(
@@ -118,7 +118,7 @@ Case = _of_scalars(
 
 
 class Study(Section):
-    """Every surface, seed, slope and material of the lists, each with each, along one path."""
+    """All combinations of the surfaces, seeds, slopes and materials of the lists, along one path."""
 
     surfaces: list_of_names("Names of surfaces.") = Field(default=[], description="Names of surfaces.")
     seeds: Seeds = Field(
@@ -134,28 +134,29 @@ class Study(Section):
     materials: list_of_names("Names of materials.") = Field(default=[], description="Names of materials.")
     vary: Vary | None = Field(
         default=None,
-        description="Parameters of the surfaces and materials that take other values in this study, each with each.",
+        description="Parameters of the surfaces and materials that take other values in this study, in all "
+        "combinations.",
     )
     zip: list[Annotated[list[Text], Field(min_length=2)]] = Field(
         default=[],
-        description="Groups of lists that go along together, first with first and second with second, instead of each "
-        "with each: `[[rms_slopes, surface_energy]]`.",
+        description="Groups of lists that are combined first with first and second with second, instead of in all "
+        "combinations: `[[rms_slopes, surface_energy]]`.",
     )
     cases: Annotated[list[Case], Field(min_length=1)] | None = Field(
         default=None,
-        description="An explicit list of runs instead of the lists of the study, which serve for what a case does not "
-        "name.",
+        description="An explicit list of runs instead of all combinations. What a case does not name is taken from the "
+        "lists of the study.",
     )
     models: Annotated[list[Literal[MODELS]], Field(min_length=1), AfterValidator(distinct)] = Field(
         default=[ASPERITIES],
-        description="Models of contact with which every run is computed: `asperities`, which are quick, and "
-        "`boundary_elements` in the limit of a short range of attraction, which need a periodic surface and a grid of "
-        "at least 4 cells (better 8) per shortest wavelength.",
+        description="Contact models by which every run is computed: `asperities`, which are quick, and "
+        "`boundary_elements` in the limit of a short range of attraction, which need a periodic surface "
+        "and a grid of at least 4 cells (better 8) per shortest wavelength.",
     )
     targets: Targets = Field(description="Stops of the loading path.")
     snapshots: Annotated[list[Snapshot], AfterValidator(distinct)] | None = Field(
         default=None,
-        description="States of which spots and distributions are kept; each is hit exactly. Left out: the last target.",
+        description="States whose spots and distributions are kept; each is met exactly. Left out: the last target.",
     )
     unload: Flag = Field(
         default=False, description="Whether the surfaces are pulled apart again, until nothing touches any more."
@@ -167,14 +168,15 @@ class Study(Section):
     )
     control: Literal["separation", "load"] = Field(
         default="separation",
-        description="What is imposed: the mean separation, or the load, under which the state jumps where the curve "
-        "turns back; then all targets and turning points are loads.",
+        description="What is imposed: the mean separation or the load. Under load control the state jumps where the "
+        "curve turns back, and all targets and turning points must be loads.",
     )
     united_until: Literal["overlap", "detachment"] = Field(
         default="overlap",
-        description="Until when coalesced spots stay one on the way back: until the two spots that they were made of "
-        "would no longer overlap, or until they detach as a whole and fall back into their asperities. Of model "
-        "`asperities`; patches of boundary elements part by themselves.",
+        description="How long coalesced spots stay united on the way back: until the two spots that they were made of "
+        "would no longer overlap (`overlap`), or until they detach as a whole and fall back into their "
+        "asperities (`detachment`). Only for the model `asperities`; patches of boundary elements split by "
+        "themselves.",
     )
     max_step: number(STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."

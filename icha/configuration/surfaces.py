@@ -29,7 +29,7 @@ class SelfAffineSurface(Section):
     kind: Literal["self_affine"] = Field(description="Surface made from a self-affine spectrum.")
     period: Length = Field(description="Side L of the periodic cell.")
     rolloff_wavelength: Length = Field(
-        description="Roll-off wavelength 2π/q0: the spectrum is flat for longer waves. At most the period."
+        description="Roll-off wavelength 2π/q0: the spectrum is flat at longer wavelengths. At most the period."
     )
     short_wavelength: Length = Field(
         description="Short cut-off 2π/q1: there are no shorter waves. Less than the roll-off wavelength; at least 2 "
@@ -40,7 +40,7 @@ class SelfAffineSurface(Section):
     amplitudes: Literal["fixed", "gaussian"] = Field(
         default="fixed",
         description="Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and "
-        "slope, or `gaussian`, drawn at random about it.",
+        "slope, or `gaussian`, random with the spectrum as their mean square.",
     )
 
     @property

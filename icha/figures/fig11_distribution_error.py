@@ -10,8 +10,8 @@ from icha.figures.options import ComparedFigure, model_error_only
 
 DECLARATION = Declaration(
     description=(
-        "How far distributions of pressure and gap and the contact map are from those of boundary elements. The study "
-        "needs both `models`, or an entry of `boundary_elements`."
+        "Distance of the distributions of pressure and gap, and of the contact map, from those of boundary elements. "
+        "The study needs both `models`, or an entry of `boundary_elements`."
     ),
     caption=(
         "Difference between the states of ICHA and those of boundary elements, on the same topographies and at the "

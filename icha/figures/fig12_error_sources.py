@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class SourcesFigure(FigureOptions):
-    """A figure of where the model's error comes from."""
+    """A figure of the sources of the model's error."""
 
     entry: Name = Field(description="Name of the entry of `error_sources` that is drawn: its runs without adhesion.")
 
@@ -75,7 +75,7 @@ def inputs(campaign: Campaign, options: SourcesFigure, files: results.ResultFile
 
 
 DECLARATION = Declaration(
-    description="From the model to boundary elements, one thing at a time.",
+    description="Steps from the model to boundary elements, each of which changes one thing.",
     caption=(
         "Sources of the model's error: between ICHA and boundary elements (BEM) one thing is changed at a time, on the "
         "same topographies, without adhesion. Panels (a) and (b) show contact area and mean separation over those of "

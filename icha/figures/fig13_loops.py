@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class LoopsFigure(TruthFigure):
-    """A figure of the runs of a study both ways, for one topography."""
+    """A figure of the runs of a study in loading and unloading, for one topography."""
 
     surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
     seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
@@ -56,7 +56,7 @@ def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles)
 
 
 DECLARATION = Declaration(
-    description="Pressure and contact area against mean separation, both ways.",
+    description="Pressure against mean separation and contact area against load, in loading and unloading.",
     caption=(
         "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over "
         "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed). Tension is "

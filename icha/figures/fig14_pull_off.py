@@ -46,8 +46,8 @@ class PullOffFigure(StudyFigure):
     )
     quantity: Literal["pull_off_pressure", "pull_off_over_strength", "pull_off_over_summits"] = Field(
         default="pull_off_pressure",
-        description="What is drawn: the largest tension, or its part of the interface's strength or of what all "
-        "asperities could pull at once.",
+        description="What is drawn: the largest tension, or this divided by the strength of the interface or by the "
+        "tension of all asperities that pull their most at once.",
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:

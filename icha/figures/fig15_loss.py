@@ -24,9 +24,10 @@ if TYPE_CHECKING:
 class LossFigure(FigureOptions):
     """A figure of the energy lost in the runs of some studies."""
 
-    studies: list_of_names("Studies that are drawn; those that differ in their largest load only make up the lines.")
+    studies: list_of_names("Studies that are drawn; lines join those that differ only in their largest load.")
     over_surface_energy: Flag = Field(
-        default=True, description="Whether the loss is drawn over the surface energy, or in J/m²."
+        default=True,
+        description="Whether the loss is divided by the surface energy (`true`), or drawn in J/m² (`false`).",
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
@@ -39,7 +40,7 @@ class LossFigure(FigureOptions):
 
 
 DECLARATION = Declaration(
-    description="Energy lost in a loop against contact area, and what it was lost in.",
+    description="Energy lost in a loop against contact area, and its parts.",
     caption=(
         "Panel (a) shows the hysteresis loss, which is the energy per nominal area that is dissipated on a path from "
         "first contact to the largest load and back to separation, against the largest contact area on the path over "

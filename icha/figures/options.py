@@ -44,12 +44,12 @@ class StudyFigure(FigureOptions):
 
 
 class TruthFigure(StudyFigure):
-    """A figure of all runs of a study, and of those by boundary elements beside them."""
+    """A figure of all runs of a study, with those by boundary elements."""
 
     boundary_elements: Name | None = Field(
         default=None,
-        description="Name of a study whose runs by boundary elements are drawn beside. Left out: the study itself, if "
-        "it has some.",
+        description="Name of a study whose runs by boundary elements are also drawn. Left out: the study itself, if it "
+        "has such runs.",
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
@@ -127,7 +127,7 @@ class RunFigure(StudyFigure):
 
 
 class ComparedFigure(StudyFigure):
-    """A figure of a study's runs beside their boundary elements."""
+    """A figure that compares a study's runs with boundary elements."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """A study without boundary elements is one more."""

@@ -10,7 +10,7 @@ AreaFraction = number(STATES["area_fraction"])
 
 
 class Snapshot(Section):
-    """A state of which spots, gap and pressure distributions are kept: exactly one of the four keys."""
+    """A state whose spots and distributions of gap and pressure are kept: exactly one of the four keys."""
 
     reduced_pressure: ReducedPressure | None = Field(default=None, description="At this p/(E* h'rms).")
     relative_load: Positive | None = Field(
