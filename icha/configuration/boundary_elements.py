@@ -73,7 +73,7 @@ class BesideStudy(Section):
                     yield (key, index), value, f"is not in study {self.study!r}; allowed: {allowed}"
         contacts = campaign.solved(self)
         if not contacts:
-            yield (), self.study, "has no run with all that is asked for; allowed: combinations that the study has"
+            yield (), self.study, "has no run with the chosen labels together; allowed: combinations that the study has"
         for name in dict.fromkeys(each.surface for each in contacts):
             if campaign.boundary(name) != "periodic":
                 reason = (
@@ -126,10 +126,10 @@ class BoundaryElementLoops(BesideStudy):
     def _study_problems(self, campaign, study):
         """What the way back needs of the study, too."""
         if not study.unload or study.turning_points:
-            reason = "does not come straight back; allowed: a study with `unload: true` and without turning points"
+            reason = "does not unload after its targets; allowed: a study with `unload: true` and no turning points"
             yield ("study",), self.study, reason
         if study.targets.last[0] != "reduced_pressure":
-            reason = "has no reduced pressures for targets; allowed: a study with them, whose last one is where to turn"
+            reason = "has no reduced pressures as targets; allowed: a study with them; unloading begins at the last one"
             yield ("study",), self.study, reason
         yield from super()._study_problems(campaign, study)
 

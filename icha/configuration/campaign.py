@@ -271,7 +271,7 @@ class Campaign(Section):
             if cells is not None and cells < 4 * (1 - ROUNDING):
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
-                    f"{variant}; 4 are the least advisable, 8 recommended"
+                    f"{variant}; recommended: 8, at least 4"
                 )
             elif (
                 cells is not None
@@ -286,7 +286,7 @@ class Campaign(Section):
             if topography is not None and (topography.rms_slope or 0) > _STEEP:
                 found.append(
                     f"surfaces.{origin}: the topography has an rms slope of {topography.rms_slope:g}{variant}; check "
-                    "its units of height and length, its size, and whether a number stands for points that are missing"
+                    "its units of height and length, its size, and whether some number stands for missing points"
                 )
         return found
 

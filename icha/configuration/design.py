@@ -156,7 +156,7 @@ def _zip_problems(at, study, lists) -> Iterator[Problem]:
                 yield (*at, "zip", index, position), name, f"is no list of this study; allowed: {allowed}"
                 continue
             if one in seen:
-                yield (*at, "zip", index, position), name, "goes along with two other lists; allowed: every list once"
+                yield (*at, "zip", index, position), name, "is in two groups; allowed: every list in one group only"
             seen.add(one)
             lengths[name] = len(lists[one])
         if len(set(lengths.values())) > 1:
@@ -188,7 +188,7 @@ class _Variants:
                 self.problems[location[:4]] = (
                     location[:4],
                     value,
-                    f"surface {surface!r} is of another kind; allowed: surfaces of kind {kinds}, or a study each",
+                    f"surface {surface!r} is of another kind; allowed: surfaces of kind {kinds}, or separate studies",
                 )
         seed = point["seed"][1] if self._campaign.surfaces[surface].random else 0
         return Contact(
@@ -220,7 +220,7 @@ class _Variants:
         name = "-".join([base, *(f"{key}{value_label(made, key)}" for key in changes)])
         if name in getattr(self._campaign, section):
             location, value = next(iter(changes.values()))
-            reason = f"gives {base!r} a variant called {name!r}, which is there; allowed: another name for that"
+            reason = f"gives {base!r} a variant named {name!r}, but this name is taken; allowed: rename that entry"
             self.problems[(section, name)] = (location, value, reason)
         self.derived[section][name] = made
         self.origin[section, name] = base

@@ -86,7 +86,7 @@ class Measurement(Section):
     @classmethod
     def _columns_differ(cls, value, info):
         if "load" in info.data and info.data["load"].column == value.column:
-            raise ValueError(f"column {value.column!r} is the load's; allowed: another one")
+            raise ValueError(f"column {value.column!r} is that of the load; allowed: another one")
         return value
 
     @model_validator(mode="after")

@@ -153,7 +153,7 @@ def _addressable(value: str) -> str:
         if char in ' <>"{}|\\^`':
             raise ValueError(f"holds {char!r}, which no web address can; allowed: none, or {quote(char)!r} for it")
         if char.isspace() or not char.isprintable():
-            raise ValueError(f"holds {char!r}, which no web address can; allowed: characters that are seen")
+            raise ValueError(f"holds {char!r}, which no web address can; allowed: visible characters")
     return value
 
 

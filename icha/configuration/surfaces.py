@@ -75,7 +75,7 @@ class SelfAffineSurface(Section):
         if value * short / period < 2 * (1 - ROUNDING):
             least = math.ceil(2 * period / short * (1 - ROUNDING))
             raise ValueError(
-                f"gives {value * short / period:.3g} grid cells per shortest wavelength, 2 are the least; "
+                f"gives {value * short / period:.3g} grid cells per shortest wavelength, but at least 2 are needed; "
                 f"allowed: at least {least}, advisable: {2 * least} or more"
             )
         return value

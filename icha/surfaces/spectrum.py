@@ -150,8 +150,7 @@ class SelfAffineSpectrum:
             )
         if cells < 4 * (1 - _ROUNDING):
             warnings.warn(
-                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; 4 are the least advisable, "
-                "8 recommended",
+                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; recommended: 8, at least 4",
                 stacklevel=2,
             )
         kx, ky, k, inside = self._band

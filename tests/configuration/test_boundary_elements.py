@@ -20,7 +20,7 @@ BAD = {
     "loops of a study that does not come back": (
         "boundary_element_loops",
         {"both": {"study": "one"}},
-        "boundary_element_loops.both.study: 'one' does not come straight back",
+        "boundary_element_loops.both.study: 'one' does not unload after its targets",
     ),
     "loops of no study": ("boundary_element_loops", {"both": {"study": "two"}}, "'two' is not defined; allowed: one"),
     "boundary elements of no study": (

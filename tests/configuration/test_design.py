@@ -56,7 +56,7 @@ BAD = {
     "list together twice": (
         "studies.one.zip",
         [["rms_slopes", "seeds"], ["seeds", "materials"]],
-        "studies.one.zip[1][0]: 'seeds' goes along with two other lists",
+        "studies.one.zip[1][0]: 'seeds' is in two groups",
     ),
     "case of an unknown surface": (
         "studies.one.cases",
