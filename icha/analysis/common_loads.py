@@ -33,7 +33,7 @@ _AVERAGED = (
 _STATISTICS = {
     "mean": "mean of {} over the seeds",
     "deviation": "standard deviation of {} over the seeds",
-    "confidence": "half the width of the 95 % band of confidence of the mean of {} over the seeds (Student's t)",
+    "confidence": "half the width of the 95 % confidence interval of the mean of {} over the seeds (Student's t)",
 }
 
 

@@ -73,7 +73,7 @@ class BesideStudy(Section):
                     yield (key, index), value, f"is not in study {self.study!r}; allowed: {allowed}"
         contacts = campaign.solved(self)
         if not contacts:
-            yield (), self.study, "has no run with the chosen labels together; allowed: combinations that the study has"
+            yield (), self.study, "has none of the chosen combinations; allowed: combinations that the study has"
         for name in dict.fromkeys(each.surface for each in contacts):
             if campaign.boundary(name) != "periodic":
                 reason = (

@@ -5,11 +5,11 @@ from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Variable, terms
 _OF_VARIANT, _OF_CATEGORY, _PAIR = ("variant", "reduced_pressure"), ("category", "reduced_pressure"), ("pair",)
 
 ERROR_SOURCES = {
-    "variant": Variable(("variant",), "1", "what was solved", str, coordinate=True),
+    "variant": Variable(("variant",), "1", "variant that was solved", str, coordinate=True),
     "reduced_pressure": terms("reduced_pressure", along=("reduced_pressure",))["reduced_pressure"]._replace(
         coordinate=True
     ),
-    "category": Variable(("category",), "1", "what spots and patches lie on each other", str, coordinate=True),
+    "category": Variable(("category",), "1", "group of spots and patches that overlap", str, coordinate=True),
     **terms("contact_area_fraction", along=_OF_VARIANT),
     "mean_separation": Variable(_OF_VARIANT, "m", "mean separation from the surface's own mean plane"),
     **terms("reduced_separation", along=_OF_VARIANT),
@@ -30,6 +30,6 @@ ERROR_SOURCES = {
     **terms(*MATERIAL, *ROUGHNESS, "period"),
     "grid": Variable((), "1", "nodes of the surface along a side", int),
     "refinement": Variable((), "1", "boundary elements per cell of the surface's grid, along a side", int),
-    "tolerance": Variable((), "1", "error of the boundary elements' solver at which it was to stop"),
+    "tolerance": Variable((), "1", "error of the boundary elements' solver at which it may stop"),
     **terms("seed"),
 }

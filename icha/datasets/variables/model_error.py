@@ -21,45 +21,45 @@ MODEL_ERROR = {
     ),
     "contact_area_fraction_raw": Variable((), "1", "fraction of the boundary elements' nodes in contact"),
     "perimeter_correction": Variable(
-        (), "1", "fraction of the nodes in contact over the area corrected by the contact's perimeter, less 1"
+        (), "1", "fraction of the nodes in contact over the area corrected by the contact's perimeter, minus 1"
     ),
     "energetic_area_fraction": Variable(
         (), "1", "energy of adhesion of boundary elements over that of full contact; the raw area without adhesion"
     ),
     "reduced_separation": Variable((), "1", "mean separation over rms height, of the model"),
     "reduced_separation_boundary_elements": Variable((), "1", "mean separation over rms height, of boundary elements"),
-    "area_error": Variable((), "1", "contact area of the model over that of boundary elements, less 1"),
+    "area_error": Variable((), "1", "contact area of the model over that of boundary elements, minus 1"),
     "energetic_area_error": Variable(
         (),
         "1",
-        "contact area of the model over the energetic area of boundary elements, less 1; area_error without adhesion",
+        "contact area of the model over the energetic area of boundary elements, minus 1; area_error without adhesion",
     ),
-    "separation_error": Variable((), "1", "mean separation of the model over that of boundary elements, less 1"),
+    "separation_error": Variable((), "1", "mean separation of the model over that of boundary elements, minus 1"),
     "gap_distribution_distance": Variable(
         (),
         "1",
-        "first Wasserstein distance between the distributions of the gap over the nominal area, over rms height; "
-        "contact, and what overlaps in the model, has gap 0",
+        "first Wasserstein distance between the distributions of the gap over the nominal area, in units of the rms "
+        "height; contact, and what overlaps in the model, has gap 0",
         further=_UNKEPT,
     ),
     "pressure_distribution_distance": Variable(
         (),
         "1",
-        "first Wasserstein distance between the distributions of the contact pressure over the nominal area, over the "
-        "nominal pressure",
+        "first Wasserstein distance between the distributions of the contact pressure over the nominal area, in units "
+        "of the nominal pressure",
         further=_UNKEPT,
     ),
-    "jaccard": Variable((), "1", "area in contact in both over area in contact in either", further=_UNKEPT),
+    "jaccard": Variable((), "1", "area in contact in both over area in contact in at least one", further=_UNKEPT),
     "shared_of_icha": Variable((), "1", "area in contact in both over area in contact in the model", further=_UNKEPT),
     "shared_of_boundary_elements": Variable(
         (), "1", "area in contact in both over area in contact in boundary elements", further=_UNKEPT
     ),
-    "load_error": Variable((), "1", "nominal pressure of boundary elements over the one asked for, less 1"),
+    "load_error": Variable((), "1", "nominal pressure of boundary elements over the one asked for, minus 1"),
     "residual": Variable(
         (),
         "1",
-        "error of the boundary elements' solver: its criterion of convergence, without a range the largest deviation "
-        "from 1 of the root of energy release rate over surface energy",
+        "error of the boundary elements' solver: its criterion of convergence; in the limit of short range, the "
+        "largest deviation from 1 of sqrt(energy release rate over surface energy)",
     ),
     "solution_grid": Variable((), "1", "boundary elements along a side", int),
     "gap_density": Variable(

@@ -6,7 +6,7 @@ _APPROACH, _LOAD = ("approach",), ("given_load",)
 
 ONE_ASPERITY = {
     "approach": Variable(_APPROACH, "m", "approach of the summit to the mean plane", coordinate=True),
-    "given_load": Variable(_LOAD, "N", "force by boundary elements, held", coordinate=True),
+    "given_load": Variable(_LOAD, "N", "force by boundary elements, given to ICHA as load", coordinate=True),
     "force_boundary_elements": Variable(_APPROACH, "N", "force by boundary elements"),
     "zero_gap_area": Variable(_APPROACH, "m^2", "area of zero gap by boundary elements, corrected by its perimeter"),
     "energetic_area": Variable(_APPROACH, "m^2", "energy of adhesion by boundary elements over the surface energy"),
@@ -23,15 +23,15 @@ ONE_ASPERITY = {
     "force_error": Variable(
         _APPROACH,
         "1",
-        "ICHA's force less the boundary elements', over the larger of the latter and ICHA's pull-off force",
+        "ICHA's force minus that of boundary elements, over the larger of the latter and ICHA's pull-off force",
     ),
-    "zero_gap_area_error": Variable(_APPROACH, "1", "ICHA's area over that of zero gap, less 1, at the same approach"),
+    "zero_gap_area_error": Variable(_APPROACH, "1", "ICHA's area over that of zero gap, minus 1, at the same approach"),
     "energetic_area_error": Variable(
-        _APPROACH, "1", "ICHA's area over the energetic one, less 1, at the same approach"
+        _APPROACH, "1", "ICHA's area over the energetic one, minus 1, at the same approach"
     ),
-    "zero_gap_area_error_at_load": Variable(_LOAD, "1", "ICHA's area over that of zero gap, less 1, at the same load"),
+    "zero_gap_area_error_at_load": Variable(_LOAD, "1", "ICHA's area over that of zero gap, minus 1, at the same load"),
     "energetic_area_error_at_load": Variable(
-        _LOAD, "1", "ICHA's area over the energetic one, less 1, at the same load"
+        _LOAD, "1", "ICHA's area over the energetic one, minus 1, at the same load"
     ),
     "approach_error_at_load": Variable(
         _LOAD,

@@ -32,13 +32,13 @@ RUN = {
     "mean_separation": Variable(
         _STEP,
         "m",
-        "mean separation of the surfaces; of a free square that of its mean plane and the half-space far away",
+        "mean separation of the surfaces; for a free square, that of its mean plane and the half-space far away",
     ),
     "mean_gap": Variable(
         _STEP,
         "m",
-        "mean gap over the nominal area; of a periodic surface the mean separation, of a free square less or more by "
-        "what the half-space is displaced there",
+        "mean gap over the nominal area: for a periodic surface, the mean separation; for a free square, it differs by "
+        "the mean displacement of the half-space there",
     ),
     "nominal_pressure": Variable(_STEP, "Pa", "force over nominal area"),
     **terms("contact_area_fraction", along=_STEP),
@@ -53,7 +53,7 @@ RUN = {
     "jump_in_count": Variable(_STEP, "1", "contacts formed so far", int),
     "jump_off_count": Variable(_STEP, "1", "contacts broken so far", int),
     "coalescence_count": Variable(_STEP, "1", "unions of two spots so far", int),
-    "split_count": Variable(_STEP, "1", "united spots so far that let go and left asperities in contact", int),
+    "split_count": Variable(_STEP, "1", "united spots so far that detached and left asperities in contact", int),
     "pending_count": Variable(
         _STEP, "1", "asperities past jump-in left free after breaking contact at the same step", int
     ),
@@ -65,7 +65,7 @@ RUN = {
     "area_beyond_edges": Variable(
         _SNAPSHOT,
         "1",
-        "part of the nominal area by which spots reach over the edges of a free square; 0 of a periodic surface",
+        "part of the nominal area by which spots extend beyond the edges of a free square; 0 for a periodic surface",
     ),
     "gap_density": Variable(_GAP_BIN, "m^-1", "probability density of the gap over the nominal area"),
     "pressure_density": Variable(
@@ -82,10 +82,10 @@ RUN = {
     "spot_perimeter": Variable(_SPOT, "m", "length of the edge of the contact area"),
     "spot_force": Variable(_SPOT, "N", "contact force, negative in tension"),
     "spot_curvature_radius": Variable(
-        _SPOT, "m", "radius of curvature of the spot's paraboloid, of boundary elements that of its highest summit"
+        _SPOT, "m", "radius of curvature of the spot's paraboloid; for boundary elements, that of its highest summit"
     ),
     "spot_members": Variable(
-        _SPOT, "1", "number of asperities united in the spot, of boundary elements that of the summits in it", int
+        _SPOT, "1", "number of asperities united in the spot; for boundary elements, of the summits in it", int
     ),
     **terms(*MATERIAL, *ROUGHNESS),
     "spectral_moment_0": Variable((), "m^2", "spectral moment m0 of a profile: variance of its height"),
@@ -102,7 +102,7 @@ RUN = {
     "united_until": Variable(
         (),
         "1",
-        "until when united spots stay united on the way back: detachment or overlap; empty for boundary elements",
+        "how long united spots stay united on the way back: detachment or overlap; empty for boundary elements",
         str,
     ),
 }
@@ -112,9 +112,9 @@ PATCHES = {
     "front_residual": Variable(
         _STEP,
         "1",
-        "largest deviation from 1 along the edges of contact of the root of energy release rate over surface energy",
+        "largest deviation from 1, along the edges of contact, of sqrt(energy release rate over surface energy)",
     ),
-    "gap_residual": Variable(_STEP, "1", "largest gap in contact, or overlap out of it, over h_rms"),
+    "gap_residual": Variable(_STEP, "1", "largest gap in contact, or overlap out of contact, over h_rms"),
     "contact_map": Variable((*_SNAPSHOT, *CELLS), "1", "part of the cell that is in contact", np.float32),
     "contact_pressure": Variable((*_SNAPSHOT, *CELLS), "Pa", "pressure in the cell, negative in tension", np.float32),
 }
@@ -129,7 +129,7 @@ CYCLE = {
         "work done on the contact since first contact, -(integral of p du), "
         "cubic between steps, by pressure and contact stiffness, and at constant pressure in a jump under load control",
     ),
-    "stored_energy": Variable(_STEP, "J m^-2", "elastic energy less that of adhesion, 0 out of contact"),
+    "stored_energy": Variable(_STEP, "J m^-2", "elastic energy minus that of adhesion; 0 out of contact"),
     "dissipated_by_jump_in": Variable(_STEP, "J m^-2", "energy lost so far as contacts formed"),
     "dissipated_by_jump_off": Variable(_STEP, "J m^-2", "energy lost so far as contacts broke"),
     "dissipated_by_coalescence": Variable(_STEP, "J m^-2", "energy lost so far as spots united or unions were undone"),
