@@ -147,7 +147,7 @@ class JKR:
         """Derivative of `displacement` with respect to a, for a > 0 (dimensionless).
 
         The neck's part, sqrt(a)/sqrt(r^2 - a^2), is singular at the edge; within 2.5 % of the radius from it the value
-        there is used: no spot's centre is so near to another in equilibrium, and a Newton step needs no wilder slope.
+        there is used: in equilibrium no spot's centre is so near to another, and a Newton step needs no steeper slope.
         """
         outside = r > a
         arc = np.arcsin(np.where(outside, a / np.maximum(r, a), 1.0))

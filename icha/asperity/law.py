@@ -1,4 +1,4 @@
-"""The law of one spot: what the equilibrium of many asks of the contact of one asperity with the half-space."""
+"""The law of one spot: what the equilibrium of many spots needs to know of the contact of one asperity."""
 
 from typing import Protocol
 

@@ -22,9 +22,9 @@ def stickiness(moments: SpectralMoments, material: Material) -> float:
 
         (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03,
 
-    is that it exceeds 1. h' is the rms slope, h'' the rms Laplacian. They ask for an attraction of short range, whose
-    area stays small beside A: J. M. Monti, A. Sanner and L. Pastewka, Tribol. Lett. 69 (2021),
-    doi:10.1007/s11249-021-01454-6. The range of the material stands for r.
+    is that it exceeds 1. h' is the rms slope, h'' the rms Laplacian. The criterion needs an attraction of short range,
+    whose area stays small compared with A: J. M. Monti, A. Sanner and L. Pastewka, Tribol. Lett. 69 (2021),
+    doi:10.1007/s11249-021-01454-6. Here r is the range of the material.
 
     Parameters
     ----------

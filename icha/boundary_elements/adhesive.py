@@ -59,7 +59,7 @@ def settled(
 ) -> tuple[Held, int]:
     """The contact in equilibrium at a separation (cells), and how many summits within reach it left open.
 
-    tolerance: of sqrt(G/dgamma) along the fronts. near: whether they are so near to rest that this shows at once where
+    tolerance: of sqrt(G/dgamma) along the fronts. near: whether they are already so near to rest that it is clear where
     new contact forms.
 
     Fronts come nearly to rest first; then all summits within reach make contact, until there is none, and fronts come

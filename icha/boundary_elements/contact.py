@@ -111,7 +111,7 @@ class BoundaryElements:
     ) -> CellState:
         """The contact brought to another mean separation (m), or to a given load or area; as of `ContactModel`.
 
-        Fronts lose their equilibrium together or alone without anybody's help: `let_go` changes nothing.
+        Fronts lose their equilibrium by themselves, together or alone, so that `let_go` changes nothing.
         """
         if control is None:
             new = self._at(state, separation)
@@ -142,7 +142,7 @@ class BoundaryElements:
         return 1 - BEYOND_EDGES * edges(state.cells, self.space.grid)
 
     def gap(self, state: CellState) -> np.ndarray:
-        """Gap at the nodes, (n, n), m; zero in contact but for what bonds are drawn out."""
+        """Gap at the nodes, (n, n), m; zero in contact, except for the extension of bonds."""
         displaced = self.space.displacement(state.cells, state.pressure / self.contact_modulus)
         return displaced * self.spacing + state.separation - self.heights
 
@@ -151,7 +151,7 @@ class BoundaryElements:
         return self.space.on_grid(state.cells, state.fraction)
 
     def mean_gap(self, state: CellState) -> float:
-        """Mean gap over the nominal area, m: the mean separation, for pressures displace no mean plane."""
+        """Mean gap over the nominal area, m: the mean separation, since pressures do not displace the mean plane."""
         return state.separation
 
     def spot_count(self, state: CellState) -> int:
@@ -171,7 +171,7 @@ class BoundaryElements:
         return float(np.sum(self._energy_of_cells(state))) / self.heights.size
 
     def is_unstable(self, state: CellState) -> bool:
-        """Whether it is on an unstable branch: what is found here lies at a minimum of energy."""
+        """Whether it is on an unstable branch: never, since what is found here is a minimum of energy."""
         return False
 
     def events_between(self, before: CellState, after: CellState) -> Events:

@@ -110,14 +110,14 @@ def solve_bonds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pressures p with (K + bonds) p = wanted on cells, zero elsewhere; and what is left of `wanted`.
 
-    Corrections are found in single precision, and what they leave is found in double.
+    Corrections are computed in single precision, the remaining error in double precision.
 
     Parameters
     ----------
     cells : (k,), counted through. bonds, wanted : (k,), compliances and displacements. pressure : (k,), to start from.
     tolerance : of the displacement, in cells. kind : np.float32 for displacements, (n, n), in single precision. gain :
-    in single precision, what may be left of the error at the start. balanced : pressures change by nothing in sum, and
-    `wanted` is wanted but for a constant.
+    in single precision, what may be left of the error at the start. balanced : the sum of the pressures does not
+    change, and `wanted` is met up to a constant.
 
     Raises
     ------
@@ -180,8 +180,8 @@ def held(
 ) -> Held:
     """The elastic equilibrium of given fractions of contact.
 
-    Bonds pull only: cells that are partly in contact and come under pressure close. Where the surfaces would overlap
-    they touch, under pressure: whether they also stick is for the front to say.
+    Bonds only pull: cells that are partly in contact and come under pressure close. Where the surfaces would overlap,
+    they touch under pressure; the front decides whether they also stick.
 
     Parameters
     ----------

@@ -7,8 +7,8 @@ linearly with the gap and does the work dgamma (A. A. Griffith, Phil. Trans. A 2
 a straight front, times a factor: then a front moves through its cells without being trapped by them, and what is
 between open and closed is about two cells wide.
 
-Such a front lies by a constant part of a cell within the sum of its fractions. An area that counts cells by their
-neighbours,
+The edge of contact lies inside that of the sum of fractions, by a constant part of a cell. An area that counts cells
+by their neighbours,
 
     A = sum f - b sum f (1 - w*f),   w a Gaussian stencil,
 
@@ -92,7 +92,7 @@ def area_gradient(around: np.ndarray) -> np.ndarray:
 
 
 def contact_areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
-    """Contact area of every cell as it is told, in cells.
+    """Contact area of every cell as it is reported, in cells.
 
     `areas` is what the energy of adhesion needs; how far the sum of fractions lies outside the edge of contact depends
     on how wide the front is, which cells partly in contact say. With both terms the radius of spots of 4 to 16 cells
@@ -102,7 +102,7 @@ def contact_areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
 
 
 def contact_area_gradient(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
-    """Change of the whole area, as it is told, with the fraction of every cell."""
+    """Change of the whole area, as it is reported, with the fraction of every cell."""
     whole = 1 - _EDGE - _WIDE + 2 * _EDGE * around + 2 * _WIDE * fraction
     return np.where(1 - _EDGE * (1 - around) - _WIDE * (1 - fraction) > _LEAST, whole, _LEAST)
 

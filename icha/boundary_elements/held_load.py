@@ -39,7 +39,7 @@ def under_control(
 
     separation: a first guess, m. settle: the equilibrium at a separation, from a state, to a tolerance of the front;
     near: whether the state is next to it, same_slopes: and has its slopes. events: those between two states.
-    Where events may happen on the way nothing is passed: a trial that goes too far is taken back.
+    Where events may happen on the way, none is skipped: a trial that goes too far is taken back.
 
     Raises
     ------

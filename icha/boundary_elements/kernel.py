@@ -23,7 +23,7 @@ _CACHE, _COLUMNS, _LARGE = 2_000_000, 32, 2048
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace:
-    """Fourier kernel of a periodic half-space on an n x n grid, or of many that know nothing of each other.
+    """Fourier kernel of a periodic half-space on an n x n grid, or of many independent ones.
 
     shape: of fields, (n, n), or (t, n, n) for t grids. Arrays are (n, n//2 + 1). compliance: of the half-space, by
     precision. stiffness: its approximate inverse, which is asked for in single precision only.
@@ -64,9 +64,9 @@ class HalfSpace:
         return filtered(self.shape, cells, pressure, self.compliance[pressure.dtype], at)
 
     def pressure(self, cells: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """The pressures in E* on cells (k,), rising, that displace them so if nothing else is displaced; nearly.
+        """Approximate pressures in E* on cells (k,), rising, that displace them so if nothing else is displaced.
 
-        Their mean is made up, for conditioning alone.
+        Their mean is arbitrary and only serves the conditioning.
         """
         return filtered(self.shape, cells, displacement, self.stiffness, cells)
 

@@ -118,7 +118,7 @@ def front_at_rest(
     """The contact in equilibrium at a separation (cells), down in energy from that of a given one.
 
     contact: if it is `Held`, at this separation. tolerance: of sqrt(G/dgamma) along the front. near: whether it is not
-    far from rest. most_steps: after which it is as near to rest as it is. beyond: of a window, what the contact outside
+    far from rest. most_steps: after which it is returned as it is. beyond: of a window, what the contact outside
     adds to the mean fraction around every cell, a field. mended: where few cells, (m,), of a contact are far from rest,
     the contact with these at rest, if a short way leads there.
 
@@ -194,7 +194,7 @@ class _Given:
         return COMPLIANCE * self.front.strength
 
     def at(self, contact, off):
-        """A contact in elastic equilibrium; its displacement to so much of the reach."""
+        """A contact in elastic equilibrium; its displacement is accurate to this part of the reach."""
         return held(self.space, self.topography, self.separation, contact, off * self.reach, self.beyond)
 
     def energy(self, state):

@@ -1,8 +1,8 @@
-"""Fronts that are far from rest in few places come to rest there, in windows around these, while nothing else moves.
+"""Fronts that are far from rest in a few places come to rest there, in windows around them; nothing else moves.
 
 After two or three of Newton's steps nearly all of a front is at rest, and steps of the whole contact go on for the sake
-of some cells: where contact has just been made, where two patches meet. What these do is nobody else's concern before
-it is done.
+of some cells: where contact has just been made, where two patches meet. What happens there
+does not concern the rest before it is done.
 """
 
 from __future__ import annotations

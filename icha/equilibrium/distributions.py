@@ -38,8 +38,8 @@ class PressureDistribution:
 def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
     """Fraction of every node's cell that lies in contact, (n, n), exact for discs.
 
-    Its mean is the contact area fraction to rounding, spots being disjoint; of a free square without what lies beyond
-    its edges.
+    Its mean is the contact area fraction to rounding, since spots are disjoint; for a free square, without what lies
+    beyond its edges.
     """
     grid, centres, radii = surface.grid, spots.position, spots.contact_radius
     period, free = surface.period, surface.free
@@ -59,8 +59,9 @@ def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndar
 def gap_distribution(law: SpotLaw, surface: Surface, state: ContactState) -> GapDistribution:
     """P(u) from the gap field; cells on the edge of a spot count with the part that lies outside.
 
-    integral of P(u) + A/A0 + overlap = 1; of a free square 1 and what its spots have beyond the edges. The part outside
-    of a cell whose node lies inside a spot has gap zero: it is the spot's edge. The field is never held as a whole.
+    integral of P(u) + A/A0 + overlap = 1; for a free square, 1 plus what its spots have beyond the edges. Where the
+    node of a cell lies inside a spot, the outer part of the cell has gap zero: it is the spot's edge. The field is
+    never held as a whole.
 
     Raises
     ------

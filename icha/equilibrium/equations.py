@@ -1,4 +1,4 @@
-"""The equations of equilibrium, eq. (4), at given approaches, and how far these are from fulfilling them.
+"""The equations of equilibrium, eq. (4), and their error at given approaches.
 
 The unknowns are the local approaches delta_i of the spots in contact:
 

@@ -1,7 +1,7 @@
 """Equilibrium of all contact spots at a given mean separation, load or contact area: Newton's steps and events.
 
 With adhesion contact forms and breaks in jumps. As soon as Newton's iteration is close to an equilibrium, all jumps and
-unions that apply happen at once, and it goes on from there.
+unions that apply happen at once, and the iteration goes on from there.
 
 Unions are undone when the surfaces part: as the problem says, where a united spot detaches, which then falls back into
 its asperities (those that a stable state of the law holds stay in contact), or before, where the two spots that it was
@@ -90,7 +90,7 @@ def equilibrium(
 
 
 def happen(search: Search, point: Point, margin: float) -> tuple[Search, bool]:
-    """The search after all jumps and unions that hang by more than the margin (m); and whether there were any."""
+    """The search after all jumps and unions that are due by more than the margin (m); and whether there were any."""
     problem = search.problem
     covered = held_value(problem, AREA_FRACTION, point.a, search.sites.radius_of_curvature)
     if covered > _FULL_CONTACT:
@@ -119,7 +119,7 @@ def _without_swallowed(search, point, control):
 
 
 def _united_for_descent(search, point, margin, size):
-    """With spots united of which one's edge runs through another, where the equations are singular."""
+    """With those spots united where the edge of one runs through another, so that the equations are singular."""
     before = search.at(point.approach)
     search = unite(before, point, margin)
     if search is before:
@@ -157,7 +157,7 @@ def _state(search, point, control):
 
 
 def _contact_or_not(search, point):
-    """Without adhesion: who has come into contact in the iteration, and who has lost it, single asperities alone."""
+    """Without adhesion: which single asperities have come into contact in the iteration, and which have lost it."""
     sites, status, holder = search.sites, search.sites.status.copy(), search.holder.copy()
     made = np.flatnonzero((status == TRIAL) & (point.approach > 0))
     status[made] = CONTACT

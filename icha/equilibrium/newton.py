@@ -1,7 +1,7 @@
 """Newton's method for the equations of equilibrium, without events, by an inexact Krylov solver.
 
-It runs over sites: the spots and, without adhesion, the asperities that may come into contact; there a negative
-approach exerts nothing, and who is in contact comes out of the iteration.
+It runs over sites: the spots and, without adhesion, the asperities that may come into contact. There a negative
+approach means no force, and the iteration decides which sites are in contact.
 """
 
 from dataclasses import replace
@@ -32,7 +32,7 @@ _NEXT_TO_JUMP_OFF = 0.2
 def descend(equations: Equations, point: Point, size: float) -> tuple[Point, bool, bool]:
     """A Newton step, shortened until the error falls below its `size`; or, where it does not, the point as it was.
 
-    Whether it falls, and whether a rough solution of the linear equations was not enough.
+    Also returns whether it falls, and whether a rough solution of the linear equations was not enough.
     """
     for exact in (False, True):
         step, du = _step(equations, point, exact)
@@ -114,7 +114,7 @@ def _step(equations, point, exact):
 def _moved(equations, point, step):
     """Approaches (n,) after a step of theirs.
 
-    At jump-off the radius goes with the root of the approach that is left; in terms of the radius the equations
+    At jump-off the radius goes with the square root of the approach that is left; in terms of the radius the equations
     are smooth there. So a step towards jump-off is taken as one of the radius, and one back over it ends there
     first, and then solves the quadratic equation that the radius obeys.
     """
@@ -150,7 +150,7 @@ def _drawn_back(sites, point):
 
 
 def _solve(apply, b, tolerance):
-    """Solve apply(x) = b roughly; the caller sees how good the answer is by what becomes of the equations."""
+    """Solve apply(x) = b approximately; the caller checks the answer by the error of the equations."""
     size = len(b)
     operator = LinearOperator((size, size), matvec=apply, dtype=float)
     x, _ = gmres(operator, b, rtol=tolerance, atol=0.0, restart=min(size, _KRYLOV), maxiter=2)

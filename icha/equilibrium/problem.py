@@ -1,4 +1,4 @@
-"""The problem: a law of one spot, the summits of one surface, and until when united spots stay united."""
+"""The problem: a law of one spot, the summits of one surface, and how long united spots stay united."""
 
 from dataclasses import dataclass, field
 

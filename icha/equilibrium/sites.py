@@ -1,4 +1,4 @@
-"""Sites: the places where contact is, or may come out of the iteration, as an immutable table."""
+"""Sites: the places where contact is, or may form in the iteration, as an immutable table."""
 
 from __future__ import annotations
 

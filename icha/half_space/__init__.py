@@ -1,1 +1,1 @@
-"""The elastic half-space between the spots: who displaces whom by how much."""
+"""The elastic half-space between the spots: the displacement that every spot causes at the others."""

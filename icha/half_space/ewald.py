@@ -5,9 +5,9 @@ counter-pressure that keeps the mean displacement zero, the sum is split as Ewal
 erf(alpha r)/r goes through its Fourier series, (2/(E* q)) erfc(q/(2 alpha)) per mode and cell area, by non-uniform
 FFTs; the rest is short-ranged and pairwise.
 
-A square on a free half-space, which goes on beyond it and is pressed by nothing else, is put into a cell of twice its
-side, where all ways between its points are the shortest; what images and counter-pressure do there is taken off again
-(`icha.half_space.free_square`), and the plain sum of F/(pi E* r) is left.
+A square on a free half-space, which extends beyond it and is not loaded elsewhere, is put into a cell of twice its
+side, where the direct way between any two of its points is the shortest one. The displacement by images and
+counter-pressure is subtracted again (`icha.half_space.free_square`), so that the plain sum of F/(pi E* r) remains.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def _point_kernels(r, alpha, contact_modulus):
 class Ewald:
     """How the sum is split: reach of the near field and floor of the moments' fields (m), and the smooth sums.
 
-    period: of the sum, m. free: whether only the quarter [0, period/2]^2 counts, and what its images do is taken off.
+    period: of the sum, m. free: whether only the quarter [0, period/2]^2 counts, without the effect of its images.
     """
 
     period: float
@@ -171,7 +171,7 @@ class Ewald:
         return 0.5 * self.period if self.free else self.period
 
     def bases(self, points):
-        """What the images' displacement at points (n, 2), or by spots there, is made of; None if images count."""
+        """Polynomials for the images' displacement at points (n, 2), or by spots there; None if images stay."""
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
     def by_images(self, sources, targets, moments):
@@ -201,7 +201,7 @@ class Ewald:
 
     @cached_property
     def once(self):
-        """The split for a sum whose pairs serve only once."""
+        """The split for a sum whose pairs are used only once."""
         return replace(self, reach=self.reach * np.sqrt(NEIGHBOURS_ONCE / NEIGHBOURS))
 
     @cached_property
@@ -221,7 +221,7 @@ class Ewald:
         return _point_kernels(np.maximum(r, self.floor), self.alpha, self.contact_modulus)
 
     def replaced(self, r):
-        """Displacement at distances r by unit moments k = 0, 1, 2 in all, as the sum over points gives it."""
+        """Whole displacement at distances r by unit moments k = 0, 1, 2, as the sum over points gives it."""
         held = np.maximum(r, self.floor)
         force, moment = 1 / held, 1 / held**3
         fourth = np.where(r <= self.reach, 1 / held**5, 0.0)
@@ -246,7 +246,7 @@ class HalfSpace:
     pairs : near pairs as (later, earlier, distance), each pair once.
     near : three (n, n) lower triangular matrices, the short-ranged displacement by the moments k = 0, 1, 2.
     near_transposed : their transposes.
-    near_loose : the displacement by forces, what matters to a thousandth, and its transpose.
+    near_loose : the displacement by forces, accurate to a thousandth, and its transpose.
     bases : of the points, for their images on a free half-space.
     """
 

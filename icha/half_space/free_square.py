@@ -1,8 +1,9 @@
-"""A single square on a free half-space: the images of a periodic sum within a quarter of its cell, to be rid of.
+"""A single square on a free half-space: how to remove the images from a periodic sum in a quarter of its cell.
 
 A square on a free half-space is put into a periodic cell of twice its side. There the nearest image of a point is as
-far from the square as the square is wide, so that the images' displacement is smooth: Lagrange's polynomials through a
-few Chebyshev nodes hold it (the error falls as 5.8^-n), and the periodic sum less that is the plain sum of 1/r.
+far from the square as the square is wide, so that the images' displacement is smooth. It is interpolated by Lagrange's
+polynomials through a few Chebyshev nodes (the error falls as 5.8^-n) and subtracted from the periodic sum, which leaves
+the plain sum of 1/r.
 """
 
 from functools import lru_cache
@@ -97,7 +98,7 @@ def image_potential(y, x):
 def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
     """Mean displacement of a square of a free half-space by point forces (n,) at (n, 2) in it, m.
 
-    By reciprocity it is that of the points under an even pressure on the square, whose four rectangles around a point
+    By reciprocity it is that of the points under a uniform pressure on the square, whose four rectangles around a point
     give x asinh(y/x) + y asinh(x/y) each.
     """
     x, y = ([along, side - along] for along in np.clip(position.T, 0.0, side))

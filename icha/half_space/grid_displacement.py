@@ -1,10 +1,10 @@
-"""Displacement of the half-space at all nodes of a grid, and the spots around which something changes there.
+"""Displacement of the half-space at all nodes of a grid, and the nodes around every spot.
 
 The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half through its Fourier series and
-a short-ranged half around every spot. A field has as many targets as nodes, so that the area of the windows around the
-spots is what it costs, and many moments of a spot's pressure pay: four of them represent it from five radii on. In
-return the smooth half of a large spot must be smooth on the scale of that spot: spots are put into groups of like
-size, every group with a Fourier series of its own length.
+a short-ranged half around every spot. A field has as many targets as nodes, so that its cost is the area of the windows
+around the spots. More moments of a spot's pressure make the windows smaller: four moments represent it from five radii
+on. In return, the smooth half of a large spot must be smooth on the scale of that spot. So spots are put into groups of
+similar size, and every group has a Fourier series of its own length.
 
 With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot far away displaces by sum_k M_k Lap^k (1/(pi E* r)),
 and its Fourier transform is that of a point with sum_k M_k (-q^2)^k in the place of its force.

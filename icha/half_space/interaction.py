@@ -1,6 +1,6 @@
 """Elastic interaction of contact spots: the displacement at every one by all others and all images, eq. (4)'s sum.
 
-A spot is no point. Within eight of its radii its exact displacement is taken; farther away an axisymmetric pressure
+A spot is not a point. Within eight of its radii its exact displacement is taken; farther away an axisymmetric pressure
 acts by its moments, integral of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4, 9/64, whose fields fall as 1/r, 1/r^3
 and 1/r^5. The third is only needed where the field is summed pairwise. Images farther than half the cell act by the
 first two. What depends on the positions alone, nearly everything, is computed once (`icha.half_space.ewald`); only the

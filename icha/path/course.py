@@ -1,4 +1,4 @@
-"""How far a path has come: for those who wait for it, and for the reason why it ends."""
+"""How far a path has come, to show its progress and to say why it ends."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Course:
     def require_covered(
         self, before: State, after: State, stop: Stop | None, waiting: list[Stop], loading: bool
     ) -> None:
-        """Refuse a state, at a stop or before those that wait, that the model does not cover."""
+        """Refuse a state that the model does not cover, at a stop or before stops that are still to come."""
         contact = self.contact
         what = (stop or waiting[0]).target.named() if stop or waiting else "separation"
         area = contact.area_fraction(after)
@@ -59,7 +59,7 @@ class Course:
             raise self.ended(after, loading, NotConverged(reason))
 
     def ended(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Where the path ended and why; a surface that sticks together by itself is called so."""
+        """Where the path ended and why; says so if the surfaces stick together by themselves."""
         contact, failures = self.contact, (*self.missed, *failures)
         sticky = ""
         # Without a load, adhesion alone has spread the contact, or the very first one does not come to rest.
@@ -76,7 +76,7 @@ class Course:
 
 
 def halved(step: float, longest: float, failure: NotConverged) -> float:
-    """Half the step after an equilibrium that was not found; the failure is raised where no step helps."""
+    """Half the step, after an equilibrium was not found; raises the failure where no shorter step helps."""
     if step / 2 < _SMALLEST_STEP * longest:
         raise failure
     return step / 2

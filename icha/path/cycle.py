@@ -1,4 +1,4 @@
-"""To and fro: every equilibrium of a path that goes on after the first loading.
+"""Loading and unloading: every equilibrium of a path that goes on after the first loading.
 
 The way back follows the stable branch of every spot until it jumps off, up to complete separation or to a turning
 point. It stops at the separations of the way in, so that both can be compared; where an event changes the pressure the

@@ -1,4 +1,4 @@
-"""The energy balance of a path: of the work done on a contact part is stored, the rest is lost in jumps.
+"""The energy balance of a path: a part of the work done on a contact is stored, the rest is lost in jumps.
 
 Between two events the stored energy changes by the work done. An event, at a given separation, changes the energy at
 once; what it sets free is lost. Over a closed path the losses of all events make up the area of the loop, the integral
@@ -39,7 +39,8 @@ class Step:
     def between(cls, contact: ContactModel, before: State, after: State) -> Step:
         """The step from one state to the next.
 
-        The integral is that of the cubic with the pressures and stiffnesses at both ends; what jumps, jumps half way.
+        The integral is that of the cubic with the pressures and stiffnesses at both ends; jumps are taken to happen
+        half way.
         """
         events = contact.events_between(before, after)
         width = after.separation - before.separation
@@ -74,7 +75,7 @@ class Step:
 
     @property
     def unresolved(self) -> float:
-        """Bound of what is not known of the work, for not knowing where in the step its events happen, J/m^2."""
+        """Bound of the error of the work, since it is not known where in the step its events happen, J/m^2."""
         return 0.5 * abs(self.pressure_jump * self.width)
 
 
@@ -101,10 +102,10 @@ class EnergyBalance:
     def after(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """The balance after one more step.
 
-        A step with jumps alone has lost its energy in them, if it is about what they would lose, were their spots
-        alone, or not small beside the work; those of both kinds share it as if every spot were alone. Otherwise, and
-        where spots also united, they have lost just what their spots would alone. The rest is that of unions and their
-        undoing, where there were any, and else unattributed.
+        A step whose only events are jumps has lost its energy in them, if this is about what they would lose if their
+        spots were alone, or if it is not small compared with the work; both kinds of jumps share it as if every spot
+        were alone. Otherwise, and where spots also united, jumps have lost just what their spots would lose alone. The
+        rest belongs to unions and their undoing, where there were any, and is otherwise unattributed.
         """
         events, united = step.events, step.unites
         jump_in, jump_off = (

@@ -1,4 +1,4 @@
-"""Load control: of the states of a path those that are visited when the load is imposed."""
+"""Load control: which states of a path are visited when the load is imposed."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -12,7 +12,7 @@ from icha.path.waypoints import Waypoint, between_stops
 
 
 def under_load(contact: ContactModel, waypoints: Iterable[Waypoint]) -> Iterator[Waypoint]:
-    """Of the states of a path under separation control those that load control visits, with their balances.
+    """Those states of a path under separation control that load control visits, with their balances.
 
     Where the pressure would have to go back, the state jumps at constant pressure to where the curve goes on; with the
     last contact, to where nothing touches any more.

@@ -57,8 +57,8 @@ class Path:
     unload : whether the path ends with complete separation, met by the stops once more on the way.
     control : "separation": the mean separation is imposed. "load": the load is; the state runs along the same curve
         and jumps, at constant load, where it would have to turn back. Then all stops and turning points are loads.
-    united_until : until when united spots stay united on the way back: "overlap", where the two spots that they were
-        made of would just touch, or "detachment", where they let go as a whole and fall back into their asperities.
+    united_until : how long united spots stay united on the way back: "overlap", where the two spots that they were
+        made of would just touch, or "detachment", where they detach as a whole and fall back into their asperities.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in (0, 0.5].
 
     Raises

@@ -1,4 +1,4 @@
-"""What a path hands out: its equilibria, one after the other."""
+"""What a path yields: its equilibria, one after the other."""
 
 from dataclasses import dataclass
 

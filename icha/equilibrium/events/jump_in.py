@@ -1,7 +1,7 @@
 """Jump-in: free asperities whose approach reaches that at which contact forms, eq. (3), become sites.
 
 Without adhesion contact forms at an approach of zero and without a jump: there all asperities are sites that may come
-into contact, and who does comes out of the iteration.
+into contact, and the iteration decides which do.
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
 """Jump-off: spots past the end of their stable branch break contact, and united ones fall into their asperities.
 
-Of a united spot those asperities stay in contact that a stable state of the law holds: `jump_in` sees to that.
+Those asperities of a united spot that have a stable state of the law stay in contact; `jump_in` does this.
 """
 
 from dataclasses import replace

@@ -19,7 +19,7 @@ from icha.surfaces.square import periodic_difference
 def unite(search: Search, point: Point, margin: float = 0.0, *, deep: bool = False) -> Search:
     """Overlapping spots replaced by their equivalents.
 
-    margin : error of the approaches in m, beyond whose effect they have to overlap.
+    margin : error of the approaches in m; spots unite if they overlap by more than its effect.
     deep : only those of which one covers the other's centre.
     """
     sites, law, period, a = search.sites, search.problem.law, search.problem.asperities.cell, point.a
