@@ -78,9 +78,9 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     Dataset on two grids of loads, `reduced_pressure` and `relative_load`, each over the range that all complete runs
     cover (of length zero where there is no such range) between stops of their first loading. On each, with the suffix
     `_at_load` on the second: `contact_area_fraction` and `reduced_separation` along the labels of the runs; over the
-    seeds mean, standard deviation and half the width of the 95 % band of confidence of both (`area_mean`,
+    seeds mean, standard deviation and half the width of the 95 % confidence interval of both (`area_mean`,
     `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
-    `material_spread` and `slope_spread`, the largest over the smallest area of all materials (slopes), less one. Runs
+    `material_spread` and `slope_spread`, the largest over the smallest area of all materials (slopes), minus one. Runs
     that are not complete lack values, as `status` says, and do not count; `seed_count` says how many seeds there are of
     every model, surface, slope and material. A single one has no deviation and no band: they are missing.
     """
@@ -158,7 +158,7 @@ def _spreads(on_grid):
 
 
 def mean_curve(curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: bool) -> tuple[np.ndarray, Ensemble]:
-    """Mean of the curves of an ensemble, one for each seed, at common positive loads, with its band of confidence.
+    """Mean of the curves of an ensemble, one for each seed, at common positive loads, with its confidence band.
 
     Parameters
     ----------

@@ -130,9 +130,9 @@ def has_groups(path: str | os.PathLike) -> bool:
 
 
 def read_campaign(path: str | os.PathLike) -> xr.DataTree:
-    """Read a campaign dataset into memory, but for large arrays; errors as `read_dataset`.
+    """Read a campaign dataset into memory, except for large arrays; errors as `read_dataset`.
 
-    What takes more than 64 MB, as distributions of thousands of runs do, stays in the file until it is used; of a
+    What takes more than 64 MB, as distributions of thousands of runs do, stays in the file until it is used; for a
     single run (`icha.datasets.campaign.select_run`) only its own part is then read.
     """
     with readable(path):

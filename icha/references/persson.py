@@ -57,7 +57,7 @@ def persson_mean_separation(reduced_pressure, spectrum):
 def persson_stiffness(reduced_pressure, spectrum):
     r"""Contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures, in the theory of Yang & Persson (2008).
 
-    The derivative of `persson_mean_separation`, in closed form but for the integral over the wave numbers:
+    The derivative of `persson_mean_separation`, in closed form except for the integral over the wave numbers:
 
         -p du/dp = sqrt(pi) int dq q^2 C(q) w(q) [gamma + 3 (1 - gamma) P^2] exp(-(w p/E*)^2).
 

@@ -1,7 +1,7 @@
 r"""Theories of separate summits: spheres on a rigid plane of heights, each in contact as if it were alone.
 
 Pressures are reduced, p* = p/(E* h'_rms), and separations are those of the plane against the mean plane of the rough
-surface over h_rms: in these theories nothing moves but what a summit flattens, so that is the mean separation. Sources:
+surface over h_rms: in these theories only the summits deform, so that this is the mean separation. Sources:
 
 - Bush, Gibson & Thomas: Wear 35 (1975) 87-111, doi:10.1016/0043-1648(75)90145-3.
 - Greenwood & Williamson: Proc. R. Soc. Lond. A 295 (1966) 300-319, doi:10.1098/rspa.1966.0242; with the summits of a
@@ -103,8 +103,8 @@ def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Ma
     moments : of the surface, at its own rms slope.
     material : its range of attraction plays no part.
     pulled : whether the surfaces are pulled apart after every summit has been in contact. Then, as in Fuller & Tabor,
-        summits hold on until their approach falls to that of jump-off. When surfaces approach each other, as here
-        unless told, the law knows no attraction at a distance: a summit is in contact from approach 0 on, where it
+        summits hold on until their approach falls to that of jump-off. When surfaces approach each other, which is
+        the default, the law has no attraction at a distance: a summit is in contact from approach 0 on, where it
         jumps to the radius (2 pi dgamma R^2/E*)^(1/3) and is in tension.
     """
     law = JKR(material)

@@ -22,7 +22,7 @@ class Ensemble(NamedTuple):
 
 
 def ensemble(samples, axis: int = 0) -> Ensemble:
-    """Mean over an axis and its band of confidence by Student's t, which holds for members of a normal distribution.
+    """Mean over an axis and its confidence band by Student's t, which holds for normally distributed members.
 
     Parameters
     ----------

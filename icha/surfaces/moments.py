@@ -1,4 +1,4 @@
-"""Spectral moments, which are what statistical theories know of a rough surface, and its radial power spectrum.
+"""Spectral moments, by which statistical theories describe a rough surface, and its radial power spectrum.
 
 Surfaces are taken to be isotropic: the moments are those of a profile along any direction, as in P. R. Nayak, J.
 Lubr. Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.

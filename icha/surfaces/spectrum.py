@@ -125,7 +125,7 @@ class SelfAffineSpectrum:
 
         Parameters
         ----------
-        grid : nodes along a side. At least 2 per shortest wavelength (an error below, a warning under 4).
+        grid : nodes along a side. At least 2 per shortest wavelength (fewer are an error, fewer than 4 a warning).
         seed : seed of the random phases, a non-negative integer.
         amplitudes : "fixed" by the spectrum (height and slope are then the same for every seed), or "gaussian".
 

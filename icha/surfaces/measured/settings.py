@@ -32,7 +32,7 @@ class Preparation:
     missing : "refuse" or "fill".
     crop : x, y, side (m) of the square; None: the largest, in the middle.
     detrend : "none", "tilt" or "curvature".
-    taper : of a window, part of the side on which it falls at either edge.
+    taper : with a window, the part of the side over which heights fall at each edge.
     grid : nodes along a side of the result; None: as the scan.
     """
 
