@@ -441,9 +441,8 @@ the same as the ratio of wall times. *Computation / ICHA's* is the ratio of the 
 largest resident memory. ICHA and `aspher` had the machine to themselves. Another code had not, where its wall time is
 longer than its processor time; there the ratio of the computations flatters ICHA by as much. Like the other codes, ICHA
 is asked for bare numbers (`icha.path.follow`). The labelled dataset of `icha.simulate` costs another 1.5 s, nearly all
-of it for the import of xarray. At 256² and 512² most of ICHA's time goes into its imports. The loads are 20 reduced
-pressures
-p\\* = p/(E\\* h'_rms) from 5e-4 to 8e-2 in geometric progression. The surfaces have
+of it for the import of xarray. At 256² and 512² most of ICHA's time goes into its imports. The loads are
+20 reduced pressures p\\* = p/(E\\* h'_rms) from 5e-4 to 8e-2 in geometric progression. The surfaces have
 the spectrum of the challenge (period 100 µm, roll-off 20 µm, Hurst exponent 0.8, rms slope 1) down to waves of eight
 grid cells, so that every grid has all the waves that it can resolve as recommended for ICHA.
 
