@@ -169,7 +169,7 @@ BAD = {
     "invisible character in an address": (
         "publication",
         {"funding": [{"funder": "A", "award_url": "https://a.org/\u200b"}]},
-        "award_url: 'https://a.org/\\u200b' holds '\\u200b', which no web address can; allowed: characters that are",
+        "award_url: 'https://a.org/\\u200b' holds '\\u200b', which no web address can; allowed: visible characters",
     ),
     "community by its title": (
         "publication",
