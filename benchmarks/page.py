@@ -564,23 +564,27 @@ def _stages(results) -> str:
 
 def draw_sweep(results, path: Path) -> None:
     """Processor time of a sweep over the nodes along a side, one line per code."""
-    figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(1, 2, figsize=(9, 4.4), sharey=True, layout="constrained")
+    others = sorted({run["code"] for run in chosen(results, "sweep-")} - {"icha"})
+    colours = {"icha": "black"} | {code: f"C{number}" for number, code in enumerate(others)}
+    lines = {}
     for axis, adhesion in zip(axes, (False, True), strict=True):
         runs = chosen(results, "sweep-", adhesion=adhesion, threads=1, outcome="complete")
         for code, control in sorted({(run["code"], run["control"]) for run in runs}):
             line = sorted(
                 (run["grid"], run["processor"]) for run in runs if (run["code"], run["control"]) == (code, control)
             )
-            style = {"lw": 2.5, "color": "black"} if code == "icha" else {}
-            style |= {"marker": "o", "ls": "--" if control == "gap" else "-"}
-            axis.loglog(*zip(*line, strict=True), label=f"{code}, given {control}s", **style)
+            style = {"lw": 2.5 if code == "icha" else 1.5, "ls": "--" if control == "gap" else "-"}
+            (lines[f"{code}, given {control}s"],) = axis.loglog(
+                *zip(*line, strict=True), marker="o", color=colours[code], **style
+            )
         axis.set_title(WITH[adhesion])
         axis.set_xlabel("nodes along a side")
         axis.set_xticks(grids(results), [str(grid) for grid in grids(results)], minor=False)
         axis.set_xticks([], minor=True)
         axis.grid(alpha=0.3)
-        if runs:
-            axis.legend(fontsize=8)
+    if lines:
+        figure.legend(lines.values(), lines.keys(), loc="outside lower center", ncols=4, fontsize=8)
     axes[0].set_ylabel("processor time of the process, s")
     _save(figure, path)
 
