@@ -26,7 +26,7 @@ from functools import cache
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from icha.boundary_elements.kernel import HalfSpace, filtered
+from icha.boundary_elements.kernel import HalfSpace
 
 # Compliance of the last row of a straight contact, with the kernel 2/q, over h/E*. The front's own is larger by a
 # factor at which circular spots, wherever in their cells, follow JKR (docs/short_range.md).
@@ -55,7 +55,7 @@ def _neighbour_modes(grid: int, kind: np.dtype) -> np.ndarray:
 
 def neighbours(space: HalfSpace, cells: np.ndarray, fraction: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
     """w*f: mean fraction of contact around cells (m,), rising, or around all; of fractions on cells (k,), rising."""
-    return filtered(space.shape, cells, fraction, _neighbour_modes(space.grid, fraction.dtype), at)
+    return space.filtered(cells, fraction, _neighbour_modes(space.grid, fraction.dtype), at)
 
 
 def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:

@@ -61,14 +61,29 @@ class HalfSpace:
 
         At cells (m,), rising, or everywhere.
         """
-        return filtered(self.shape, cells, pressure, self.compliance[pressure.dtype], at)
+        return self.filtered(cells, pressure, self.compliance[pressure.dtype], at)
 
     def pressure(self, cells: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """Approximate pressures in E* on cells (k,), rising, that displace them so if nothing else is displaced.
 
         Their mean is arbitrary and only serves the conditioning.
         """
-        return filtered(self.shape, cells, displacement, self.stiffness, cells)
+        return self.filtered(cells, displacement, self.stiffness, cells)
+
+    def filtered(
+        self, cells: np.ndarray, values: np.ndarray, factor: np.ndarray, at: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Periodic fields whose Fourier modes are multiplied by factors, (n, n//2 + 1), in the precision of the values.
+
+        The field has values (k,) on cells, rising, and is zero elsewhere. The result is given at cells (m,), rising,
+        or everywhere.
+        """
+        if len(self.shape) > 2 or self.size * values.itemsize < _CACHE:
+            modes = scipy.fft.rfft2(self.on_grid(cells, values, values.dtype), workers=1)
+            modes *= factor
+            field = scipy.fft.irfft2(modes, s=self.shape[-2:], overwrite_x=True, workers=1)
+            return field if at is None else field.ravel()[at]
+        return _filtered_by_blocks(self.grid, cells, values, factor, at)
 
     def on_grid(self, cells: np.ndarray, values: np.ndarray | float, kind: type = float) -> np.ndarray:
         """A field of given values on cells (k,), counted through, and zero elsewhere."""
@@ -82,26 +97,11 @@ def in_both_precisions(field: np.ndarray) -> dict[np.dtype, np.ndarray]:
     return {np.dtype(kind): field.astype(kind, copy=False) for kind in (np.float64, np.float32)}
 
 
-def filtered(
-    shape: tuple[int, ...], cells: np.ndarray, values: np.ndarray, factor: np.ndarray, at: np.ndarray | None = None
-) -> np.ndarray:
-    """Periodic fields of a shape, (..., n, n), their Fourier modes times factors, (n, n//2 + 1), in that precision.
-
-    The field has values (k,) on cells, rising, and is zero elsewhere. It is told at cells (m,), rising, or everywhere.
-    """
-    grid = shape[-1]
-    if len(shape) > 2 or grid**2 * values.itemsize < _CACHE:
-        field = np.zeros(shape, values.dtype)
-        field.ravel()[cells] = values
-        modes = scipy.fft.rfft2(field, workers=1)
-        modes *= factor
-        field = scipy.fft.irfft2(modes, s=(grid, grid), overwrite_x=True, workers=1)
-        return field if at is None else field.ravel()[at]
-
-    # Some rows or columns at a time, while they are in the cache, and rows without any of the cells not at all.
+def _filtered_by_blocks(grid, cells, values, factor, at):
+    """As `HalfSpace.filtered`, some rows or columns at a time, while they are in the cache; empty rows not at all."""
     each = on_cores if grid >= _LARGE else _one_by_one
     modes = np.empty((grid, grid // 2 + 1), np.result_type(values.dtype, np.complex64))
-    found = np.empty(shape if at is None else len(at), values.dtype)
+    found = np.empty((grid, grid) if at is None else len(at), values.dtype)
     rows = blocks(grid, max(_CACHE // (2 * grid * values.itemsize), 1))
     starts = grid * np.array([some.start for some in rows] + [grid])
     given, asked = np.searchsorted(cells, starts), None if at is None else np.searchsorted(at, starts)

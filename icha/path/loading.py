@@ -29,10 +29,11 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
     while waiting:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
             state = first_contact  # nothing happens on the way there
-        nearest, way = _nearest(waiting, state)
+        nearest, expected = _nearest(waiting, state)
+        way = state.separation - expected
         try:
             if way <= step and missed < _TRIALS:
-                stop, beyond = nearest, _straight(nearest, waiting, state, step)
+                stop, beyond = nearest, _straight(nearest, expected, waiting, state, step)
                 if beyond is None:
                     # A shorter way helps; if it does not, the stop is looked for between two states.
                     missed = missed + 1 if way > _LONG * longest else _TRIALS
@@ -67,16 +68,16 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
 
 
 def _nearest(waiting: list[Stop], state: State) -> tuple[Stop, float]:
-    """The stop that seems to come next, and how far away it seems, m."""
+    """The stop that seems to come next, and the separation at which it is expected, m."""
     expected = {stop: stop.expected_separation(state) for stop in waiting}
     stop = max(expected, key=expected.get)
-    return stop, state.separation - expected[stop]
+    return stop, expected[stop]
 
 
-def _straight(stop: Stop, waiting: list[Stop], state: State, step: float) -> State | None:
+def _straight(stop: Stop, expected: float, waiting: list[Stop], state: State, step: float) -> State | None:
     """The state at a stop that seems no farther than a step; None if it is not met there after all, or not first."""
     try:
-        met = stop.meet(state, stop.expected_separation(state))
+        met = stop.meet(state, expected)
     except NotConverged:
         return None
     same = SAME_SEPARATION * stop.contact.rms_height
