@@ -22,7 +22,10 @@ include: "workflow/rules/publish.smk"
 before_jobs.end_jobs_with_this_process()
 
 if workflow.is_main_process:
+    origin = before_jobs.Origin(RESULTS, CAMPAIGN.name, CONFIGURATION.origin, workflow.basedir)
     here = before_jobs.Campaign(RESULTS, dry_run=workflow.output_settings.dryrun)
+    if Path(RESULTS).is_dir() and not workflow.output_settings.dryrun:
+        origin.claim()  # those of an older version, of which nothing may be left to do
 
 
 onstart:
@@ -32,6 +35,7 @@ onstart:
     here.refuse_unwritable()
     if DeploymentMethod.CONDA not in workflow.deployment_settings.deployment_method:
         here.refuse_without(missing_software(CAMPAIGN))
+    origin.claim()
 
 
 # On a cluster these are run where Snakemake runs, and not submitted: targets, and what is soon done.

@@ -1,6 +1,7 @@
 """What is done before Snakemake decides on its jobs, and before it starts them."""
 
 import atexit
+import contextlib
 import gc
 import json
 import os
@@ -11,6 +12,7 @@ from pathlib import Path
 from campaign_lock import hold_lock
 from snakemake.logging import logger
 
+from icha.planning.belonging import belongs_to_another, claim
 from icha.support import checksums
 from icha.support.atomic_files import why_not_writable
 
@@ -47,6 +49,21 @@ def start_without_limit(workflow) -> None:
     """
     if workflow.local_exec:
         workflow.scheduler.job_rate_limiter = None
+
+
+class Origin:
+    """The configuration file of a campaign, to which its results are to belong."""
+
+    def __init__(self, results: str, name: str, file: str, project: str):
+        """Refuse results that belong to another file, before anything of them is touched."""
+        self.results, self.file, self.project = Path(results), Path(file).resolve(), Path(project)
+        if reason := belongs_to_another(self.results, name, self.file, self.project):
+            raise SystemExit(f"{reason} Nothing was computed.")
+
+    def claim(self) -> None:
+        """Record that the results belong to it, where that can be written."""
+        with contextlib.suppress(OSError):
+            claim(self.results, self.file, self.project)
 
 
 class Campaign:

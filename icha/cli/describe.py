@@ -26,6 +26,7 @@ def describe(
     """
     from rich.console import Console
 
+    from icha.planning.belonging import belongs_to_another
     from icha.planning.needs import wanting
     from icha.planning.plan import plan
     from icha.planning.software import missing_software
@@ -44,6 +45,8 @@ def describe(
     if runs:
         _list(console, items)
     _summary(console, items, spoilt, count)
+    if reason := belongs_to_another(shown(results), campaign.name, path, found):
+        console.print(f"[red]not to be run:[/] {reason}", highlight=False, soft_wrap=True)
     if missing := missing_software(campaign):
         console.print(f"[red]missing:[/] {missing}", highlight=False, soft_wrap=True)
     for lack in wanting(items, count, results, profile_settings(found / "profiles/default")):

@@ -79,6 +79,7 @@ def run(
     path = configuration_path(config)
     campaign = read_configuration(path).campaign
     folder = (folder or home).resolve()
+    _refuse_results_of_another(folder / "results" / campaign.name, campaign.name, path, home)
     command = [
         *(sys.executable, "-m", "snakemake", *asked),
         *("--snakefile", str(home / "Snakefile"), "--directory", str(folder)),
@@ -123,6 +124,13 @@ def run(
         print(f"deposit: {shown(folder / 'results' / campaign.name / 'publish' / deposit)}")
     if status:
         raise typer.Exit(FAILED)
+
+
+def _refuse_results_of_another(results: Path, name: str, path: Path, home: Path) -> None:
+    from icha.planning.belonging import belongs_to_another
+
+    if reason := belongs_to_another(shown(results), name, path, home):
+        raise Mistake(f"{reason} Nothing was begun")
 
 
 def _profile(asked: str, home: Path) -> Path:

@@ -24,6 +24,7 @@ from icha.configuration.load import load_configuration
 from icha.configuration.settings import run_sha256
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
+from icha.planning.belonging import belongs_to_another, claim
 from icha.planning.constants import FITTED
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, start_up, time_on, total
 from icha.support.checksums import damaged, write_checksum
@@ -244,6 +245,43 @@ def test_what_is_there_is_told_from_what_is_to_do(project):
     assert told.exit_code == 0
     assert "4 runs, 2 to do" in told.output and "1 run there, but with other settings" in told.output
     assert f"failed: runs/{failed.path}.nc: {reason}" in " ".join(told.output.split())
+
+
+def test_results_of_another_file_of_the_same_name_are_left_alone(project, monkeypatch):
+    def begun(*_):
+        raise SystemExit(BEGUN)
+
+    monkeypatch.setattr(sys.modules["icha.cli.run"], "_follow", begun)
+    for file in ("tiny.yaml", "copy.yaml"):
+        Path(file).write_text(TINY)
+    record = project / "results/tiny/belongs_to.txt"
+    record.parent.mkdir(parents=True)
+    record.write_text("tiny.yaml\n")
+    message = "results/tiny belongs to tiny.yaml, and copy.yaml has the same `name: tiny`: its results would replace"
+    ways_out = ("Give copy.yaml another `name:`;", "remove results/tiny/belongs_to.txt")
+    for command, status in (("describe", 0), ("run", 2)):
+        refused = icha(command, "copy.yaml")
+        told = " ".join(refused.output.split())
+        assert refused.exit_code == status and message in told and all(way in told for way in ways_out)
+        assert "belongs to" not in icha(command, "tiny.yaml").output
+    assert icha("run", "copy.yaml", "--dry-run").exit_code == 2
+    assert icha("run", "copy.yaml", "--directory", "elsewhere").exit_code == BEGUN
+    assert record.read_text() == "tiny.yaml\n"
+    record.unlink()
+    assert icha("run", "copy.yaml").exit_code == BEGUN
+
+
+def test_the_kept_configuration_belongs_to_its_results(project):
+    results = project / "results/tiny"
+    results.mkdir(parents=True)
+    (results / "config.used.yaml").write_text(TINY)
+    claim(results, results / "config.used.yaml", project)
+    assert not (results / "belongs_to.txt").exists()
+    claim(results, project / "tiny.yaml", project)
+    claim(results, project / "copy.yaml", project)
+    assert (results / "belongs_to.txt").read_text() == "tiny.yaml\n"
+    assert belongs_to_another(results, "tiny", results / "config.used.yaml", project) is None
+    assert belongs_to_another(results, "tiny", project / "config/../tiny.yaml", project) is None
 
 
 def test_files_that_were_cut_off_are_damaged_and_to_do_again(project):
