@@ -27,7 +27,7 @@ def campaign_configuration(workflow) -> Configuration:
         )
     except ConfigurationError as error:
         raise SystemExit(f"The configuration cannot be run:\n{error}") from None
-    for warning in configuration.campaign.warnings():
+    for warning in configuration.warnings:
         logger.warning(f"Warning: {warning}")
     return configuration
 

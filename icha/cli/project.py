@@ -97,7 +97,7 @@ def read_configuration(path: Path):
         configuration = load_configuration(path)
     except ConfigurationError as error:
         raise Mistake(f"the configuration cannot be run:\n{error}") from None
-    for warning in configuration.campaign.warnings():
+    for warning in configuration.warnings:
         typer.secho(f"Warning: {warning}", err=True, fg="yellow")
     return configuration
 

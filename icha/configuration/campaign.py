@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import (
+    AfterValidator,
     Field,
     PrivateAttr,
 )
@@ -37,6 +38,7 @@ from icha.support.values import (
     Problem,
     Section,
     Text,
+    distinct,
 )
 
 # Sections of entries that belong to a study.
@@ -83,6 +85,11 @@ class Campaign(Section):
     title: Text = Field(description="One line that says what the campaign is.")
     summary: Text = Field(description="A few sentences for readers of the datasets and of the report.")
     license: Text = Field(description="Licence of the data, as an SPDX identifier such as `CC-BY-4.0`.")
+    confirmed: Annotated[list[Text], AfterValidator(distinct)] = Field(
+        default=[],
+        description="Keys of values that are unusual and meant, such as `materials.soft.contact_modulus`; all entries "
+        "of a list by the key of the list. Others that are unusual are refused.",
+    )
     defaults: Defaults = Field(
         default=Defaults(), description="Values for all surfaces, materials or studies that do not give their own."
     )

@@ -13,6 +13,7 @@ from icha.configuration.defaults import merged, place_in_defaults, with_defaults
 from icha.configuration.design import designed
 from icha.configuration.errors import ConfigurationError, line, problem_of
 from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.configuration.plausibility import CONFIRMED, plausibility_problems, unusual_values
 from icha.configuration.values import MEASURED
 from icha.configuration.yaml_files import dumped, read_yaml
 from icha.support.checksums import sha256_of
@@ -25,12 +26,14 @@ class Configuration:
     """A valid campaign and where it came from.
 
     `text` is the merged configuration as its author wrote it, units included; `campaign` is what it means, in SI
-    units and with the paths of its files resolved; `origin` is its file.
+    units and with the paths of its files resolved; `origin` is its file, and `warnings` are what is allowed but not
+    advisable, or unusual.
     """
 
     campaign: Campaign
     text: str
     origin: str = field(compare=False)
+    warnings: tuple[str, ...] = field(compare=False, default=())
 
 
 def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | None = None) -> Configuration:
@@ -50,10 +53,16 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     from_file = read_yaml(path)
     written = merged(from_file, overrides or {})
     content = with_defaults(written)
+    unusual = unusual_values(written)
+    # Told with whatever else is wrong, of which they may be the cause.
+    slips = list(plausibility_problems(unusual, written.get(CONFIRMED)))
+
+    def said(location, *what):
+        return line(_origin(path, from_file, overrides or {}, location), location, *what)
 
     def fail(found: Iterable[Problem]):
         found = [(place_in_defaults(location, written), value, reason) for location, value, reason in found]
-        lines = [line(_origin(path, from_file, overrides or {}, problem[0]), *problem) for problem in found]
+        lines = [said(*problem) for problem in [*found, *slips]] if found else []
         if lines:
             raise ConfigurationError("\n".join(dict.fromkeys(lines)))
 
@@ -66,8 +75,9 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     topographies, unread = _topographies(campaign)
     fail(unread)
     campaign = campaign.with_topographies(topographies)
-    fail(campaign.problems())
-    return Configuration(campaign, dumped(written), str(path))
+    fail([*campaign.problems(), *slips])
+    confirmed = [said(each.location, each.value, f"is unusual, but confirmed; usual: {each.usual}") for each in unusual]
+    return Configuration(campaign, dumped(written), str(path), (*campaign.warnings(), *confirmed))
 
 
 def _origin(path: Path, from_file: Mapping, overrides: Mapping, location: tuple) -> str:

@@ -83,7 +83,9 @@ def test_a_new_campaign_is_valid_as_it_is(project, options):
     written = icha("new", "mine", *options)
     assert written.exit_code == 0 and "config/campaigns/mine.yaml written" in written.output
     file = project / "config/campaigns/mine.yaml"
-    campaign = load_configuration(file).campaign
+    configuration = load_configuration(file)
+    campaign = configuration.campaign
+    assert configuration.warnings == ()
     assert campaign.name == "mine" and ("pull" in campaign.studies) == ("--pull-off" in options)
     first = file.read_text().splitlines()[0]
     schema = file.parent / first.removeprefix("# yaml-language-server: $schema=")
@@ -194,6 +196,20 @@ def test_a_wrong_configuration_says_all_that_is_wrong(project):
         refused = icha(command, "wrong.yaml")
         assert refused.exit_code == 2
         assert "wrong.yaml: materials.cmc.contact_modulus" in refused.output and "grid: 6" in refused.output
+
+
+def test_slips_are_refused_and_warned_of_once_they_are_confirmed(project):
+    text = TINY.replace("25 MPa", "25 mPa", 1)
+    Path("slip.yaml").write_text(text)
+    for command in ("describe", "run"):
+        refused = icha(command, "slip.yaml")
+        assert refused.exit_code == 2
+        assert "slip.yaml: materials.bare.contact_modulus: '25 mPa' is unusual; usual: 1 kPa to" in refused.output
+        assert "`confirmed: [materials.bare.contact_modulus]` at the top level" in refused.output
+    Path("slip.yaml").write_text(f"{text}confirmed: [materials.bare.contact_modulus]\n")
+    told = icha("describe", "slip.yaml")
+    assert told.exit_code == 0
+    assert "Warning: slip.yaml: materials.bare.contact_modulus: '25 mPa' is unusual, but confirmed" in told.output
 
 
 def test_outside_of_a_project_the_program_says_so(tmp_path, monkeypatch):

@@ -1,0 +1,115 @@
+"""Values that are allowed and almost surely slips, as a rule of their unit: what is usual, and what is meant anyway.
+
+An unusual value is refused unless the list `confirmed` of the campaign names its key; then it is warned of.
+"""
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from icha.support.units import to_number, to_si
+from icha.support.values import Problem
+
+CONFIRMED = "confirmed"
+# Where keys of that name are quantities; in all other sections they are not, or are names of what is in these.
+_SECTIONS = ("defaults", "surfaces", "materials", "studies")
+
+
+class Usual(NamedTuple):
+    """The usual values of a key, and why they end there."""
+
+    si_unit: str
+    least: str
+    most: str
+    why: str
+    or_zero: bool = False
+
+    def holds(self, value: Any) -> bool:
+        """Whether a value, as it is written, is usual; what is no such value at all is refused elsewhere."""
+        try:
+            number = self._read(value)
+        except ValueError:
+            return True
+        return (self.or_zero and number == 0) or self._read(self.least) <= number <= self._read(self.most)
+
+    def _read(self, value):
+        return to_number(value) if self.si_unit == "1" else to_si(value, self.si_unit)
+
+    def __str__(self):
+        """The range and its reason, as messages give them."""
+        return f"{'0 or ' if self.or_zero else ''}{self.least} to {self.most} ({self.why})"
+
+
+_SIDE = Usual("m", "1 nm", "1 m", "from a few atoms to a machine part")
+_WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
+_SLOPE = Usual("1", "1e-4", "5", "from superpolished mirrors, 1e-3, to fracture surfaces, about 1")
+# By key. Wide on purpose: what is asked for by reason lies in it, a wrong prefix of a unit as a rule does not.
+USUAL = {
+    "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond against something rigid, 1150 GPa"),
+    "surface_energy": Usual(
+        "J/m^2",
+        "0.001 mJ/m^2",
+        "3 J/m^2",
+        "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2",
+        True,
+    ),
+    "interaction_range": Usual(
+        "m",
+        "0.05 nm",
+        "1 um",
+        "of bonds a fraction of an atom, of van der Waals forces some nm, of a model's rarely more",
+    ),
+    "period": _SIDE,
+    "size": _SIDE,
+    "rolloff_wavelength": _WAVE,
+    "short_wavelength": _WAVE,
+    "rms_slope": _SLOPE,
+    "rms_slopes": _SLOPE,
+}
+
+
+class Unusual(NamedTuple):
+    """An unusual value: where it is written, the value, and what is usual there."""
+
+    location: tuple
+    value: Any
+    usual: Usual
+
+    @property
+    def key(self) -> str:
+        """How `confirmed` calls it: all entries of a list by the key of the list."""
+        return ".".join(part for part in self.location if isinstance(part, str))
+
+
+def unusual_values(written: Mapping) -> list[Unusual]:
+    """All unusual values of a configuration, as it was written."""
+    return [found for section in _SECTIONS for found in _unusual((section,), written.get(section))]
+
+
+def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
+    if isinstance(value, Mapping | list):
+        inside = value.items() if isinstance(value, Mapping) else enumerate(value)
+        for part, each in inside:
+            yield from _unusual((*location, part), each)
+        return
+    name = next(part for part in reversed(location) if isinstance(part, str))
+    if name in USUAL and not USUAL[name].holds(value):
+        yield Unusual(location, value, USUAL[name])
+
+
+def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:
+    """Unusual values that are not confirmed, and what is confirmed without being unusual.
+
+    `confirmed` is the list as it is written; what is no such list is refused elsewhere.
+    """
+    confirmed = [key for key in confirmed if isinstance(key, str)] if isinstance(confirmed, list) else []
+    for each in unusual:
+        if each.key not in confirmed:
+            reason = f"is unusual; usual: {each.usual}; allowed: another value, or, if it is meant, this one with"
+            yield each.location, each.value, f"{reason} `{CONFIRMED}: [{each.key}]` at the top level"
+    keys = dict.fromkeys(each.key for each in unusual)
+    for index, key in enumerate(confirmed):
+        if key not in keys:
+            reason = (
+                f"is the key of no unusual value; allowed: {', '.join(keys) or 'nothing, for all values are usual'}"
+            )
+            yield (CONFIRMED, index), key, reason

@@ -1,0 +1,69 @@
+"""Values that are almost surely slips: refused unless confirmed, and warned of then."""
+
+import pytest
+from demo_configuration import measured_surface
+
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.plausibility import USUAL
+
+SLIPS = {
+    "materials.soft.contact_modulus": ["2 mPa", "999 Pa", "2.1 TPa"],
+    "materials.soft.surface_energy": ["5 kJ/m^2", "1e-7 J/m^2"],
+    "materials.soft.interaction_range": ["2 km", "2 um", "1e-12 m"],
+    "studies.one.rms_slopes.0": [500, "6", 1e-5],
+    "studies.one.rms_slopes.1": [500],
+}
+USUAL_ONES = {
+    "materials.soft.contact_modulus": ["1 kPa", "1 TPa"],
+    "materials.soft.surface_energy": ["0 J/m^2", "1e-6 J/m^2", "2 J/m^2"],
+    "materials.soft.interaction_range": ["0.05 nm", "1 um"],
+    "studies.one.rms_slopes": [[1e-4, 5]],
+}
+
+
+def key_of(place):
+    return place.rstrip(".01")
+
+
+@pytest.mark.parametrize(("place", "value"), [(place, value) for place, values in SLIPS.items() for value in values])
+def test_slips_are_refused_until_they_are_confirmed(place, value, load, refused, tmp_path):
+    key = key_of(place)
+    refused(place, value, f": {value!r} is unusual; usual: ")
+    refused(place, value, f"if it is meant, this one with `confirmed: [{key}]` at the top level")
+    configuration = load({place: value, "confirmed": [key]})
+    (warning,) = configuration.warnings
+    assert warning.startswith(f"{tmp_path}/campaign.yaml: {key}") and f"{value!r} is unusual, but confirmed" in warning
+
+
+@pytest.mark.parametrize(("place", "value"), [(place, value) for place, all_ in USUAL_ONES.items() for value in all_])
+def test_what_is_usual_needs_no_confirmation(place, value, load):
+    assert load({place: value}).warnings == ()
+
+
+def test_slips_are_found_wherever_values_are_written(load, refused, tmp_path):
+    refused(
+        "studies.one.vary", {"surface_energy": ["1 mJ/m^2", "1 kJ/m^2"]}, "studies.one.vary.surface_energy[1]: '1 kJ"
+    )
+    refused("studies.one.cases", [{"rms_slope": 80}], "[studies.one.cases.rms_slope]")
+    refused("surfaces.rough", measured_surface(size=["72 um", "64 m"]), "surfaces.rough.size[1]: '64 m' is unusual")
+    refused("surfaces.rough.period", "100 m", "surfaces.rough.period: '100 m' is unusual; usual: 1 nm to 1 m (")
+    moved = {"materials.soft.interaction_range": None, "defaults": {"materials": {"interaction_range": "2 mm"}}}
+    refused("", moved, "defaults.materials.interaction_range: '2 mm' is unusual")
+    with pytest.raises(ConfigurationError, match=r"^--config: materials\.soft\.contact_modulus: '25 mPa' is unusual"):
+        load(overrides={"materials": {"soft": {"contact_modulus": "25 mPa"}}})
+
+
+@pytest.mark.parametrize("entry", ["materials.soft.contact_modulus", "materials.hard.contact_modulus", "materials"])
+def test_what_is_not_unusual_cannot_be_confirmed(entry, refused):
+    refused("confirmed", [entry], f"confirmed[0]: {entry!r} is the key of no unusual value; allowed: nothing, for all")
+
+
+def test_all_slips_and_other_mistakes_of_the_design_are_named_at_once(load):
+    with pytest.raises(ConfigurationError) as error:
+        load({"materials.soft.contact_modulus": "2 mPa", "studies.one.rms_slopes": [500, 1e-6]})
+    assert len(str(error.value).splitlines()) == 3
+
+
+def test_the_usual_ranges_are_ranges_with_a_reason():
+    for usual in USUAL.values():
+        assert usual.holds(usual.least) and usual.holds(usual.most) and usual.why
