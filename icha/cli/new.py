@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import CAMPAIGNS, Mistake, project, shown
+from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, shown
 
 TEMPLATES = Path(__file__).parent / "templates"
 # Whether boundary elements stand beside the model.
@@ -48,6 +48,8 @@ def new(
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
         raise Mistake(f"{name!r} is not a name; allowed: lower-case letters, digits, '_' and '-'")
     file = folder / CAMPAIGNS / f"{name}.yaml"
+    if name in campaigns(folder) and not file.exists():
+        raise Mistake(f"{name} is the campaign of {shown(campaigns(folder)[name])}; choose another name")
     if file.exists():
         raise Mistake(f"{shown(file)} is there already; choose another name, or remove it")
     if measured is not None and boundary_elements:

@@ -73,13 +73,32 @@ def configuration_path(asked: str | None) -> Path:
         return shown(project() / DEFAULT)
     if Path(asked).is_file():
         return Path(asked)
-    named = [folder / CAMPAIGNS / f"{asked}.yaml"] if folder and Path(asked).name == asked else []
-    for path in named:
-        if path.is_file():
-            return shown(path)
-    there = sorted(path.stem for path in (folder / CAMPAIGNS).glob("*.yaml")) if folder else []
-    also = f" and no campaign of that name; there are: {', '.join(there)}" if there else ""
+    there = campaigns(folder) if folder else {}
+    if asked in there:
+        return shown(there[asked])
+    if Path(asked).is_dir():
+        raise Mistake(f"{asked}: is a folder; allowed: a YAML file, or the name of a campaign")
+    also = f" and no campaign of that name; there are: {', '.join(sorted(there))}" if there else ""
     raise Mistake(f"{asked}: no such file{also}. `icha new NAME` writes a campaign to start from")
+
+
+def campaigns(folder: Path) -> dict[str, Path]:
+    """The files of a project's campaigns by the names that commands take: the default one has that in its file."""
+    named = {path.stem: path for path in sorted((folder / CAMPAIGNS).glob("*.yaml"))}
+    default = _name_in(folder / DEFAULT)
+    return ({default: folder / DEFAULT} if default else {}) | named
+
+
+def _name_in(file: Path) -> str | None:
+    """The name of the campaign of a configuration file; None where it cannot be read, which is told when it is used."""
+    from icha.configuration.errors import ConfigurationError
+    from icha.configuration.yaml_files import read_yaml
+
+    try:
+        name = read_yaml(file).get("name")
+    except ConfigurationError:
+        return None
+    return name if isinstance(name, str) else None
 
 
 def read_configuration(path: Path):

@@ -1,5 +1,6 @@
 """YAML files of configurations, read and written: every key once, in the order in which they stand."""
 
+import codecs
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,11 +17,12 @@ def read_yaml(path: Path) -> dict:
     ConfigurationError
         If the file is missing, empty, not YAML, or holds anything else.
     """
+    text = _text_of(path)
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigurationError(f"{path}: {reason}; allowed: a readable YAML file") from None
+        content = yaml.load(text, Loader=_Loader)
+    except yaml.reader.ReaderError as error:
+        where, code = text[: error.position].count("\n") + 1, f"{error.character:#04x}"
+        raise ConfigurationError(f"{path}, line {where}: control character {code}; allowed: text alone") from None
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f", line {mark.line + 1}" if mark else ""
@@ -30,6 +32,27 @@ def read_yaml(path: Path) -> dict:
         what = "empty" if content is None else f"a {type(content).__name__}"
         raise ConfigurationError(f"{path}: the file is {what}; allowed: a YAML mapping of keys to values")
     return content
+
+
+def _text_of(path: Path) -> str:
+    try:
+        content = path.read_bytes()
+    except IsADirectoryError:
+        raise ConfigurationError(f"{path}: is a folder; allowed: a YAML file") from None
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error.strerror}; allowed: a readable YAML file") from None
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise ConfigurationError(f"{path}: is text in UTF-16; allowed: a YAML file saved in UTF-8")
+    if b"\0" in content:
+        raise ConfigurationError(f"{path}: is a binary file; allowed: a YAML file, which is text")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        where, byte = content[: error.start].count(b"\n") + 1, f"0x{content[error.start]:02x}"
+        raise ConfigurationError(
+            f"{path}, line {where}: byte {byte} is not UTF-8, so the text is in another encoding, such as Latin-1; "
+            f"allowed: a YAML file saved in UTF-8"
+        ) from None
 
 
 class _Loader(yaml.SafeLoader):

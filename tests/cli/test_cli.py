@@ -61,6 +61,23 @@ def test_every_command_explains_itself():
     assert icha("nonsense").exit_code == 2
 
 
+def test_help_fits_a_narrow_terminal():
+    commands = [each.name or each.callback.__name__ for each in app.registered_commands]
+    for command in ([], *([name] for name in commands)):
+        told = CliRunner().invoke(app, [*command, "--help"], env={"COLUMNS": "80"}).output
+        assert len(told.splitlines()) > 6
+        assert [line for line in told.splitlines() if len(line) > 80] == [], command
+
+
+def test_the_campaign_of_the_default_file_has_a_name_as_others_have(project):
+    for command in (["describe", "paper"], ["describe"]):
+        told = icha(*command)
+        assert told.exit_code == 0 and "configuration: config/config.yaml" in told.output
+    assert "paper, " in icha("describe", "nonsense").output
+    Path("config/config.yaml").write_bytes(b"name: \xff")
+    assert icha("describe", "paper").exit_code == 2 and icha("describe", "smoke").exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "without"),
     [
@@ -151,6 +168,8 @@ def test_one_of_several_datasets_of_a_measured_file_is_chosen_by_its_name(projec
     ("arguments", "message"),
     [
         (["new", "Mine"], "'Mine' is not a name; allowed: lower-case letters"),
+        (["new", "paper"], "paper is the campaign of config/config.yaml; choose another name"),
+        (["describe", "config"], "config: is a folder; allowed: a YAML file, or the name of a campaign"),
         (["new", "smoke"], "config/campaigns/smoke.yaml is there already"),
         (["describe", "nonsense"], "nonsense: no such file and no campaign of that name; there are: cmc_full,"),
         (["run", "nonsense"], "nonsense: no such file"),
