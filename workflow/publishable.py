@@ -5,7 +5,7 @@ from pathlib import Path
 from icha.configuration.load import Configuration
 from icha.configuration.publication import needed
 from icha.publication.environment import refuse_other_environment
-from icha.publication.licences import known_licence
+from icha.publication.licences import licence_problem
 from icha.publication.source import Source, committed_source
 
 
@@ -16,11 +16,8 @@ def publishable_source(configuration: Configuration, project: str) -> Source:
     """
     publication = configuration.campaign.published()
     wrong = [f"{configuration.origin}: {line}" for line in needed(publication)]
-    try:
-        known_licence(publication.license)
-    except ValueError as error:
-        key = "publication.license" if configuration.campaign.publication.license else "license"
-        wrong.append(f"{configuration.origin}: {key}: {publication.license!r} {error}")
+    if problem := licence_problem(configuration.campaign):
+        wrong.append(": ".join([configuration.origin, *problem]))
     try:
         source = committed_source(project)
     except ValueError as error:

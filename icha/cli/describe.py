@@ -30,6 +30,7 @@ def describe(
     from icha.planning.needs import wanting
     from icha.planning.plan import plan
     from icha.planning.software import missing_software
+    from icha.publication.licences import licence_problem
     from icha.support.checksums import damaged
 
     path = configuration_path(config)
@@ -47,6 +48,10 @@ def describe(
     _summary(console, items, spoilt, count)
     if reason := belongs_to_another(shown(results), campaign.name, path, found):
         console.print(f"[red]not to be run:[/] {reason}", highlight=False, soft_wrap=True)
+    if problem := licence_problem(campaign):
+        console.print(
+            f"[red]not to be published:[/] {shown(path)}: {': '.join(problem)}", highlight=False, soft_wrap=True
+        )
     if missing := missing_software(campaign):
         console.print(f"[red]missing:[/] {missing}", highlight=False, soft_wrap=True)
     for lack in wanting(items, count, results, profile_settings(found / "profiles/default")):

@@ -6,6 +6,8 @@ from typing import NamedTuple
 # Not of the public part, which does not tell licences from expressions, nor what is deprecated.
 from packaging.licenses._spdx import LICENSES
 
+from icha.configuration.campaign import Campaign
+
 _TEXTS = Path(__file__).parent / "license_texts"
 # Names and addresses of the licences whose text is here, as their authors give them.
 _USUAL = {
@@ -54,6 +56,16 @@ def known_licence(identifier: str) -> Licence:
     if found not in _USUAL:
         return Licence(found, found, f"https://spdx.org/licenses/{found}.html", "")
     return Licence(found, *_USUAL[found], (_TEXTS / f"{found}.txt").read_text(encoding="utf-8"))
+
+
+def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
+    """Key and text of what is wrong with the licence of a campaign's data; None if a deposit can have it."""
+    licence = campaign.published().license
+    try:
+        known_licence(licence)
+    except ValueError as error:
+        return "publication.license" if campaign.publication.license else "license", f"{licence!r} {error}"
+    return None
 
 
 def _successors(deprecated: str) -> list[str]:

@@ -231,6 +231,21 @@ def test_slips_are_refused_and_warned_of_once_they_are_confirmed(project):
     assert "Warning: slip.yaml: materials.bare.contact_modulus: '25 mPa' is unusual, but confirmed" in told.output
 
 
+@pytest.mark.parametrize(
+    ("licence", "told"),
+    [
+        ("CC-BY", "tiny.yaml: license: 'CC-BY' is no licence that SPDX knows; allowed: one identifier of"),
+        ("cc0-1.0", "tiny.yaml: license: 'cc0-1.0' is not written as SPDX writes it; allowed: 'CC0-1.0'"),
+        ("CC0-1.0", None),
+    ],
+)
+def test_a_licence_that_no_deposit_can_have_is_told_before_anything_is_computed(licence, told, project):
+    Path("tiny.yaml").write_text(TINY.replace("CC0-1.0", licence))
+    described = icha("describe", "tiny.yaml")
+    assert described.exit_code == 0
+    assert (f"not to be published: {told}" in described.output) if told else "published" not in described.output
+
+
 def test_outside_of_a_project_the_program_says_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for command in (["run"], ["describe"], ["new", "mine"]):
