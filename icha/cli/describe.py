@@ -24,6 +24,25 @@ def describe(
     used. A run counts as done if its file was made with the present settings; `icha run -n` also sees changes of the
     program.
     """
+    path = configuration_path(config)
+    campaign = read_configuration(path).campaign
+    found = find_project() or Path.cwd()
+    tell(path, campaign, found, (folder or found).resolve(), core_count(cores), runs=runs)
+
+
+def tell(path: Path, campaign, project: Path, home: Path, cores: int, *, runs: bool = False, profile=None) -> None:
+    """Print what a campaign computes, what is there, what the rest costs, and what is in its way.
+
+    Parameters
+    ----------
+    path : its configuration file.
+    campaign : what that says.
+    project : the folder of the project.
+    home : the folder in which results/ stands.
+    cores : number of cores that are used.
+    runs : whether every file is listed.
+    profile : folder of the profile of Snakemake that is used; the project's default one if left out.
+    """
     from rich.console import Console
 
     from icha.planning.belonging import belongs_to_another
@@ -33,20 +52,15 @@ def describe(
     from icha.publication.licences import licence_problem
     from icha.support.checksums import damaged
 
-    path = configuration_path(config)
-    campaign = read_configuration(path).campaign
-    found = find_project() or Path.cwd()
-    home = (folder or found).resolve()
     results = home / "results" / campaign.name
     items, spoilt = plan(campaign, results), damaged(results)
-    count = core_count(cores)
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(f"[bold]{campaign.name}[/]: {campaign.title}", highlight=False)
     console.print(f"configuration: {shown(path)}\n", highlight=False)
     if runs:
         _list(console, items)
-    _summary(console, items, spoilt, count)
-    if reason := belongs_to_another(shown(results), campaign.name, path, found):
+    _summary(console, items, spoilt, cores)
+    if reason := belongs_to_another(shown(results), campaign.name, path, project):
         console.print(f"[red]not to be run:[/] {reason}", highlight=False, soft_wrap=True)
     if problem := licence_problem(campaign):
         console.print(
@@ -54,7 +68,7 @@ def describe(
         )
     if missing := missing_software(campaign):
         console.print(f"[red]missing:[/] {missing}", highlight=False, soft_wrap=True)
-    for lack in wanting(items, count, results, profile_settings(found / "profiles/default")):
+    for lack in wanting(items, cores, results, profile_settings(profile or project / "profiles/default")):
         console.print(f"[red]not enough:[/] {lack}", highlight=False, soft_wrap=True)
 
 

@@ -14,6 +14,7 @@ from typing import Annotated
 
 import typer
 
+from icha.cli.describe import tell
 from icha.cli.options import Config, Cores, Folder, core_count
 from icha.cli.project import (
     DEFAULT,
@@ -53,7 +54,9 @@ def run(
         ),
     ] = None,
     folder: Folder = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="Only show which jobs would run.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", "-n", help="Only show the plan, and which jobs would run.")
+    ] = False,
     plain: Annotated[
         bool, typer.Option("--plain", help="Print a line for every job instead of the live view.")
     ] = False,
@@ -89,7 +92,9 @@ def run(
         *(["--workflow-profile", str(_profile(profile, home))] if profile else []),
     ]
     if dry_run:
-        _rehearse([*command, "--dry-run"], home, campaign, asked)
+        planned = _rehearse([*command, "--dry-run"], home, campaign, asked)
+        tell(path, campaign, home, folder, core_count(cores), profile=_profile(profile, home) if profile else None)
+        typer.echo(planned)
         return
     from rich.console import Console
 
@@ -172,16 +177,28 @@ def _at_a_terminal() -> bool:
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
-def _rehearse(command: list[str], home: Path, campaign, asked: list[str]) -> None:
-    """Let Snakemake say what it would do, or why it cannot."""
+def _rehearse(command: list[str], home: Path, campaign, asked: list[str]) -> str:
+    """Have Snakemake plan what was asked for: how many jobs of which kind would run, or the end with why none can."""
     done = subprocess.run(command, cwd=home, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode == 0:
-        print(done.stdout, end="")
-        return
+        return _planned(done.stdout)
     _refuse_unknown(done.stdout, asked, campaign)
     _heading("Snakemake could not start:")
     _reason(None, _last_words(done.stdout))
     raise typer.Exit(FAILED)
+
+
+def _planned(said: str) -> str:
+    """What Snakemake would do, by its table of jobs."""
+    table = said.partition("Job stats:")[2].partition("\ntotal")[0]
+    rows = re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)
+    counts = {rule.replace("_", " "): int(number) for rule, number in rows if rule not in TARGETS}
+    if not counts:
+        return "Nothing would run: everything that was asked for is there and up to date."
+    listed = ", ".join(f"{number} {rule}" for rule, number in counts.items())
+    return (
+        f"{counted(sum(counts.values()), 'job')} would run, those included that a changed program makes anew: {listed}"
+    )
 
 
 def _refuse_unknown(said: str, asked: list[str], campaign) -> None:

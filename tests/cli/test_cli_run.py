@@ -10,7 +10,7 @@ import time
 import pytest
 from conftest import REPOSITORY, copy_project, modules_of, snakemake
 
-from icha.cli.run import _last_words
+from icha.cli.run import _last_words, _planned
 
 CAMPAIGN = """
 name: tiny
@@ -104,7 +104,7 @@ def test_damaged_files_are_made_again(project):
     for path in paths[2:]:
         (results / path).write_bytes(before[path][:-1000])
     told = run(project, "--dry-run").stdout
-    assert all(f"damaged, to be made again: results/tiny/{path}\n" in told for path in paths)
+    assert all(f"damaged: {path}: to do again." in told for path in paths)
     done = run(project, "dataset")
     for path in paths:
         aside = (results / path).with_name((results / path).name + ".damaged")
@@ -155,6 +155,27 @@ def test_a_campaign_that_another_process_runs_is_refused_with_the_reason(project
     assert "Snakemake could not start:\n    Process 4242 is running this campaign" in refused.stdout
     for wrong in ("for want of", "jobs done", "dataset:", "Job stats"):
         assert wrong not in refused.stdout, refused.stdout
+
+
+def test_a_dry_run_shows_the_plan_and_counts_the_jobs(project):
+    (project / "config/campaigns/planned.yaml").write_text(CAMPAIGN.replace("name: tiny", "name: planned"))
+    program, how = command(project, "surfaces", "-n")
+    program[program.index("tiny")] = "planned"
+    told = subprocess.run(program, stderr=subprocess.STDOUT, **how)
+    assert told.returncode == 0, told.stdout
+    assert "study load" in told.stdout and "2 runs, 2 to do: about" in told.stdout
+    assert "1 job would run, those included that a changed program makes anew: 1 surface" in told.stdout
+    for words in ("Job stats", "host:", "Building DAG", "reason:"):
+        assert words not in told.stdout
+    assert not (project / "results/planned").exists()
+
+
+def test_the_table_of_jobs_of_snakemake_is_read():
+    table = "Job stats:\njob         count\n--------  -------\nall             1\nfigure          2\n"
+    assert _planned(f"{table}report_page     1\ntotal           4\n\nrun  7\n").endswith(
+        "anew: 2 figure, 1 report page"
+    )
+    assert _planned("Building DAG\nNothing to be done\n").startswith("Nothing would run")
 
 
 @pytest.mark.parametrize("target", ["nosuchtarget", "results/tiny/runs/load/rough/seed9/slope1/bare.nc"])
