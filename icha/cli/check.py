@@ -6,30 +6,57 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import FAILED, WRONG
+from icha.publication.deposit_files import CHECKSUMS
 from icha.support.in_words import counted
+
+# What of a campaign is no netCDF file, by its name.
+_BY_NAME = {
+    "*.yaml": "configuration; `icha describe` checks it",
+    "checks.json": "findings of the checks of a campaign, which its report shows; it has none of its own",
+    "verdict.txt": "verdict on the checks of a campaign; it has none of its own",
+    "belongs_to.txt": "record of the configuration file that results belong to; it has no checks of its own",
+    "report.html": "report; it has no checks of its own",
+    "run_times.tsv": "times of the jobs; it has no checks of its own",
+    "*.*.json": "checksum of a result; `icha run` compares it",
+    "*.png": "figure; it has no checks of its own",
+    "*.pdf": "figure; it has no checks of its own",
+    "*.log": "log of a job; it has no checks of its own",
+    "*.jsonl": "time and memory of a job; it has no checks of its own",
+    CHECKSUMS: "checksums of a deposit; `icha verify` checks its folder",
+}
 
 
 def check(
-    files: Annotated[list[Path], typer.Argument(help="Runs, surfaces or campaign datasets (.nc).")],
+    files: Annotated[list[Path], typer.Argument(help="Runs, surfaces, campaign datasets or other results.")],
 ) -> None:
     """Check files: documented names, dimensions, units and attributes, and the physics that every result must satisfy.
 
-    Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is no run, surface or campaign
-    dataset. All files are checked in any case.
+    Of results without checks of their own it says what they are.
+
+    Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is none that ICHA writes. All
+    files are checked in any case.
     """
-    from icha.datasets.format import CAMPAIGN, RUN, UnknownFile, flaws, kind_of
+    from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, flaws, kind_of
 
     status = 0
     for file in files:
+        if told := _without_checks(file):
+            typer.echo(f"{file}: {told}")
+            continue
         try:
+            if file.is_dir():
+                raise UnknownFile(f"{file}: is a folder; allowed: files in it, or a deposit")
             kind, data = kind_of(file)
         except UnknownFile as error:
             typer.secho(f"Error: {error}", err=True, fg="red")
             status = WRONG
             continue
-        found = flaws(kind, data)
+        if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
+            typer.echo(f"{file}: {kind}; it can be read, and has no checks of its own")
+            continue
+        found = flaws(kind, data) if kind != SOLUTION else []
         tested = 0
-        if not found and kind in (RUN, CAMPAIGN):
+        if not found and kind != SURFACE:
             findings, tested = _physics(kind, data)
             found += findings
         if found:
@@ -44,11 +71,25 @@ def check(
         raise typer.Exit(status)
 
 
+def _without_checks(file: Path) -> str | None:
+    """What a file is by its name, and who checks it; None of netCDF files and of what ICHA does not write."""
+    if not file.exists():
+        return None
+    if file.suffix == ".zip" or (file / CHECKSUMS).is_file():
+        return "deposit; `icha verify` checks it"
+    if file.is_dir():
+        return None
+    return next((told for pattern, told in _BY_NAME.items() if file.match(pattern)), None)
+
+
 def _physics(kind, data):
     """Checks of the numbers that failed, as text, and how many there are."""
-    from icha.analysis.checks import check_campaign, check_run
-    from icha.datasets.format import RUN
+    from icha.analysis.checks import check_campaign, check_run, check_solution
+    from icha.datasets.format import RUN, SOLUTION
 
+    if kind == SOLUTION:
+        checks = check_solution(data)
+        return [_said(check) for check in checks if not check.passed], len(checks)
     if kind == RUN and "incomplete" in data.attrs:
         return [f"the run failed: {data.attrs['incomplete']}"], 1
     checks = check_run(data) if kind == RUN else check_campaign(data)

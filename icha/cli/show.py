@@ -30,6 +30,8 @@ def show(
         kind, data = kind_of(file)
     except UnknownFile as error:
         raise Mistake(str(error)) from None
+    if kind not in (RUN, SURFACE, CAMPAIGN):
+        raise Mistake(f"{file}: {kind}; shown are runs, surfaces and campaign datasets, and others by `ncdump -h`")
     if kind == CAMPAIGN:
         studies = list(data.children)
         if study is not None and study not in studies:

@@ -19,6 +19,17 @@ from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
 from icha.datasets.variables.terms import Variable
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
+SOLUTION = "solution by boundary elements at a finite range"
+# Kinds whose format is not promised, by a variable that no other kind has.
+_OTHERS = {
+    "comparison of runs at common loads": "seed_count",
+    "error of the model": "area_error",
+    "theories and published points": "bush_gibson_thomas_area_fraction",
+    SOLUTION: "target_reduced_pressure",
+    "boundary elements both ways at a finite range": "dissipated",
+    "sources of the model's error": "variant",
+    "comparison of one asperity": "force_icha",
+}
 
 # A number of the identities of the format may be off by rounding.
 _ROUNDING = 1e-9
@@ -97,7 +108,7 @@ _WORDS = ("branch", "step_kind")
 
 
 def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
-    """What a file is, one of RUN, SURFACE and CAMPAIGN, and its content.
+    """What a file is, and its content: RUN, SURFACE, CAMPAIGN, or another kind, of which no format is promised.
 
     Raises
     ------
@@ -105,17 +116,22 @@ def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
         If it is none of them, or cannot be read.
     """
     try:
-        if has_groups(path):
-            return CAMPAIGN, read_campaign(path)
-        data = read_dataset(path)
+        data = read_campaign(path) if has_groups(path) else read_dataset(path)
     except ValueError as error:
         raise UnknownFile(str(error)) from None
-    if "mean_separation" in data and "spot_count" in data and "variant" not in data.dims:
+    groups = [data] if isinstance(data, xr.Dataset) else [node.to_dataset() for node in data.children.values()]
+    for kind, variable in _OTHERS.items():
+        if all(variable in group.variables for group in groups):
+            return kind, data
+    if isinstance(data, xr.DataTree):
+        return CAMPAIGN, data
+    if "mean_separation" in data and "spot_count" in data:
         return RUN, data
     if "height" in data and "period" in data:
         return SURFACE, data
     raise UnknownFile(
-        f"{path}: neither a {RUN} (it would have mean_separation) nor a {SURFACE} (height) nor a {CAMPAIGN} (groups)"
+        f"{path}: neither a {RUN} (it would have mean_separation) nor a {SURFACE} (height) nor a {CAMPAIGN} (groups), "
+        f"nor another file that ICHA writes"
     )
 
 

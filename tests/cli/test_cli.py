@@ -15,6 +15,7 @@ import yaml
 from conftest import REPOSITORY
 from typer.testing import CliRunner
 
+from icha.analysis.common_loads import compare_campaign
 from icha.cli import app
 from icha.cli.events import Watch, last_line, reason_of
 from icha.cli.live import LiveView
@@ -27,6 +28,7 @@ from icha.datasets.surface_file import write_surface
 from icha.planning.belonging import belongs_to_another, claim
 from icha.planning.constants import FITTED
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, start_up, time_on, total
+from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
 
 HEAVY = ["scipy", "pandas", "xarray", "matplotlib", "netCDF4", "snakemake"]
@@ -457,6 +459,40 @@ def test_one_run_without_the_workflow(tmp_path, monkeypatch):
     assert mixed.exit_code == 2
     for told in ("bad.npy: not a readable", "none.nc: no such file", "sticky.nc: run", "run.nc: run dataset, all is"):
         assert told in mixed.output
+
+
+def test_results_without_checks_are_called_what_they_are(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_dataset(reference_dataset(small.SPECTRUM), "theories.nc")
+    write_dataset(compare_campaign(small.tree()), "aggregated.nc")
+    for name, kind in (("theories.nc", "theories and published points"), ("aggregated.nc", "comparison of runs")):
+        told = icha("check", name)
+        assert told.exit_code == 0 and f"{name}: {kind}" in told.output and "has no checks" in told.output
+        refused = icha("show", name)
+        assert refused.exit_code == 2 and kind in refused.output
+    names = [
+        "checks.json",
+        "verdict.txt",
+        "report.html",
+        "run_times.tsv",
+        "belongs_to.txt",
+        "a.png",
+        "a.pdf",
+        "run.log",
+    ]
+    names += ["run.jsonl", "a.nc.json", "config.used.yaml", "paper-1.0.zip"]
+    for name in names:
+        Path(name).write_text("text")
+    told = icha("check", *names)
+    assert told.exit_code == 0
+    assert [line.split(": ")[0] for line in told.output.splitlines()] == names
+    assert "paper-1.0.zip: deposit; `icha verify` checks it" in told.output
+    Path("deposit").mkdir()
+    refused = icha("check", "deposit")
+    assert refused.exit_code == 2 and "deposit: is a folder; allowed: files in it, or a deposit" in refused.output
+    Path("deposit/SHA256SUMS").touch()
+    assert icha("check", "deposit").output == "deposit: deposit; `icha verify` checks it\n"
+    assert icha("check", "none.log").exit_code == 2
 
 
 @pytest.mark.parametrize("options", [["--grid", "32"], ["--grid", "16"], ["--grid", "32", "--period", "1 mm"]])

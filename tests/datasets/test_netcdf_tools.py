@@ -13,6 +13,7 @@ import pint
 import pytest
 from outside_validators import REPOSITORY, python_of_validators
 
+from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, kind_of
 from icha.datasets.labels import LABELS
 
 GROUPS = {"run.nc": "/", "campaign.nc": "/slopes"}
@@ -250,6 +251,21 @@ sys.path.insert(0, sys.argv[1])
 import validate
 sys.exit(not validate.validate(pathlib.Path(sys.argv[2]), ["compliance-checker", "cf-units"], 1000))
 """
+
+
+def test_every_kind_of_file_is_known(folder):
+    found = {path.stem: kind_of(path)[0] for path in sorted(folder.glob("*.nc"))}
+    assert {name for name, kind in found.items() if kind == RUN} == {"run", "run_without_snapshots", "cycle"}
+    assert {name for name, kind in found.items() if kind == SOLUTION} == {
+        "boundary_elements",
+        "boundary_elements_adhesive",
+    }
+    assert found["campaign"] == CAMPAIGN and found["surface"] == SURFACE
+    others = {name: kind for name, kind in found.items() if kind not in (RUN, SOLUTION, CAMPAIGN, SURFACE)}
+    assert set(others) == {
+        *("aggregated", "model_error", "theories", "loop", "error_sources", "hertz_asperity", "one_asperity"),
+    }
+    assert others["hertz_asperity"] == others["one_asperity"] and len(set(others.values())) == len(others) - 1
 
 
 def test_checkers_accept_every_kind_of_file(folder):
