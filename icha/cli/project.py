@@ -32,6 +32,9 @@ def told(command: Callable) -> Callable:
             # Whoever read our output has seen enough (`icha describe --runs | head`).
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(FAILED) from None
+        except MemoryError as error:
+            typer.secho(f"Error: not enough memory: {error or 'nothing is left'}", err=True, fg="red")
+            raise typer.Exit(FAILED) from None
         except OSError as error:
             # What the system refuses: a folder that cannot be written to, a full disk.
             what = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error

@@ -90,7 +90,7 @@ def simulate(
     from icha.simulation import simulate as press
 
     try:
-        topography = _topography(surface, period, rolloff, short, hurst, grid, seed, rms_slope)
+        topography = _topography(surface, period, rolloff, short, hurst, grid, seed, rms_slope, model)
         material = Material(modulus, energy, interaction_range)
         if pressures is None and areas is None:
             pressures = [1e-3, 3e-3, 1e-2, 3e-2]
@@ -109,13 +109,15 @@ def simulate(
         raise typer.Exit(FAILED)
 
 
-def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope):
+def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope, model):
+    from icha.support.rules import GRID
     from icha.surfaces.spectrum import SelfAffineSpectrum
     from icha.surfaces.surface import Surface
 
     if file is None:
         slope = 1.0 if rms_slope is None else rms_slope
-        rolloff, short = _cutoffs(period, rolloff, short, grid)
+        rolloff, short = _cutoffs(period, rolloff, short, GRID.checked("grid", grid))
+        _refuse_too_large(grid, period / short, model)
         return SelfAffineSpectrum(period, rolloff, short, hurst, slope).realise(grid, seed)
     if file.suffix == ".npy":
         from icha.surfaces.measured.height_map import read_height_map
@@ -129,6 +131,24 @@ def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope):
 
         found = read_surface(file)
     return found if rms_slope is None else found.scaled_to_rms_slope(rms_slope)
+
+
+def _refuse_too_large(grid: int, waves: float, model: str) -> None:
+    """Refuse a random surface that needs more memory than this machine has.
+
+    `waves` are the shortest ones along a side: some twenty numbers are held for each wave of the spectrum.
+    """
+    from icha.planning.costs import PATCH_ARRAYS, surface_cost
+    from icha.planning.needs import memory_of_machine
+    from icha.support import in_words
+
+    arrays = 8 * PATCH_ARRAYS * grid**2 if model != ASPERITIES else 0
+    needed, there = max(surface_cost(grid).memory, arrays, 8 * 20 * waves**2), memory_of_machine()
+    if needed > there:
+        raise ValueError(
+            f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about {in_words.size(needed)} "
+            f"of memory, and this machine has {in_words.size(there)}; choose a smaller --grid or a longer --short"
+        )
 
 
 def _cutoffs(period, rolloff, short, grid):

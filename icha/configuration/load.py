@@ -107,10 +107,12 @@ def _topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Probl
             continue
         try:
             grid, period, boundary, slope = _facts(surface, name in asking)
-        except ValueError as error:
+        except (ValueError, MemoryError) as error:
             key = getattr(error, "key", "path")
             origin = campaign.origin("surfaces", name)
             variant = "" if origin == name else f"of variant {name!r}: "
+            if isinstance(error, MemoryError):
+                error = f"does not fit into the memory of this machine ({error}); allowed: a smaller topography"
             wrong.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
             continue
         # Six digits name the files, and are more than any instrument has.

@@ -181,6 +181,8 @@ def test_one_of_several_datasets_of_a_measured_file_is_chosen_by_its_name(projec
         (["simulate", "run.nc", "--modulus", "25"], "'25': the unit is missing; allowed: such as '25 MPa'"),
         (["simulate", "run.nc", "--period", "1 kg"], "is not a unit of length"),
         (["simulate", "run.nc", "--hurst", "2"], "hurst: 2.0 must lie in (0, 1]"),
+        (["simulate", "run.nc", "--grid", "1000000"], "grid: 1000000 must be at most 32768"),
+        (["simulate", "run.nc", "--short", "1e-15 m"], "needs about 1600000000000 TB of memory, and this machine has"),
         (["simulate", "run.nc", "--grid", "32", "--rolloff", "20 um"], "--short 25 um, which is 8 grid cells if left"),
         (["simulate", "run.nc", "--short", "30 um", "--rolloff", "20 um"], "give a smaller --short or a longer --roll"),
         (["simulate", "run.nc", "--pressures", "a,b"], "'a,b' is no list of numbers"),
@@ -419,6 +421,26 @@ def test_what_exceeds_the_machine_is_refused_where_nobody_can_be_asked(project, 
     assert icha("run", "tiny.yaml", "all", "--", "--forceall", "--resources", "mem_mb=60000").exit_code == 2
     assert icha("run", "tiny.yaml", "results/tiny/report.html").exit_code == BEGUN
     assert icha("run", "tiny.yaml", "--anyway").exit_code == BEGUN
+
+
+def test_a_single_run_that_exceeds_the_machine_is_refused_with_its_size(project, monkeypatch):
+    monkeypatch.setattr("icha.planning.needs.memory_of_machine", lambda: 16e9)
+    refused = icha("simulate", "run.nc", "--grid", "32768")
+    told = " ".join(refused.output.split())
+    assert refused.exit_code == 2
+    assert "--grid 32768, with 4.1e+03 of the shortest waves along a side, needs about 23" in told
+    assert "GB of memory, and this machine has 16 GB; choose a smaller --grid" in told
+    by_cells = icha("simulate", "run.nc", "--grid", "16384", "--model", "boundary_elements")
+    assert by_cells.exit_code == 2 and "needs about 34.4 GB of memory" in " ".join(by_cells.output.split())
+
+
+def test_want_of_memory_is_a_message(project, monkeypatch):
+    def fail(*_, **__):
+        raise MemoryError("Unable to allocate 80 GiB for an array")
+
+    monkeypatch.setattr("icha.simulation.simulate", fail)
+    refused = icha("simulate", "run.nc", "--grid", "32")
+    assert refused.exit_code == 1 and "Error: not enough memory: Unable to allocate 80 GiB" in refused.output
 
 
 def test_what_exceeds_the_machine_is_begun_if_that_is_said(project, small_machine, monkeypatch):
