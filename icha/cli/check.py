@@ -44,8 +44,6 @@ def check(
             typer.echo(f"{file}: {told}")
             continue
         try:
-            if file.is_dir():
-                raise UnknownFile(f"{file}: is a folder; allowed: files in it, or a deposit")
             kind, data = kind_of(file)
         except UnknownFile as error:
             typer.secho(f"Error: {error}", err=True, fg="red")

@@ -113,6 +113,8 @@ def _measured(path: Path, data: str | None, start: Path) -> tuple[str, str, list
     from icha.surfaces.measured.scan import read_scan
     from icha.surfaces.measured.settings import Preparation, UnfitTopography
 
+    if path.is_dir():
+        raise Mistake(f"--measured {path}: is a folder; allowed: a file that holds a topography")
     if not path.is_file():
         raise Mistake(f"--measured {path}: no such file")
     if not path.read_bytes().strip():

@@ -78,6 +78,9 @@ def simulate(
     `icha show FILE` shows what came out. Exit status 1 if the path could not be followed to its end; the file then
     holds the stops that were reached, and says why there are no more.
     """
+    for path in (output, surface):
+        if path is not None and path.is_dir():
+            raise Mistake(f"{path}: is a folder; allowed: a file")
     if output.exists() and not force:
         raise Mistake(f"{output} is there already; --force replaces it")
     if not output.absolute().parent.is_dir():

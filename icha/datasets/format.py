@@ -115,6 +115,10 @@ def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
     UnknownFile
         If it is none of them, or cannot be read.
     """
+    if os.path.isdir(path):
+        raise UnknownFile(f"{path}: is a folder; allowed: a file")
+    if os.path.isfile(path) and not os.path.getsize(path):
+        raise UnknownFile(f"{path}: the file is empty")
     try:
         data = read_campaign(path) if has_groups(path) else read_dataset(path)
     except ValueError as error:

@@ -193,6 +193,10 @@ def test_one_of_several_datasets_of_a_measured_file_is_chosen_by_its_name(projec
         (["show", "Snakefile"], "Snakefile: not a readable netCDF file"),
         (["show", "Snakefile", "--plot", "a.txt"], "--plot a.txt: ends in '.txt'; allowed: .png"),
         (["check", "none.nc"], "none.nc: no such file"),
+        (["show", "config"], "config: is a folder; allowed: a file"),
+        (["new", "scan", "--measured", "config"], "--measured config: is a folder; allowed: a file that holds a topo"),
+        (["simulate", "run.nc", "--surface", "config"], "config: is a folder; allowed: a file"),
+        (["simulate", "config", "--force"], "config: is a folder; allowed: a file"),
     ],
 )
 def test_mistakes_are_messages_and_status_2(project, arguments, message):
@@ -479,7 +483,12 @@ def test_one_run_without_the_workflow(tmp_path, monkeypatch):
     Path("bad.npy").write_bytes(b"")
     mixed = icha("check", "bad.npy", "none.nc", "sticky.nc", "run.nc")
     assert mixed.exit_code == 2
-    for told in ("bad.npy: not a readable", "none.nc: no such file", "sticky.nc: run", "run.nc: run dataset, all is"):
+    for told in (
+        "bad.npy: the file is empty",
+        "none.nc: no such file",
+        "sticky.nc: run",
+        "run.nc: run dataset, all is",
+    ):
         assert told in mixed.output
 
 
@@ -511,7 +520,7 @@ def test_results_without_checks_are_called_what_they_are(tmp_path, monkeypatch):
     assert "paper-1.0.zip: deposit; `icha verify` checks it" in told.output
     Path("deposit").mkdir()
     refused = icha("check", "deposit")
-    assert refused.exit_code == 2 and "deposit: is a folder; allowed: files in it, or a deposit" in refused.output
+    assert refused.exit_code == 2 and "deposit: is a folder; allowed: a file" in refused.output
     Path("deposit/SHA256SUMS").touch()
     assert icha("check", "deposit").output == "deposit: deposit; `icha verify` checks it\n"
     assert icha("check", "none.log").exit_code == 2

@@ -110,6 +110,11 @@ def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.nc").write_text("no netCDF")
     with pytest.raises(UnknownFile, match="not a readable netCDF file"):
         kind_of(tmp_path / "text.nc")
+    with pytest.raises(UnknownFile, match="is a folder"):
+        kind_of(tmp_path)
+    (tmp_path / "empty.nc").touch()
+    with pytest.raises(UnknownFile, match="the file is empty"):
+        kind_of(tmp_path / "empty.nc")
     with pytest.raises(UnknownFile, match="no such file"):
         kind_of(tmp_path / "none.nc")
     xr.Dataset({"a": 1}).to_netcdf(tmp_path / "other.nc")
