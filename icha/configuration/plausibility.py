@@ -56,7 +56,7 @@ USUAL = {
         "m",
         "0.05 nm",
         "1 um",
-        "of bonds a fraction of an atom, of van der Waals forces some nm, of a model's rarely more",
+        "chemical bonds reach less than 1 nm, van der Waals forces some nm, what grids resolve some 100 nm",
     ),
     "period": _SIDE,
     "size": _SIDE,
