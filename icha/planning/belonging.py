@@ -43,8 +43,8 @@ def claim(results: Path, file: Path, project: Path) -> None:
 def _recorded(results: Path) -> str | None:
     try:
         return (results / RECORD).read_text(encoding="utf-8", errors="replace").strip() or None
-    except FileNotFoundError:
-        return None
+    except OSError:
+        return None  # there is none; or nothing can be read there, so that nothing will be replaced
 
 
 def _is_kept(results: Path, file: Path) -> bool:
