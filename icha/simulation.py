@@ -24,7 +24,7 @@ from icha.models.model import Model
 from icha.path.follow import follow
 from icha.path.hysteresis import hysteresis
 from icha.path.limits import MAX_REDUCED_PRESSURE
-from icha.path.targets import MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
+from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
 from icha.path.waypoints import Waypoint
 from icha.support.rules import Integer
 from icha.surfaces.moments import spectral_moments
@@ -105,7 +105,8 @@ def simulate(
             **bin_values("gap", GAP_BINS * surface.rms_height),
             **bin_values("pressure", PRESSURE_BINS * pressure_unit),
         }
-        dataset = build(table | CYCLE, values, _attributes(surface, material, path, model, chosen))
+        described_here = table | CYCLE | _targets(table, path)
+        dataset = build(described_here, values, _attributes(surface, material, path, model, chosen))
     if met.failure:
         raise ConvergenceError(met.failure, dataset.assign_attrs(incomplete=met.failure)) from None
     if path.unload:
@@ -229,6 +230,24 @@ def _of_path(table: Table, path: Path, met: _Met, grid: int) -> dict:
         "event_y": events.position[:, 1],
         "event_members": events.members,
     }
+
+
+def _targets(table: Table, path: Path) -> Table:
+    """Descriptions of the values asked for, with the unit that they have on this path."""
+    steps = {target.kind for target in (*path.targets, *path.turning_points)} | ({BETWEEN} if path.cyclic else set())
+    snapshots = {target.kind for target in path.targets if target.snapshot} | ({PULL_OFF} if path.unload else set())
+    return {
+        "step_target": table["step_target"]._replace(**_unit_of(steps, "step_kind")),
+        "snapshot_target": table["snapshot_target"]._replace(**_unit_of(snapshots, "snapshot_kind")),
+    }
+
+
+def _unit_of(kinds: set[str], named_by: str) -> dict:
+    """Unit of values of these kinds; where they have different ones, a comment says which is whose."""
+    metres = kinds.intersection(IN_METRES)
+    if not metres or metres == kinds:
+        return {"units": "m" if metres else "1"}
+    return {"units": "1", "further": {"comment": f"in m where {named_by} is {' or '.join(sorted(metres))}, else 1"}}
 
 
 def _of_surface(surface: Surface, material: Material, seed: int) -> dict:

@@ -11,6 +11,7 @@ from icha.datasets.labels import RunLabels
 # In units of the largest pressure: by how much unloading with adhesion lies below loading; a tenth more for every step
 # between the stops, so that runs differ.
 TENSION = 0.3
+_COORDINATES = ["branch", "reduced_pressure", "reduced_separation"]
 _UNKNOWN = {"units": "1", "long_name": "test"}
 
 
@@ -21,7 +22,7 @@ def unloaded(run, between=0):
     jump off that ends all contact. Nothing has coalesced. Between the last two stops there are `between` more steps.
     """
     adhesive = float(run["surface_energy"]) > 0
-    run = run.drop_vars(["leg", "split_count", "control"]).reset_coords("branch")
+    run = run.drop_vars(["leg", "split_count", "control"]).reset_coords(_COORDINATES)
     count = run.sizes["step"]
     stops = np.insert(np.arange(count, dtype=float), count - 1, count - 2 + np.arange(1, between + 1) / (between + 1))
     back = np.append(stops[-2::-1], -1.0)
@@ -114,7 +115,7 @@ def unloaded(run, between=0):
         run["snapshot_step"].attrs,
     )
     step = ("step", np.arange(len(at)), run["step"].attrs)
-    return kept.assign(new).assign_coords(step=step).set_coords("branch")
+    return kept.assign(new).assign_coords(step=step).set_coords(_COORDINATES)
 
 
 @cache

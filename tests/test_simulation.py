@@ -51,6 +51,28 @@ def test_every_variable_carries_unit_and_name_and_no_nan(run):
     assert np.all(run.converged == 1)
 
 
+@pytest.mark.parametrize(
+    ("path", "steps", "snapshots"),
+    [
+        (Path([1e-3]), ("1", None), ("1", None)),
+        (Path(mean_separations=[3e-6]), ("m", None), ("m", None)),
+        (
+            Path([1e-3], snapshots=[("mean_separation", 3e-6)], unload=True),
+            ("1", "in m where step_kind is mean_separation or path, else 1"),
+            ("1", "in m where snapshot_kind is mean_separation, else 1"),
+        ),
+    ],
+    ids=["loads", "separations", "both"],
+)
+def test_values_asked_for_have_the_unit_of_their_kind_where_they_have_one(path, steps, snapshots):
+    run = simulate(rough(grid=32, ratio=8), BARE, path)
+    for name, expected in (("step_target", steps), ("snapshot_target", snapshots)):
+        attrs = run[name].attrs
+        assert (attrs["units"], attrs.get("comment")) == expected
+    in_metres = run["step_kind"].isin(["mean_separation", "path"])
+    np.testing.assert_allclose(run["step_target"][in_metres], run["mean_separation"][in_metres], rtol=1e-9)
+
+
 def test_sums_over_spots_are_the_totals(run):
     for k in range(run.sizes["snapshot"]):
         of = run.spot_snapshot.values == k

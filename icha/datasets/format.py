@@ -86,6 +86,9 @@ _OF_STUDY = {name: Variable(DESIGN, "1", "") for name in ("status", "step_count"
     if _OF_RUN[name].dims == ("step",)
 }
 
+# Values asked for have the unit of what is asked for, where that is the same of all.
+_UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))
+
 # Global attributes. Those of a campaign are written by the workflow, not by `icha.simulate`.
 ATTRIBUTES = {
     RUN: (
@@ -247,7 +250,8 @@ def _flaws_of_study(study):
                 yield f"{name}: {gaps} values of complete runs are not finite"
     # Runs that are not complete may lack any value.
     numbers = study[[name for name in _OF_STUDY if "step" in study[name].dims and name not in _WORDS]]
-    yield from _flaws_of_steps(numbers.reset_coords(drop=True).where(complete).assign(branch=study["branch"]), study)
+    numbers = numbers.reset_coords(["reduced_pressure", "reduced_separation"]).reset_coords(drop=True)
+    yield from _flaws_of_steps(numbers.where(complete).assign(branch=study["branch"].variable), study)
 
 
 def _flaws_of_attributes(attributes, needed, refused=(*_REFUSED_ATTRIBUTES, *_MAKERS)) -> Iterator[str]:
@@ -278,8 +282,9 @@ def _flaws_of_variables(data, table, names, there) -> Iterator[str]:
             variable, (dims, units, *_) = data[name], table[name]
             if variable.dims != dims:
                 yield f"{name}: has the dimensions ({', '.join(variable.dims)}); allowed: ({', '.join(dims)})"
-            if variable.attrs.get("units") != units:
-                yield f"{name}: has the units {variable.attrs.get('units')!r}; allowed: {units!r}"
+            allowed = _UNITS_OF_TARGETS.get(name, (units,))
+            if variable.attrs.get("units") not in allowed:
+                yield f"{name}: has the units {variable.attrs.get('units')!r}; allowed: {', '.join(map(repr, allowed))}"
     for name, variable in data.variables.items():
         for attribute in ("units", "long_name"):
             if attribute not in variable.attrs:

@@ -22,6 +22,9 @@ LISTS = {
 # What an equilibrium between the stops of a path is asked to reach: its mean separation.
 BETWEEN = "path"
 
+# Kinds of which values are in m; those of all others have no unit.
+IN_METRES = (MEAN_SEPARATION, BETWEEN)
+
 SEPARATION_CONTROL, LOAD_CONTROL = "separation", "load"
 CONTROLS = (SEPARATION_CONTROL, LOAD_CONTROL)
 

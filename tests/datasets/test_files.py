@@ -1,6 +1,7 @@
 """Datasets are whole, byte-stable, free of values that are not finite, and complete."""
 
 import cyclic_campaign as cyclic
+import matplotlib.pyplot as plt
 import netCDF4
 import numpy as np
 import pytest
@@ -458,3 +459,21 @@ def test_selecting_what_is_not_there_says_what_is():
         select_run(small.tree(), ("other", "asperities", "rough", 1, 1.0, "soft"))
     with pytest.raises(ValueError, match=r"no rms_slope 0\.3; there are 0\.2, 1"):
         select_run(small.tree(), ("slopes", "asperities", "rough", 1, 0.3, "soft"))
+
+
+def test_studies_and_runs_are_plotted_against_load_or_separation_by_xarray_alone(tmp_path):
+    write_campaign(small.runs(), tmp_path / "c.nc")
+    study = xr.open_datatree(tmp_path / "c.nc")["slopes"].to_dataset()
+    one = study.contact_area_fraction.isel(model=0, surface=0, seed=0, rms_slope=0, material=0)
+    for name in ("reduced_pressure", "reduced_separation"):
+        assert name in study.coords and name in small.run().coords and study[name].dims == (*LABELS, "step")
+        (line,) = one.plot(x=name)
+        np.testing.assert_array_equal(line.get_xdata(), one[name].values)
+        plt.close()
+        assert one.swap_dims(step=name).dims == (name,)
+
+
+def test_the_root_of_a_campaign_says_where_its_data_are(tmp_path):
+    write_campaign(small.runs(), tmp_path / "c.nc")
+    comment = xr.open_dataset(tmp_path / "c.nc").attrs["comment"]
+    assert "slopes, single" in comment and "xarray.open_datatree(FILE)['slopes']" in comment

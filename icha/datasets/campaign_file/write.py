@@ -72,11 +72,20 @@ def write_campaign(
         studies = arranged(spooled(runs, spool), design)
         with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
             origins = [each for study in studies for each in study.origins]
-            file.setncatts(collected("Campaign of rough contacts", _STUDIES, COLLECTED, origins) | dict(attrs))
+            own = collected("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
+            file.setncatts(own | {"comment": _where([study.name for study in studies])} | dict(attrs))
             # All is defined before anything is written, which is quicker: see icha.datasets.netcdf.
             groups = [define_group(file.createGroup(study.name), study, attrs) for study in studies]
             for group in groups:
                 _write(group, spool)
+
+
+def _where(studies: list[str]) -> str:
+    """Where in the file the data are: who opens its root alone sees nothing else."""
+    return (
+        f"The data are in the groups, one for each study: {', '.join(studies)}. With Python's xarray: "
+        f"xarray.open_datatree(FILE)['{studies[0]}'].to_dataset(), or xarray.open_dataset(FILE, group='{studies[0]}')"
+    )
 
 
 def _write(group: Group, spool: BinaryIO) -> None:

@@ -5,7 +5,7 @@ import numpy as np
 from icha.contact.events import EVENT_KINDS
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets.bins import bin_table
-from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Variable, terms
+from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Variable, term, terms
 
 _STEP, _SNAPSHOT, _SPOT, _EVENT = ("step",), ("snapshot",), ("spot",), ("event",)
 _GAP_BIN, _PRESSURE_BIN = ("snapshot", "gap_bin"), ("snapshot", "pressure_bin")
@@ -47,9 +47,10 @@ RUN = {
     "residual": Variable(_STEP, "1", "largest equilibrium error over h_rms"),
     "converged": Variable(_STEP, "1", "1 where the equilibrium converged", np.int8),
     "leg": Variable(_STEP, "1", "leg of the path: 0 the first loading, odd unloading, even loading again", int),
-    **terms("reduced_pressure", "reduced_separation", along=_STEP),
+    # Coordinates, so that whatever lies along the path can be plotted against load or separation by xarray alone.
+    **{name: term(name)._replace(dims=_STEP, coordinate=True) for name in ("reduced_pressure", "reduced_separation")},
     "step_kind": Variable(_STEP, "1", "quantity that this step was asked to reach", str),
-    "step_target": Variable(_STEP, "1", "value asked for, in the SI unit of its kind (m for mean_separation, else 1)"),
+    "step_target": Variable(_STEP, "1", "value asked for, in the SI unit of its kind"),
     "jump_in_count": Variable(_STEP, "1", "contacts formed so far", int),
     "jump_off_count": Variable(_STEP, "1", "contacts broken so far", int),
     "coalescence_count": Variable(_STEP, "1", "unions of two spots so far", int),
