@@ -11,10 +11,7 @@ import numpy as np
 from scipy.special import beta
 
 from icha.asperity.coalescence import united_paraboloids
-from icha.asperity.material import Material
-
-# Wu's jump-in formula was verified between these Tabor parameters.
-WU_RANGE = (2.0, 5.0)
+from icha.asperity.material import WU_RANGE, Material
 
 _MAX_NEWTON_STEPS = 200
 

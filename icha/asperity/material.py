@@ -6,6 +6,9 @@ import numpy as np
 
 from icha.support.rules import CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
 
+# Wu's jump-in formula was verified between these Tabor parameters.
+WU_RANGE = (2.0, 5.0)
+
 
 @dataclass(frozen=True)
 class Material:

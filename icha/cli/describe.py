@@ -49,6 +49,7 @@ def tell(path: Path, campaign, project: Path, home: Path, cores: int, *, runs: b
     from icha.planning.needs import wanting
     from icha.planning.plan import plan
     from icha.planning.software import missing_software
+    from icha.planning.validity import expected_validity
     from icha.publication.licences import licence_problem
     from icha.support.checksums import damaged
 
@@ -60,6 +61,8 @@ def tell(path: Path, campaign, project: Path, home: Path, cores: int, *, runs: b
     if runs:
         _list(console, items)
     _summary(console, items, spoilt, cores)
+    for statement in expected_validity(campaign):
+        console.print(f"[bold]{statement.about}:[/] {statement.text}", highlight=False, soft_wrap=True)
     if reason := belongs_to_another(shown(results), campaign.name, path, project):
         console.print(f"[red]not to be run:[/] {reason}", highlight=False, soft_wrap=True)
     if problem := licence_problem(campaign):

@@ -102,12 +102,14 @@ def run(
     from icha.cli.live import LiveView, PlainView
     from icha.planning.constants import FITTED
     from icha.planning.plan import expected_seconds, plan, time_on
+    from icha.planning.validity import expected_validity
 
     console = Console()
     items = plan(campaign, folder / "results" / campaign.name)
     if not anyway:
         settings = profile_settings(_profile(profile, home) if profile else home / "profiles/default")
         _ask_if_wanting(items, asked, core_count(cores), folder / "results" / campaign.name, settings)
+    _say_what_holds(expected_validity(campaign))
     watch = Watch(expected_seconds(items, f"results/{campaign.name}"), environment=FITTED.workflow.environment)
     if plain or not console.is_terminal:
         view = PlainView(watch, campaign.name, folder, lambda line: print(line, flush=True))
@@ -124,6 +126,8 @@ def run(
     # What `icha describe` says: of everything, on this machine.
     promised = None if profile or set(asked) - {"all"} else time_on(items, core_count(cores))
     _tell(status, stopped, watch, campaign, folder, log, promised)
+    if not status and not set(asked) - {"all", "report", "publish"}:
+        _tell_what_it_is_worth(campaign, folder / "results" / campaign.name)
     if not status and "publish" in asked:
         deposit = f"{campaign.name}-{campaign.published().version}.zip"
         print(f"deposit: {shown(folder / 'results' / campaign.name / 'publish' / deposit)}")
@@ -357,6 +361,25 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
             print(f"{what + ':':<9}{shown(path)}")
     if status:
         typer.echo(f"log:     {shown(log)}")
+
+
+def _tell_what_it_is_worth(campaign, results: Path) -> None:
+    """Print whether the checks passed, and, which is another thing, where the models are known to hold."""
+    from icha.analysis.checks import read_checks
+    from icha.planning.results import campaign_files
+    from icha.planning.validity import found_validity
+
+    files = campaign_files(campaign)
+    found = read_checks(results / files.checks)
+    passed = sum(check.passed for check in found)
+    print(f"checks:  {passed if passed < len(found) else 'all'} of {len(found)} passed: the equations are solved")
+    print("Whether the models hold here is another question:")
+    _say_what_holds(found_validity(campaign, results / files.dataset))
+
+
+def _say_what_holds(statements) -> None:
+    for statement in statements:
+        typer.secho(f"{statement.about + ':':<10}{statement.text}", fg=None if statement.good else "yellow")
 
 
 def _heading(text: str) -> None:

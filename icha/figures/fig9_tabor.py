@@ -146,7 +146,7 @@ def _draw_curve(panels, points, look):
 
 def _finish(ax, smallest, largest):
     """Shade where the jump-in was not verified, and choose the limits of the axes."""
-    from icha.asperity.jkr import WU_RANGE
+    from icha.asperity.material import WU_RANGE
 
     low, high = ax.get_xlim()
     # A range of attraction that was rounded does not leave what was verified.

@@ -1,5 +1,7 @@
 """What of a campaign's surfaces the costs of their runs depend on, before a surface is made."""
 
+import math
+
 from icha.configuration.campaign import Campaign
 from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.configuration.surfaces import SelfAffineSurface
@@ -13,6 +15,17 @@ def roughness(campaign: Campaign, name: str) -> Roughness:
         lengths = section.period, section.rolloff_wavelength, section.short_wavelength
         return roughness_of(section.grid, section.period, *self_affine_moments(*lengths, section.hurst))
     return measured_roughness(_read(section))
+
+
+def rms_curvature(campaign: Campaign, name: str) -> float:
+    """Rms curvature of a profile of a surface at rms slope 1, 1/m."""
+    section = campaign.surfaces[name]
+    if isinstance(section, SelfAffineSurface):
+        lengths = section.period, section.rolloff_wavelength, section.short_wavelength
+        _, m2, m4 = self_affine_moments(*lengths, section.hurst)
+        return math.sqrt(m4 / (2 * m2))
+    surface = _read(section)
+    return surface.rms_curvature / surface.rms_slope
 
 
 def _read(section):

@@ -17,6 +17,7 @@ from pathlib import Path
 import xarray as xr
 
 from icha.analysis.checks import Check, worst
+from icha.analysis.validity import of_dataset
 from icha.datasets.model_paper import MODEL_PAPER
 from icha.report.model_error import entry_section
 from icha.report.provenance import provenance
@@ -104,6 +105,7 @@ def write_report(
         spectra=spectra(surfaces),
         checks=worst(checks),
         check_count=len(checks),
+        validity=of_dataset(campaign, _not_self_affine(surfaces)),
         failed=[check for check in checks if not check.passed],
         times=link(times_path) if times_path is not None else None,
         configuration=configuration,
@@ -138,6 +140,11 @@ def _pictures(figures, studies, link):
         }
         for number, (study, figure) in enumerate(ordered, 1)
     ]
+
+
+def _not_self_affine(surfaces):
+    """Names of the surfaces that were not made from a spectrum."""
+    return list(dict.fromkeys(each.attrs.get("surface", "") for each in surfaces if "hurst" not in each))
 
 
 def _entries(model_error):

@@ -1,6 +1,7 @@
 """The command line without Snakemake: what it says, what it writes, how it refuses."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from conftest import REPOSITORY
 from typer.testing import CliRunner
 
 from icha.analysis.common_loads import compare_campaign
+from icha.analysis.checks import check_campaign, write_checks
 from icha.cli import app
 from icha.cli.events import Watch, last_line, reason_of
 from icha.cli.live import LiveView
@@ -23,6 +25,7 @@ from icha.cli.show import sparkline
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
 from icha.configuration.settings import run_sha256
+from icha.datasets.campaign_file.write import write_campaign
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning.belonging import belongs_to_another, claim
@@ -340,6 +343,28 @@ def test_the_kept_configuration_belongs_to_its_results(project):
     assert (results / "belongs_to.txt").read_text() == "tiny.yaml\n"
     assert belongs_to_another(results, "tiny", results / "config.used.yaml", project) is None
     assert belongs_to_another(results, "tiny", project / "config/../tiny.yaml", project) is None
+
+
+def test_what_the_models_were_verified_for_is_told_before_a_run(project, small_machine):
+    Path("tiny.yaml").write_text(TINY)
+    for said in (icha("describe", "tiny.yaml").output, icha("run", "tiny.yaml", "--anyway").output):
+        told = " ".join(said.split())
+        assert "models: asperities in load" in told
+        assert "jump-in: Wu's distance was verified for Tabor parameters of 2 to 5; " in told
+        assert "accuracy: contact area 8 to 25 % too small with adhesion" in told
+
+
+def test_checks_and_validity_are_told_apart_after_a_run(project, capsys):
+    Path("tiny.yaml").write_text(TINY)
+    campaign, results = load_configuration("tiny.yaml").campaign, project / "results/tiny"
+    write_campaign(small.runs(), results / "dataset/tiny.nc")
+    write_checks(check_campaign(small.tree()), results / "checks.json")
+    sys.modules["icha.cli.run"]._tell_what_it_is_worth(campaign, results)
+    checks, question, models, jumps, accuracy = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"checks:  all of \d+ passed: the equations are solved", checks)
+    assert question == "Whether the models hold here is another question:"
+    assert models == "models:   asperities in slopes, single" and "outside: soft on rough (" in jumps
+    assert accuracy.startswith("accuracy: contact area ")
 
 
 def test_files_that_were_cut_off_are_damaged_and_to_do_again(project):

@@ -220,6 +220,17 @@ def test_statistics_are_of_the_first_loading(write):
     ]
 
 
+def test_passed_checks_and_a_model_that_holds_are_told_apart(write):
+    text = write()
+    top = text[: text.index("</header>")]
+    assert "checks of the results: the equations are solved" in top
+    assert "partly outside" in top and "what the models were verified for" in top
+    assert "asperities in slopes, single" in top and "outside: soft on rough (" in top
+    assert "not of this kind" not in top and "in this campaign" not in top
+    beside = write(model_error=compared.errors())
+    assert 'in this campaign <a href="#error">contact area ' in beside[: beside.index("</header>")]
+
+
 def test_comparison_is_of_the_first_loading():
     study = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
     there = campaign_tree((labels, small.run(labels.seed, 1.0, labels.material)) for labels in study)

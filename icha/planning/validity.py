@@ -1,0 +1,65 @@
+"""What is known, before a campaign is run, of whether its models hold for it."""
+
+import math
+from functools import cache
+from pathlib import Path
+
+from icha.analysis.validity import Statement, named, of_dataset, statements
+from icha.asperity.material import WU_RANGE, Material
+from icha.configuration.campaign import Campaign
+from icha.configuration.cases import run_cases
+from icha.configuration.surfaces import SelfAffineSurface
+from icha.contact.models import ASPERITIES
+from icha.planning.roughness import rms_curvature
+
+# Radius of the mean curvature of the summits of a Gaussian surface times its rms curvature (McCool 1986, as in
+# icha.references.summit_theories, for which this would have to wait).
+_SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
+
+# Nine of ten of the spots that touch first have a Tabor parameter between these times that of the mean.
+_SPREAD = (0.84, 1.25)
+
+
+def expected_validity(campaign: Campaign) -> list[Statement]:
+    """What is to be expected, with Tabor parameters of summits of the mean curvature that a Gaussian surface has."""
+    curvature = cache(lambda surface: rms_curvature(campaign, surface))
+    adhesive, tabor = set(), {}
+    for case in run_cases(campaign):
+        section = campaign.materials[case.material]
+        if case.model != ASPERITIES:
+            continue
+        adhesive.add(section.surface_energy > 0)
+        if section.surface_energy > 0:
+            material = Material(section.contact_modulus, section.surface_energy, section.interaction_range)
+            radius = _SUMMIT_RADIUS / (curvature(case.surface) * case.rms_slope)
+            tabor.setdefault((case.material, case.surface), []).append(float(material.tabor_parameter(radius)))
+    models = {name: study.models for name, study in campaign.studies.items()}
+    return statements(models, adhesive, _expected_outside(tabor) if tabor else None, unlike_validated(campaign))
+
+
+def _expected_outside(tabor):
+    low, high = WU_RANGE
+    cases = [
+        f"{material} on {surface} (about {' to '.join(dict.fromkeys(map(_roughly, (min(own), max(own)))))})"
+        for (material, surface), own in tabor.items()
+        if _SPREAD[0] * min(own) < low or _SPREAD[1] * max(own) > high
+    ]
+    return f"some or all spots expected outside: {named(cases)}" if cases else ""
+
+
+def _roughly(mu):
+    return f"{float(f'{mu:.2g}'):g}"
+
+
+def unlike_validated(campaign: Campaign) -> list[str]:
+    """Surfaces that asperities press and that are not of the kind on which they were validated, self-affine."""
+    pressed = dict.fromkeys(case.surface for case in run_cases(campaign) if case.model == ASPERITIES)
+    return [name for name in pressed if not isinstance(campaign.surfaces[name], SelfAffineSurface)]
+
+
+def found_validity(campaign: Campaign, dataset: Path) -> list[Statement]:
+    """What the campaign's dataset says."""
+    import xarray as xr
+
+    with xr.open_datatree(dataset, engine="netcdf4") as tree:
+        return of_dataset(tree, unlike_validated(campaign))
