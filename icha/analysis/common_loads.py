@@ -28,7 +28,7 @@ _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
 _SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds whose runs are complete", np.int32)
 _AVERAGED = (
     ("contact_area_fraction", "area", "A/A0"),
-    ("reduced_separation", "separation", "the mean separation over the rms height"),
+    ("reduced_separation", "separation", "the mean separation, of a free square the mean gap, over the rms height"),
 )
 _STATISTICS = {
     "mean": "mean of {} over the seeds",
@@ -247,7 +247,7 @@ def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.
 
 
 def at_round_pressures(run: xr.Dataset) -> list[tuple[float, float, float]]:
-    """(p*, A/A0, mean separation over h_rms) of a run at the round reduced pressures that its first loading covers."""
+    """(p*, A/A0, mean gap over h_rms) of a run at the round reduced pressures that its first loading covers."""
     run = run.isel(step=loading_stops(run).values)
     load = run["reduced_pressure"].values
     positive = load > 0

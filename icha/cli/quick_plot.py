@@ -6,10 +6,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from icha.datasets.campaign import reduced_gap
 from icha.datasets.format import RUN, SURFACE
 from icha.datasets.labels import LABELS
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
-from icha.figures.style import COLOURS, ONE_COLUMN, TWO_COLUMNS, new_figure, styled
+from icha.datasets.surface_file import as_measured
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, gap_label
+from icha.figures.style import COLOURS, ONE_COLUMN, TWO_COLUMNS, new_figure, styled, unit_for
 from icha.support.atomic_files import whole_file
 
 # By model, in their order.
@@ -28,7 +30,7 @@ def _run(run: xr.Dataset) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.2)
     axes = figure.subplots(1, 2)
     _curves(axes, run, COLOURS[0])
-    _label(axes, loops="work" in run)
+    _label(axes, run)
     return figure
 
 
@@ -51,18 +53,19 @@ def _campaign(tree: xr.DataTree) -> Figure:
             axes[0].plot([], [], color="black", ls=ls, label=model.replace("_", " "))
         axes[0].legend()
         axes[0].set_title(name)
-        _label(axes, loops="work" in study)
+        _label(axes, study)
     return figure
 
 
 def _curves(axes, run, colour, lw=1.0, ls="-"):
     pressure = run["reduced_pressure"].values
-    for ax, name in zip(axes, ("contact_area_fraction", "reduced_separation"), strict=True):
-        ax.plot(pressure, run[name].values, color=colour, marker=".", ms=3, lw=lw, ls=ls)
+    for ax, values in zip(axes, (run["contact_area_fraction"], reduced_gap(run)), strict=True):
+        ax.plot(pressure, values, color=colour, marker=".", ms=3, lw=lw, ls=ls)
 
 
-def _label(axes, *, loops):
-    for ax, label in zip(axes, (AREA_LABEL, SEPARATION_LABEL), strict=True):
+def _label(axes, data):
+    loops = "work" in data
+    for ax, label in zip(axes, (AREA_LABEL, gap_label(data)), strict=True):
         # Loads on the way back may be tensile.
         ax.set_xscale("linear" if loops else "log")
         ax.set_xlabel(PRESSURE_LABEL)
@@ -77,10 +80,11 @@ def _surface(surface: xr.Dataset) -> Figure:
     axes = figure.subplots(1, 2) if spectrum else [figure.subplots()]
     side = float(surface["period"])
     every = max(1, surface.sizes["x"] // 1024)
-    image = axes[0].imshow(
-        surface["height"].values[::every, ::every] * 1e6, extent=np.array([0, side, 0, side]) * 1e6, origin="lower"
-    )
-    figure.colorbar(image, ax=axes[0], label="height as stored (µm)")
+    heights = surface["height"].values[::every, ::every] * as_measured(surface)
+    factor, unit = unit_for(np.abs(heights).max(), "m")
+    image = axes[0].imshow(heights * factor, extent=np.array([0, side, 0, side]) * 1e6, origin="lower")
+    how = "as measured" if "measured_rms_slope" in surface else "as stored"
+    figure.colorbar(image, ax=axes[0], label=f"height {how} ({unit})")
     axes[0].set_xlabel("x (µm)")
     axes[0].set_ylabel("y (µm)")
     if spectrum:

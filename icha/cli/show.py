@@ -83,6 +83,10 @@ def show_run(run, name: str) -> None:
     for variable, label in _CURVES.items():
         values = run[variable].values
         say(f"{label:>8} {sparkline(values)} {values.min():.3g} to {values.max():.3g}")
+    if str(run["boundary"].values) == "free":
+        gap = (run["mean_gap"] / run["rms_height"]).values
+        say(f" gap/h_rms {sparkline(gap)} {gap.min():.3g} to {gap.max():.3g}")
+        say("          u: mean separation from the half-space far away; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
         say(
             f"pull-off: {quantity(-value('pull_off_pressure'), 'Pa')} of tension; "
@@ -106,6 +110,7 @@ def _some(count: int, most: int = 12) -> list[int]:
 
 
 def _show_surface(surface, file) -> None:
+    from icha.datasets.surface_file import as_measured
     from icha.figures.style import quantity
 
     say = typer.echo
@@ -114,6 +119,11 @@ def _show_surface(surface, file) -> None:
         if key in surface.attrs:
             say(f"{key.replace('_', ' ')}: {surface.attrs[key]}")
     say("")
+    scale = as_measured(surface)
+    if scale != 1:
+        height, slope = (float(surface[name]) * scale for name in ("rms_height", "rms_slope"))
+        say(f"as measured: rms height {quantity(height, 'm')}, rms slope {slope:.4g}")
+        say("as stored, at the rms slope to which the heights are scaled:")
     for name in surface.data_vars:
         variable = surface[name]
         if variable.ndim == 0 and variable.dtype.kind in "fiu":
@@ -121,7 +131,8 @@ def _show_surface(surface, file) -> None:
             text = quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g}"
             say(f"{variable.attrs.get('long_name', name)}: {text}{'' if unit in ('1', 'm') else f' {unit}'}")
     heights = surface["height"].values
-    say(f"heights from {heights.min():.3g} to {heights.max():.3g} m, as stored; a line through the middle:")
+    low, high = (quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
+    say(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; a line through the middle:")
     say(f"  {sparkline(heights[len(heights) // 2])}")
 
 

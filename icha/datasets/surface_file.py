@@ -77,6 +77,16 @@ def write_surface(
     write_dataset(build(SURFACE, values, attributes | origin | dict(attrs)), path)
 
 
+def as_measured(surface: xr.Dataset) -> float:
+    """Factor from the heights of a surface file to those that were measured; 1 of what was not measured.
+
+    All topographies are kept at rms slope 1, whatever their own.
+    """
+    if "measured_rms_slope" not in surface:
+        return 1.0
+    return float(surface["measured_rms_slope"]) / float(surface["rms_slope"])
+
+
 def read_surface(path: str | os.PathLike) -> Surface:
     """Read the topography of a surface file.
 

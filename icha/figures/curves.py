@@ -33,8 +33,14 @@ if TYPE_CHECKING:
 PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"
 AREA_LABEL = r"contact area  $A/A_0$"
 SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
+GAP_LABEL = r"mean gap  $\langle u\rangle/h_{\mathrm{rms}}$"
 
 UNLOADING = {"ls": (0, (4, 2)), "lw": 0.7, "zorder": 2.2}
+
+
+def gap_label(data: xr.Dataset) -> str:
+    """What the mean gap of runs is called: of periodic surfaces the mean separation, of free squares not."""
+    return GAP_LABEL if (data["boundary"] == "free").any() else SEPARATION_LABEL
 
 
 class Line(NamedTuple):

@@ -10,11 +10,11 @@ from icha.datasets import results
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
-    SEPARATION_LABEL,
     UNLOADING,
     add_legends,
     draw_line,
     draw_ways_back,
+    gap_label,
     say_whose_theories,
     study_curves,
 )
@@ -39,7 +39,8 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 DECLARATION = Declaration(
     description="Contact area and mean separation against load, with theories.",
     caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b) against the reduced pressure "
+        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the "
+        "mean gap) against the reduced pressure "
         "F/(E* h'rms A0), on double logarithmic axes. Markers are results of ICHA, one for each stop of the loading "
         "path; open markers are without adhesion. Where there are several seeds, the lines are means over them at "
         "common loads, with the 95 % confidence band of the mean (Student's t). Thin dashed lines, if there are any, "
@@ -128,7 +129,7 @@ def figure(
         ax.set_xlabel(PRESSURE_LABEL)
         panel_label(ax, letter)
     left.set_ylabel(AREA_LABEL)
-    right.set_ylabel(SEPARATION_LABEL)
+    right.set_ylabel(gap_label(campaign[study].to_dataset()))
     add_legends(fig, {left: "lower right", right: "lower left"}, curves)
     return fig
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from icha.figures.curves import AREA_LABEL, SEPARATION_LABEL, bars_handle
+from icha.figures.curves import AREA_LABEL, bars_handle, gap_label
 from icha.figures.declaration import Campaign, Declaration
 from icha.figures.options import SnapshotFigure
 from icha.figures.scale import MOST_COLOURS, places_scale
@@ -38,7 +38,7 @@ DECLARATION = Declaration(
         "differ in their `interaction_range`."
     ),
     caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b), at the load given in the "
+        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean gap), at the load given in the "
         "figure, against the Tabor parameter of the surface, which is (R_c Δγ²/E*²)^(1/3) over the range of "
         "attraction, with R_c = 1/rms curvature. Runs that differ only in the range are joined by a line: at a given "
         "surface energy a longer range (smaller Tabor parameter) lets asperities jump into contact from farther away. "
@@ -97,7 +97,7 @@ def figure(
             ax.axhline(mean, color=colour, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
     if scale:
         scale.draw(fig, list(panels))
-    for ax, letter, label in zip(panels, "ab", (AREA_LABEL, SEPARATION_LABEL), strict=True):
+    for ax, letter, label in zip(panels, "ab", (AREA_LABEL, gap_label(campaign[study].to_dataset())), strict=True):
         _finish(ax, min(drawn), max(drawn))
         ax.set_ylabel(label)
         panel_label(ax, letter)

@@ -38,7 +38,14 @@ def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     runs = [(labels, run) for labels, run in study_runs(campaign, study, ragged=False) if ways_back(run)]
     if not runs:
         raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
-    return runs
+    return [(labels, _by_separation(run)) for labels, run in runs]
+
+
+def _by_separation(run):
+    """A run along its mean separation also where that is not the mean gap: it is what the load does its work along."""
+    if str(run["boundary"].values) != "free":
+        return run
+    return run.assign(reduced_separation=run["mean_separation"] / run["rms_height"])
 
 
 def detached_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:

@@ -40,6 +40,8 @@ def study_section(campaign, name, comparison):
         "failures": [(each, _failure(dataset, each)) for each in labels_of(INCOMPLETE)[:MOST_ROWS]],
         "lacking": labels_of(MISSING)[:MOST_ROWS],
         "axes": axes,
+        # Their mean gap is not the mean separation, which is that from the half-space far away.
+        "free": bool((dataset["boundary"] == "free").any()),
         "materials": [
             {
                 "name": material,
@@ -79,7 +81,7 @@ def _lines(complete):
 
 
 def _means(dataset, complete):
-    """Rows of means over seeds of A/A0 and mean separation at round pressures, with their 95 % confidence."""
+    """Rows of means over seeds of A/A0 and mean gap at round pressures, with their 95 % confidence."""
     lines = {line: own for line, own in _lines(complete).items() if len(own) > 1}
     wanted = ["reduced_pressure", "contact_area_fraction", "reduced_separation", "leg", "step_kind", "step_count"]
     wanted += ["mean_gap", "rms_height", "boundary"]
@@ -143,7 +145,7 @@ def _run(labels: RunLabels, run):
 
 
 def _table(runs):
-    """Rows of A/A0 and mean separation at round pressures: one of cells for each run."""
+    """Rows of A/A0 and mean gap at round pressures: one of cells for each run."""
     rows = [(labels, {p: (area, gap) for p, area, gap in at_round_pressures(run)}) for labels, run in runs]
     pressures = sorted({p for _, cells in rows for p in cells})
     return {"pressures": pressures, "rows": [(labels, [cells.get(p) for p in pressures]) for labels, cells in rows]}

@@ -7,6 +7,7 @@ import os
 import numpy as np
 import xarray as xr
 
+from icha.datasets.surface_file import as_measured
 from icha.figures.scale import Scale
 from icha.figures.style import COLOURS, quantity
 from icha.report.inline_svg import Curve, logarithmic_chart
@@ -25,16 +26,19 @@ def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
 
 
 def surface_row(surface):
-    """Name, seed, parameters and statistics of a surface file."""
-    lengths = ("period", "rolloff_wavelength", "short_wavelength", "rms_height")
-    numbers = ("hurst", "nayak_parameter", "measured_rms_slope")
+    """Name, seed, parameters and statistics of a surface file; those of what was measured as it was measured."""
+    lengths = ("period", "rolloff_wavelength", "short_wavelength")
+    numbers = ("hurst", "nayak_parameter")
+    scale = as_measured(surface)
     return {
         "name": surface.attrs.get("surface", ""),
         "seed": int(surface["seed"]),
         "grid": int(surface["grid"]),
         "boundary": surface.attrs.get("boundary", "periodic"),
-        "rms_slope": float(surface["rms_slope"]),
-        "curvature_radius": quantity(1 / float(surface["rms_curvature"]), "m"),
+        "measured": "measured_rms_slope" in surface,
+        "rms_slope": float(surface["rms_slope"]) * scale,
+        "rms_height": quantity(float(surface["rms_height"]) * scale, "m"),
+        "curvature_radius": quantity(1 / (float(surface["rms_curvature"]) * scale), "m"),
         **{name: float(surface[name]) if name in surface else None for name in numbers},
         **{name: quantity(float(surface[name]), "m") for name in lengths if name in surface},
     }

@@ -26,8 +26,9 @@ from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
 from icha.configuration.settings import run_sha256
 from icha.datasets.campaign_file.write import write_campaign
-from icha.datasets.files import write_dataset
+from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
+from icha.figures.style import quantity
 from icha.planning.belonging import belongs_to_another, claim
 from icha.planning.constants import FITTED
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, start_up, time_on, total
@@ -556,6 +557,30 @@ def test_the_left_out_options_of_a_single_run_fit_each_other(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     made = icha("simulate", "run.nc", *options, "--energy", "0 J/m^2", "--pressures", "1e-3")
     assert made.exit_code == 0 and "1 step" in made.output
+
+
+def test_what_was_measured_is_shown_in_its_own_units(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_surface("surface.nc", small.surface(), name="rough", seed=1)
+    surface = read_dataset("surface.nc")
+    write_dataset(surface.assign(measured_rms_slope=surface["rms_slope"] * 1e-3), "scan.nc")
+    height = 1e-3 * float(surface["rms_height"])
+    told = icha("show", "scan.nc").output
+    assert f"as measured: rms height {quantity(height, 'm')}, rms slope 0.001" in told
+    low, high = (quantity(1e-3 * float(each), "m") for each in (surface["height"].min(), surface["height"].max()))
+    assert f"heights from {low} to {high}, as measured" in told
+    assert ", as stored; a line" in icha("show", "surface.nc").output
+
+
+def test_both_separations_of_a_free_square_are_shown_and_told_apart(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = small.run()
+    free = run.assign(boundary=run["boundary"].copy(data="free"), mean_gap=run["mean_separation"] + run["rms_height"])
+    write_dataset(free.assign(mean_gap=free["mean_gap"].assign_attrs(run["mean_gap"].attrs)), "free.nc")
+    told = icha("show", "free.nc").output
+    assert "gap: mean gap between the surfaces" in told
+    ends = {line.split()[0]: line.split()[-1] for line in told.splitlines() if "/h_rms " in line and " to " in line}
+    assert float(ends["gap/h_rms"]) == pytest.approx(float(ends["u/h_rms"]) + 1, abs=0.01)
 
 
 def test_surfaces_and_campaigns_are_shown(tmp_path, monkeypatch):

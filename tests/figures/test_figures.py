@@ -31,6 +31,7 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
+from icha.figures.curves import GAP_LABEL, SEPARATION_LABEL, gap_label
 from icha.figures.maps import block_means
 from icha.figures.scale import Scale, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
@@ -924,3 +925,9 @@ def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
     tree = campaign_tree(runs)
     with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):
         fig4_contact_map.figure(tree, surface, study="one")
+
+
+def test_the_mean_gap_of_free_squares_is_not_called_mean_separation():
+    study = small.tree()["slopes"].to_dataset()
+    assert gap_label(study) == SEPARATION_LABEL
+    assert gap_label(study.assign(boundary=study["boundary"].copy(data=["free"]))) == GAP_LABEL

@@ -14,7 +14,7 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.fig15_loss import PARTS, linear_fit, shares
-from icha.figures.hysteresis import averages
+from icha.figures.hysteresis import averages, unloaded_runs
 from icha.figures.style import save
 
 MODULES = (fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map)
@@ -74,6 +74,14 @@ def test_the_exact_loops_close_and_lose_what_the_jumps_release(material):
     # A single asperity jumps off with 5/6 pi dgamma R, there with an infinite slope: the root of rounding is seen.
     last = -5 / 6 * np.pi * float(run["surface_energy"]) * separate.RADIUS / 0.5 / separate.PERIOD**2
     assert float(run["detachment_pressure"]) == pytest.approx(last, rel=1e-7, abs=1e-12)
+
+
+def test_loops_of_free_squares_are_along_the_separation_that_does_the_work():
+    ((labels, run), *_) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
+    gap = (run["mean_separation"] + run["rms_height"]).assign_attrs(run["mean_gap"].attrs)
+    free = run.assign(boundary=run["boundary"].copy(data="free"), mean_gap=gap)
+    ((_, shown),) = unloaded_runs(campaign_tree([(labels, free)]), "one")
+    np.testing.assert_allclose(shown["reduced_separation"], run["reduced_separation"])
 
 
 # --- figure 13 --------------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr
 from icha.figures.select import path_steps
-from icha.figures.style import save
+from icha.figures.style import quantity, save
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, read_benchmarks, write_times_page
 from icha.report.surfaces import read_surface_statistics
@@ -231,6 +231,18 @@ def test_passed_checks_and_a_model_that_holds_are_told_apart(write):
     assert 'in this campaign <a href="#error">contact area ' in beside[: beside.index("</header>")]
 
 
+def test_the_mean_gap_of_free_squares_is_not_called_mean_separation(write):
+    periodic = section(write(), "studies", "checks")
+    assert "mean separation over rms height" in periodic and "mean gap over rms height" not in periodic
+    free = small.run().assign(boundary=small.run()["boundary"].copy(data="free"))
+    free = free.assign(mean_gap=free["mean_separation"] + 0.5 * free["rms_height"])
+    (labels, _), *_ = small.runs()
+    text = section(write(campaign=campaign_tree([(labels, free)]), checks=[], comparison=None), "studies", "checks")
+    assert "mean gap over rms height" in text and "mean separation over" not in text
+    shown = at_round_pressures(free)[-1][2]
+    assert shown == pytest.approx(at_round_pressures(small.run())[-1][2] + 0.5) and f"{shown:.3f}" in text
+
+
 def test_comparison_is_of_the_first_loading():
     study = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
     there = campaign_tree((labels, small.run(labels.seed, 1.0, labels.material)) for labels in study)
@@ -339,6 +351,12 @@ def test_graph_shows_studies_whatever_they_are_called(write, tmp_path, name):
     assert graph.count('class="arrow"') == 2 + 1 + 1 + 2 + 2
 
 
+def _as_measured(surface, slope):
+    """Rms height, and radius of the rms curvature, of a surface of that slope."""
+    factor = slope / float(surface["rms_slope"])
+    return float(surface["rms_height"]) * factor, 1 / (float(surface["rms_curvature"]) * factor)
+
+
 def test_surfaces_show_spectra_and_where_measurements_come_from(write, tmp_path):
     text = write()
     plain = read_surface_statistics(tmp_path / "s.nc")
@@ -349,6 +367,10 @@ def test_surfaces_show_spectra_and_where_measurements_come_from(write, tmp_path)
     assert text.count('<polyline class="curve"') == 2
     for part in ("scan &amp; co.x3p", "ab" * 32, "tilt removed", "0.321"):
         assert part in text
+    # In its own units: files are kept at rms slope 1.
+    height, radius = (quantity(value, "m") for value in _as_measured(measured, 0.321))
+    scanned = re.findall(r"<tr><th>scan</th>.*?</tr>", text)[-1]
+    assert f">{height}<" in scanned and f">{radius}<" in scanned
     assert text.count("ab" * 32) == 1
     without = plain.drop_dims("psd_bin")
     assert "<polyline" not in section(write(surfaces=[without]), "surfaces", "checks")

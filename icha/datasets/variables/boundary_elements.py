@@ -9,12 +9,12 @@ _STEP = ("step",)
 
 SOLUTION = {
     **terms("x", "y"),
-    "mean_separation": Variable((), "m", "mean gap"),
+    "mean_separation": Variable((), "m", "mean separation, which is the mean gap"),
     "nominal_pressure": Variable((), "Pa", "mean traction over the nominal area, attraction included"),
     **terms("reduced_pressure"),
     "target_reduced_pressure": Variable((), "1", "reduced pressure asked for"),
     "load_error": Variable((), "1", "nominal pressure over the one asked for, minus 1"),
-    "reduced_separation": Variable((), "1", "mean gap over rms height"),
+    "reduced_separation": Variable((), "1", "mean separation over rms height"),
     "contact_area_fraction": Variable(
         (), "1", "real over nominal contact area, A/A0, corrected by the contact's perimeter"
     ),
@@ -59,7 +59,7 @@ LOOP = {
     "stored_energy": Variable(_STEP, "J m^-2", "elastic energy minus that of adhesion, per nominal area"),
     "dissipated": Variable(_STEP, "J m^-2", "work so far minus the change of the stored energy: lost in jumps"),
     "pull_off_pressure": Variable((), "Pa", "largest tension on the way up, at least 0"),
-    "pull_off_separation": Variable((), "m", "mean gap of the largest tension on the way up"),
+    "pull_off_separation": Variable((), "m", "mean separation at the largest tension on the way up"),
     "hysteresis_loss": Variable((), "J m^-2", "work of the whole loop"),
     "hysteresis_loss_error": Variable(
         (),
