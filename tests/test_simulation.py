@@ -13,6 +13,7 @@ import xarray as xr
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.asperity.stickiness import stickiness
+from icha.datasets.format import RUN, flaws
 from icha.surfaces.moments import spectral_moments
 
 PERIOD, MODULUS, ENERGY, RANGE = 100e-6, 25e6, 0.05, 2.071e-9
@@ -69,6 +70,7 @@ def test_values_asked_for_have_the_unit_of_their_kind_where_they_have_one(path, 
     for name, expected in (("step_target", steps), ("snapshot_target", snapshots)):
         attrs = run[name].attrs
         assert (attrs["units"], attrs.get("comment")) == expected
+    assert not [flaw for flaw in flaws(RUN, run) if "_target" in flaw]
     in_metres = run["step_kind"].isin(["mean_separation", "path"])
     np.testing.assert_allclose(run["step_target"][in_metres], run["mean_separation"][in_metres], rtol=1e-9)
 
