@@ -198,11 +198,10 @@ class Campaign(Section):
 
         The loads of the study's boundary elements are among them.
         """
-        asked = self.studies[study].snapshots
         loads = sorted({p for e in self.boundary_elements.values() if e.study == study for p in e.reduced_pressures})
-        if asked is None and not loads:
+        if self.studies[study].snapshots is None and not loads:
             return None
-        own = [self.studies[study].targets.last] if asked is None else [snapshot.target for snapshot in asked]
+        own = self.studies[study].own_snapshots
         return own + [("reduced_pressure", p) for p in loads if ("reduced_pressure", p) not in own]
 
     def solved(self, entry: BesideStudy) -> list[Contact]:

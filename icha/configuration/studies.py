@@ -1,12 +1,13 @@
 """Section `studies`: surfaces, materials, and the path along which one is pressed against the other."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
     Field,
     WithJsonSchema,
+    WrapValidator,
     create_model,
     model_validator,
 )
@@ -54,10 +55,33 @@ class Targets(Section):
     _check = model_validator(mode="after")(exactly_one)
 
     @property
+    def states(self) -> list[tuple[str, float]]:
+        """Kind and value (SI units) of every stop."""
+        ((kinds, values),) = self.model_dump(exclude_none=True).items()
+        return [(kinds.removesuffix("s"), value) for value in values]
+
+    @property
     def last(self) -> tuple[str, float]:
         """Kind and value (SI units) of the last stop."""
-        ((kinds, values),) = self.model_dump(exclude_none=True).items()
-        return kinds.removesuffix("s"), values[-1]
+        return self.states[-1]
+
+
+EVERY_STOP = "every_stop"
+
+
+def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
+    """A list of snapshots, or the word for all stops."""
+    if isinstance(value, str) and value != EVERY_STOP:
+        raise ValueError(f"is not a choice; allowed: a list of snapshots, or {EVERY_STOP!r}")
+    return value if value == EVERY_STOP else read_list(value)
+
+
+class _OrEveryStop:
+    """Annotation of a list in whose place the word may stand, for the JSON schema."""
+
+    def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
+        """The schema of either."""
+        return {"anyOf": [handler(core_schema), {"const": EVERY_STOP}]}
 
 
 class TurningPoint(Section):
@@ -154,9 +178,12 @@ class Study(Section):
         "and a grid of at least 4 cells (better 8) per shortest wavelength.",
     )
     targets: Targets = Field(description="Stops of the loading path.")
-    snapshots: Annotated[list[Snapshot], AfterValidator(distinct)] | None = Field(
+    snapshots: (
+        Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), _OrEveryStop()] | None
+    ) = Field(
         default=None,
-        description="States whose spots and distributions are kept; each is met exactly. Left out: the last target.",
+        description="States whose spots and distributions are kept; each is met exactly. `every_stop`: all targets. "
+        "Left out: the last target.",
     )
     unload: Flag = Field(
         default=False, description="Whether the surfaces are pulled apart again, until nothing touches any more."
@@ -181,6 +208,15 @@ class Study(Section):
     max_step: number(STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
     )
+
+    @property
+    def own_snapshots(self) -> list[tuple[str, float]]:
+        """Kind and value of the states that the study asks its runs to keep."""
+        if self.snapshots is None:
+            return [self.targets.last]
+        if self.snapshots == EVERY_STOP:
+            return self.targets.states
+        return [snapshot.target for snapshot in self.snapshots]
 
     def check_path(self, snapshots: list[tuple[str, float]] | None) -> None:
         """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
@@ -209,8 +245,9 @@ class Study(Section):
 
     def _load_problems(self):
         """Loads that a slope makes too large for the model."""
-        for key in ("snapshots", "turning_points"):
-            for index, state in enumerate(getattr(self, key) or []):
+        kept = [] if self.snapshots == EVERY_STOP else self.snapshots
+        for key, states in (("snapshots", kept), ("turning_points", self.turning_points)):
+            for index, state in enumerate(states or []):
                 for slope in self.rms_slopes:
                     if (state.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
                         yield (

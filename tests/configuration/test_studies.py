@@ -1,12 +1,14 @@
 """Section `studies`."""
 
 import pytest
+from demo_configuration import LONG_RANGE, TRUTH
 
 import icha
 from icha.configuration.cases import (
     run_cases,
 )
 from icha.configuration.settings import (
+    campaign_sha256,
     run_settings,
 )
 
@@ -49,6 +51,12 @@ BAD = {
         [{"area_fraction": 0.1, "relative_load": 0.1}],
         "exactly one of reduced_pressure, relative_load",
     ),
+    "snapshots by another word": (
+        "studies.one.snapshots",
+        "every",
+        "studies.one.snapshots: 'every' is not a choice; allowed: a list of snapshots, or 'every_stop'",
+    ),
+    "snapshots that are no list": ("studies.one.snapshots", 1, "studies.one.snapshots: 1 is not a list"),
     "load beyond the model": ("studies.one.snapshots", [{"relative_load": 0.1}], "a reduced pressure of 0.5"),
     "unload that is no truth value": ("studies.one.unload", 1, "studies.one.unload: 1 is neither true nor false"),
     "unknown control": ("studies.one.control", "force", "'separation' or 'load'"),
@@ -101,6 +109,23 @@ def test_a_study_is_a_product_of_its_lists(load):
         "snapshots": [("area_fraction", 0.02)],
         "max_step": 0.15,
     }
+
+
+def test_every_stop_is_the_same_as_all_of_them_one_by_one(load):
+    areas = [0.01, 0.02, 0.03]
+    listed = [{"area_fraction": area} for area in areas]
+    one, other = (
+        load({"studies.one.targets": {"area_fractions": areas}, "studies.one.snapshots": snapshots}).campaign
+        for snapshots in ("every_stop", listed)
+    )
+    assert run_settings(one, run_cases(one)[0])["path"]["snapshots"] == [("area_fraction", area) for area in areas]
+    assert campaign_sha256(one) == campaign_sha256(other)
+
+
+def test_loads_of_boundary_elements_are_added_to_every_stop(load):
+    entry = {"truth": TRUTH}
+    campaign = load({**LONG_RANGE, "boundary_elements": entry, "studies.one.snapshots": "every_stop"}).campaign
+    assert campaign.snapshots_of("one") == [("reduced_pressure", p) for p in (1e-3, 0.01, 0.003)]
 
 
 def test_the_way_back_is_part_of_the_path(load):
