@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.asperity.material import WU_RANGE
+from icha.asperity.material import WU_HOLDS_FROM
 from icha.contact.models import ASPERITIES
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE
@@ -55,8 +55,7 @@ def statements(
     """
     found = [Statement("models", _used(models))]
     if outside is not None:
-        low, high = (f"{mu:g}" for mu in WU_RANGE)
-        verified = f"Wu's distance was verified for Tabor parameters of {low} to {high}"
+        verified = f"Wu's distance is verified for Tabor parameters of {WU_HOLDS_FROM:g} and more"
         found.append(Statement("jump-in", f"{verified}; {outside or 'all cases inside'}", not outside))
     if adhesive:
         but = f"; not of this kind: {named(others)}" if others else ""

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import beta
 
 from icha.asperity.coalescence import united_paraboloids
-from icha.asperity.material import WU_RANGE, Material
+from icha.asperity.material import WU_HOLDS_FROM, Material
 
 _MAX_NEWTON_STEPS = 200
 
@@ -115,9 +115,8 @@ class JKR:
         return np.clip(wu, self.jump_off_approach(R), 0.0)
 
     def is_jump_in_verified(self, R):
-        """Whether Wu's formula was verified at the Tabor parameter of these paraboloids."""
-        mu = self.material.tabor_parameter(R)
-        return (mu >= WU_RANGE[0]) & (mu <= WU_RANGE[1])
+        """Whether Wu's formula holds at the Tabor parameter of these paraboloids."""
+        return self.material.tabor_parameter(R) >= WU_HOLDS_FROM
 
     # --- the half-space around the spot ---------------------------------------------------------------------
 

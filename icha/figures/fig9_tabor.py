@@ -38,14 +38,14 @@ DECLARATION = Declaration(
         "differ in their `interaction_range`."
     ),
     caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean gap), at the load given in the "
-        "figure, against the Tabor parameter of the surface, which is (R_c Δγ²/E*²)^(1/3) over the range of "
-        "attraction, with R_c = 1/rms curvature. Runs that differ only in the range are joined by a line: at a given "
+        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean "
+        "gap), at the load given in the figure, against the Tabor parameter of the surface, which is "
+        "(R_c Δγ²/E*²)^(1/3) over the range of attraction, with R_c = 1/rms curvature. Runs that differ only in the "
+        "range are joined by a line: at a given "
         "surface energy a longer range (smaller Tabor parameter) lets asperities jump into contact from farther away. "
         "Where there are several seeds, the points are means over them, and the bars are 95 % confidence intervals of "
-        "the mean (Student's t). Dashed lines are without adhesion. Shaded regions are outside the Tabor parameters "
-        "for which the jump-in distance was verified. Single asperities, whose radii differ, can be outside for every "
-        "value of the surface's Tabor parameter."
+        "the mean (Student's t). Dashed lines are without adhesion. A shaded region, if there is one, has "
+        "Tabor parameters for which the jump-in distance is not verified."
     ),
     options=TaborFigure,
 )
@@ -146,14 +146,12 @@ def _draw_curve(panels, points, look):
 
 def _finish(ax, smallest, largest):
     """Shade where the jump-in was not verified, and choose the limits of the axes."""
-    from icha.asperity.material import WU_RANGE
+    from icha.asperity.material import WU_HOLDS_FROM
 
     low, high = ax.get_xlim()
     # A range of attraction that was rounded does not leave what was verified.
-    if smallest < WU_RANGE[0] / 1.01:
-        ax.axvspan(low, WU_RANGE[0], color="0.93", lw=0, zorder=0)
-    if largest > WU_RANGE[1] * 1.01:
-        ax.axvspan(WU_RANGE[1], high, color="0.93", lw=0, zorder=0)
+    if smallest < WU_HOLDS_FROM / 1.01:
+        ax.axvspan(low, WU_HOLDS_FROM, color="0.93", lw=0, zorder=0)
     ax.set_xlim(low, high)
     ax.set_xlabel(r"Tabor parameter  $\mu$")
     bottom, top = ax.get_ylim()

@@ -21,7 +21,7 @@ surfaces:
 materials:
   bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
   inside: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 8 nm}
-  below: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 20 nm}
+  below: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 40 nm}
 studies:
   load:
     surfaces: [rough]
@@ -54,11 +54,11 @@ def test_curvatures_are_those_of_the_surfaces(campaign):
 def test_materials_and_surfaces_outside_are_named_before_the_run(campaign):
     found = {each.about: each for each in expected_validity(campaign)}
     assert not found["jump-in"].good
-    assert "expected outside: below on rough (about 1.3)" in found["jump-in"].text
+    assert "expected outside: below on rough (about 0.63)" in found["jump-in"].text
     assert "bare" not in found["jump-in"].text and "inside on" not in found["jump-in"].text
     assert found["accuracy"].text.endswith("not of this kind: scan")
 
 
 def test_afterwards_the_dataset_says_it(campaign, tmp_path):
     write_campaign(small.runs(), tmp_path / "c.nc")
-    assert found_validity(campaign, tmp_path / "c.nc")[1].text.endswith("% of single spots)")
+    assert found_validity(campaign, tmp_path / "c.nc")[1].text.endswith("; all cases inside")

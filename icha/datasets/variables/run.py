@@ -58,7 +58,7 @@ RUN = {
     "pending_count": Variable(
         _STEP, "1", "asperities past jump-in left free after breaking contact at the same step", int
     ),
-    "outside_wu_fraction": Variable(_STEP, "1", "fraction of single-asperity spots outside 2 <= mu <= 5"),
+    "outside_wu_fraction": Variable(_STEP, "1", "fraction of single-asperity spots whose Tabor parameter is below 1"),
     "snapshot_step": Variable(_SNAPSHOT, "1", "step of the snapshot", int),
     "snapshot_kind": Variable(_SNAPSHOT, "1", "quantity that the snapshot was asked to reach", str),
     "snapshot_target": Variable(_SNAPSHOT, "1", "value asked for, in the SI unit of its kind"),
