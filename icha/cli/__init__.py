@@ -6,6 +6,7 @@ import typer
 
 from icha.cli.check import check
 from icha.cli.describe import describe
+from icha.cli.explore import explore
 from icha.cli.new import new
 from icha.cli.project import told
 from icha.cli.reproduce import reproduce
@@ -46,7 +47,7 @@ def icha(
     """
 
 
-for command in (new, describe, run, simulate, show, check, verify, reproduce, upload):
+for command in (new, describe, run, simulate, show, explore, check, verify, reproduce, upload):
     app.command()(told(command))
 
 

@@ -16,6 +16,7 @@ _BY_NAME = {
     "verdict.txt": "verdict on the checks of a campaign; it has none of its own",
     "belongs_to.txt": "record of the configuration file that results belong to; it has no checks of its own",
     "report.html": "report; it has no checks of its own",
+    "explore.html": "page of `icha explore`; it has no checks of its own",
     "run_times.tsv": "times of the jobs; it has no checks of its own",
     "*.*.json": "checksum of a result; `icha run` compares it",
     "*.png": "figure; it has no checks of its own",

@@ -87,6 +87,9 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
             continue  # not known of a run that ended early
         if own.dtype.kind == "f" and own.encoding.get("dtype") == np.dtype("int32"):
             own = xr.Variable(own.dims, own.values.astype(np.int32), own.attrs)  # a float for other runs that lack it
+        if incomplete and name in ("snapshot", "spot_snapshot"):
+            # Its snapshots are counted without those that only others have.
+            own = xr.Variable(own.dims, np.searchsorted(part["snapshot"], own.values), own.attrs)
         variables[name] = own
     attrs = study.attrs | {"contact_model": labels.model} | ({"incomplete": failure.item()} if incomplete else {})
     return variables, attrs

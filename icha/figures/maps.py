@@ -19,9 +19,9 @@ def draw_whole(axes, means: np.ndarray, n: int, side: float, **look):
     return axes.imshow(drawn, extent=borders * 2, interpolation="antialiased", **look)
 
 
-def block_means(nodes: np.ndarray) -> np.ndarray:
-    """Means over blocks of nodes, as near to equal as can be, where there are too many to be drawn."""
-    count = min(len(nodes), _MOST_CELLS)
+def block_means(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
+    """Means over blocks of nodes, as near to equal as can be, where there are more than `most` along a side."""
+    count = min(len(nodes), most)
     if count == len(nodes):
         return nodes
     starts = np.arange(count) * len(nodes) // count

@@ -312,6 +312,16 @@ def test_runs_that_end_early_keep_what_they_have(tmp_path):
     np.testing.assert_array_equal(taken["nominal_pressure"].values, short["nominal_pressure"].values)
 
 
+def test_a_run_that_ends_early_keeps_its_spots_where_others_meet_their_snapshots_in_another_order(tmp_path):
+    *others, (labels, run) = [(each, run) for each, run in small.runs() if each.study == "slopes"]
+    assert not np.array_equal(run["snapshot_kind"].values, others[0][1]["snapshot_kind"].values)
+    short = run.isel(step=slice(0, 3), snapshot=slice(0, 1), spot=np.flatnonzero(run["spot_snapshot"] == 0))
+    write_dataset(campaign_tree([*others, (labels, short)]), tmp_path / "c.nc")
+    taken = select_run(read_campaign(tmp_path / "c.nc"), labels)
+    for name in ("snapshot", "snapshot_kind", "spot_snapshot", "spot_radius"):
+        np.testing.assert_array_equal(taken[name].values, short[name].values)
+
+
 def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
     holed = runs[0][1].copy(deep=True)

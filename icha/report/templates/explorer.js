@@ -1,0 +1,278 @@
+"use strict";
+// The data of the page (icha/report/explorer_data.py): contacts, each with its runs by model; and topographies.
+const { contacts, topographies } = JSON.parse(document.getElementById("data").textContent);
+const CHOICES = ["study", "surface", "rms_slope", "material", "seed"];
+const WORDS = { asperities: "asperities", boundary_elements: "boundary elements" };
+const LOOKS = { asperities: { dash: "solid", symbol: "circle" }, boundary_elements: { dash: "dash", symbol: "square" } };
+const CONTACT = "{{ colour }}";
+// Only maps are enlarged: elsewhere a finger that moves over the page scrolls it.
+const MAP = { displaylogo: false, responsive: true, displayModeBar: true, modeBarButtons: [["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]] };
+const PLOT = { displayModeBar: false, responsive: true };
+const byId = (id) => document.getElementById(id);
+const stop = byId("stop");
+
+const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+const floats = (text) => new Float32Array(bytes(text).buffer);
+// A number as text, with a true minus sign.
+const said = (value) => Number(value).toPrecision(4).replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1").replaceAll("-", "−");
+
+// What is chosen: the contact, its shown runs by model, and the run along which the slider moves; ranges of axes.
+let contact, runs, leading, ranges;
+
+// Options of a list; what was chosen remains so if it is still there.
+function fill(list, values, words = {}) {
+  const before = list.value;
+  list.replaceChildren(...values.map((value) => new Option(words[value] || String(value), value)));
+  if (values.map(String).includes(before)) list.value = before;
+  list.disabled = values.length < 2;
+}
+
+// Each list offers what there is with the choices before it.
+function choose() {
+  let left = contacts;
+  for (const name of CHOICES) {
+    fill(byId(name), [...new Set(left.map((each) => each[name]))]);
+    left = left.filter((each) => String(each[name]) === byId(name).value);
+  }
+  contact = left[0];
+  const models = Object.keys(contact.runs);
+  fill(byId("model"), models.length > 1 ? ["both", ...models] : models, { ...WORDS, both: "both, side by side" });
+  const shown = byId("model").value === "both" ? models : [byId("model").value];
+  runs = Object.fromEntries(shown.map((model) => [model, opened(contact.runs[model])]));
+  leading = Object.values(runs)[0];
+  ranges = {};
+}
+
+// A run with its curves as numbers.
+function opened(run) {
+  return { ...run, ...Object.fromEntries(["pressure", "area", "gap"].map((name) => [name, floats(run[name])])) };
+}
+
+// Which step of a run belongs to the place of the slider; -1 if the run has none.
+const stepOf = (run) => (run === leading || !run.partners ? Number(stop.value) : run.partners[Number(stop.value)]);
+// The latest snapshot at or before a step, if there is any. Snapshots stand in the order of the campaign.
+function snapshotOf(run, step) {
+  const before = run.snapshots.filter((each) => each.step <= step);
+  return before.reduce((last, each) => (last && last.step >= each.step ? last : each), undefined);
+}
+const legOf = (run, step) => (run.leg[step] % 2 ? "unloading" : "loading") + (run.leg[step] > 1 ? ` (leg ${run.leg[step]})` : "");
+
+// The colours of the style sheet as the browser resolves them in the scheme, light or dark.
+let colours;
+function mix() {
+  colours = Object.fromEntries(["ink", "soft", "line", "paper", "asperities", "boundary_elements"].map((name) => {
+    document.body.style.caretColor = `var(--${name})`;
+    return [name, getComputedStyle(document.body).caretColor];
+  }));
+}
+
+function layoutOf(x, y, more = {}) {
+  const axis = { gridcolor: colours.line, linecolor: colours.soft, zeroline: false, showline: true, mirror: true, exponentformat: "power" };
+  return {
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    font: { color: colours.ink, size: 13, family: "Georgia, serif" },
+    margin: { l: 68, r: 14, t: 30, b: 50 }, dragmode: false, showlegend: Object.keys(runs).length > 1, legend: { orientation: "h", y: 1.02, yanchor: "bottom" },
+    xaxis: { ...axis, ...x, title: { text: x.title } }, yaxis: { ...axis, ...y, title: { text: y.title } }, ...more,
+  };
+}
+const lineOf = (model) => ({ name: WORDS[model], line: { color: colours[model], dash: LOOKS[model].dash, width: 1.6 } });
+
+// The maps: a heat map of the heights, and an image of the contact that the slider replaces.
+function drawMaps() {
+  byId("maps").replaceChildren(...Object.keys(runs).map((model) => {
+    const figure = document.createElement("figure");
+    figure.innerHTML = `<figcaption class="${model}">${WORDS[model]}</figcaption><div class="map" id="map-${model}" role="img"></div>`;
+    return figure;
+  }));
+  const { grid, cells, low, high, levels } = topographies[contact.topography];
+  const heights = bytes(levels);
+  for (const [model, run] of Object.entries(runs)) {
+    const [length, unit] = unitOf(run.period), [height, heightUnit] = unitOf(run.rms_height);
+    const side = run.period * length, node = side / grid, cell = side / cells;
+    const scale = ((high - low) / 255) * run.rms_height * height, lowest = low * run.rms_height * height;
+    const z = Array.from({ length: cells }, (_, row) => Float32Array.from(heights.subarray(row * cells, (row + 1) * cells), (level) => lowest + scale * level));
+    const range = [-node / 2, side - node / 2];
+    const trace = {
+      type: "heatmap", z, x0: (cell - node) / 2, dx: cell, y0: (cell - node) / 2, dy: cell, colorscale: "Greys", reversescale: false,
+      colorbar: { thickness: 10, outlinewidth: 0, title: { text: `height (${heightUnit})`, side: "right" } },
+      hovertemplate: `x %{x:.4g} ${unit}, y %{y:.4g} ${unit}<br>height %{z:.4g} ${heightUnit}<extra></extra>`,
+    };
+    const layout = layoutOf(
+      { title: `x (${unit})`, range, constrain: "domain", minallowed: range[0], maxallowed: range[1] },
+      { title: `y (${unit})`, range, constrain: "domain", scaleanchor: "x", minallowed: range[0], maxallowed: range[1] },
+      { showlegend: false, margin: { l: 50, r: 70, t: 34, b: 48 }, dragmode: window.matchMedia("(pointer: coarse)").matches ? false : "zoom" },
+    );
+    Plotly.newPlot(`map-${model}`, [trace], layout, MAP);
+    byId(`map-${model}`).on("plotly_relayout", (change) => alike(model, change));
+  }
+}
+
+// All maps show the same part.
+function alike(model, change) {
+  const zoomed = Object.fromEntries(Object.entries(change).filter(([key]) => /axis\d?\.(range|autorange)/.test(key)));
+  if (!Object.keys(zoomed).length || alike.busy) return;
+  alike.busy = true;
+  Promise.all(Object.keys(runs).filter((other) => other !== model).map((other) => Plotly.relayout(`map-${other}`, zoomed)))
+    .finally(() => { alike.busy = false; });
+}
+
+const PREFIXES = [[1, ""], [1e3, "m"], [1e6, "µ"], [1e9, "n"], [1e12, "p"]];
+// Factor and name of the unit of length in which a value is 1 or more.
+function unitOf(metres) {
+  const [factor, prefix] = PREFIXES.find(([each]) => metres * each >= 1) || PREFIXES.at(-1);
+  return [factor, `${prefix}m`];
+}
+
+// The contact of a snapshot as the source of an image of the cell: the map as it is, or circles, again beyond each edge.
+function pictureOf(run, snapshot) {
+  if (snapshot.map) return `data:image/png;base64,${snapshot.map}`;
+  if (!snapshot.circles) return "";
+  const [x, y, radius] = snapshot.circles.map(floats), scale = 1000 / run.period, half = 500 / run.grid;
+  const circles = Array.from(x, (_, k) => {
+    const r = (radius[k] * scale).toFixed(3);
+    return `M${(x[k] * scale - r).toFixed(3)} ${(y[k] * scale).toFixed(3)}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`;
+  });
+  const shifts = run.periodic ? [-1000, 0, 1000] : [0];
+  const copies = shifts.flatMap((dx) => shifts.map((dy) => `<use href="#s" x="${dx}" y="${dy}"/>`));
+  const svg = `<svg xmlns="http://www.w3.org/2000/svg" width="2000" height="2000" viewBox="${-half} ${half - 1000} 1000 1000">`
+    + `<defs><path id="s" d="${circles.join("")}"/></defs><g transform="scale(1 -1)" fill="${CONTACT}" stroke="${CONTACT}" stroke-width="0.5">${copies.join("")}</g></svg>`;
+  return `data:image/svg+xml,${encodeURIComponent(svg)}`;
+}
+
+// The curves of all runs, each with the point at which the path is.
+function drawCurves() {
+  const type = byId("log").checked ? "log" : "linear";
+  const load = { title: "reduced pressure <i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)", type };
+  for (const [id, name, axis] of [
+    ["area", "area", { title: "contact area <i>A</i>/<i>A</i><sub>0</sub>", type }],
+    ["separation", "gap", { title: "mean gap <i>u</i>/<i>h</i><sub>rms</sub>" }],
+  ]) {
+    const curves = Object.entries(runs).map(([model, run]) => ({ x: run.pressure, y: run[name], mode: "lines", ...lineOf(model) }));
+    const points = Object.keys(runs).map((model) => ({
+      x: [], y: [], mode: "markers", showlegend: false, hoverinfo: "skip",
+      marker: { color: colours[model], symbol: LOOKS[model].symbol, size: 12, line: { color: colours.paper, width: 1.5 } },
+    }));
+    Plotly.react(id, [...curves, ...points], layoutOf(load, axis), PLOT);
+  }
+}
+
+// Which curve of a snapshot, its axes, and the powers of a length that its values have.
+const DISTRIBUTIONS = {
+  gap_density: ["gap", { title: "gap <i>u</i>/<i>h</i><sub>rms</sub>", type: "log" }, { title: "<i>P</i>(<i>u</i>) <i>h</i><sub>rms</sub>", type: "log" }, 0, 0],
+  pressure_density: ["pressure", { title: "pressure <i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)" }, { title: "<i>P</i>(<i>p</i>) <i>E</i>*<i>h</i>′<sub>rms</sub>", type: "log" }, 0, 0],
+  sizes: ["sizes", { title: "patch area <i>A</i> (UNIT²)", type: "log" }, { title: "<i>n</i>(<i>A</i>) (UNIT<sup>−4</sup>)", type: "log" }, 2, -4],
+  larger: ["larger", { title: "patch area <i>A</i> (UNIT²)", type: "log" }, { title: "patches larger than <i>A</i> (UNIT<sup>−2</sup>)", type: "log" }, 2, -2],
+};
+
+function drawDistributions(now) {
+  const [length, unit] = unitOf(leading.period);
+  for (const [id, [name, ...axes]] of Object.entries(DISTRIBUTIONS)) {
+    const curveOf = (snapshot) => snapshot[name].map((text, k) => floats(text).map((value) => value * length ** axes[2 + k]));
+    const traces = now.filter(({ snapshot }) => snapshot).map(({ model, snapshot, exact }) => {
+      const [x, y] = curveOf(snapshot);
+      const marker = { color: colours[model], symbol: LOOKS[model].symbol, size: 5 };
+      return { x, y, mode: name === "larger" ? "lines" : "lines+markers", opacity: exact ? 1 : 0.3, ...lineOf(model), marker };
+    });
+    // The axes are those of the whole path, so that it is the curves that move.
+    if (!ranges[id]) {
+      const all = Object.values(runs).flatMap((run) => run.snapshots.map(curveOf));
+      ranges[id] = [0, 1].map((k) => rangeOf(all.map((curve) => curve[k]), axes[k].type));
+    }
+    const [x, y] = [0, 1].map((k) => ({ ...axes[k], title: axes[k].title.replace("UNIT", unit), range: ranges[id][k] }));
+    Plotly.react(id, traces, layoutOf(x, y), PLOT);
+  }
+}
+
+// From the least to the largest value of some lists, with a margin; of a logarithmic axis as plotly.js wants it.
+function rangeOf(lists, type) {
+  const values = lists.flatMap((list) => Array.from(list, (value) => (type === "log" ? Math.log10(value) : value))).filter(Number.isFinite);
+  if (!values.length) return undefined;
+  const low = values.reduce((one, other) => Math.min(one, other)), high = values.reduce((one, other) => Math.max(one, other));
+  const margin = 0.04 * (high - low) || 0.5;
+  return [low - margin, high + margin];
+}
+
+// What the slider moves: contact, points, distributions and words.
+function drawStop() {
+  const now = Object.entries(runs).map(([model, run]) => {
+    const step = stepOf(run), snapshot = snapshotOf(run, step);
+    return { model, run, step, snapshot, exact: snapshot !== undefined && snapshot.step === step };
+  });
+  for (const { model, run, snapshot, exact } of now) {
+    const side = run.period * unitOf(run.period)[0], node = side / run.grid, source = snapshot ? pictureOf(run, snapshot) : "";
+    const image = { source, xref: "x", yref: "y", x: -node / 2, y: side - node / 2, sizex: side, sizey: side, sizing: "stretch", layer: "above", opacity: exact ? 1 : 0.3 };
+    Plotly.relayout(`map-${model}`, { images: source ? [image] : [] });
+    byId(`map-${model}`).setAttribute("aria-label", `Topography with the contact by ${WORDS[model]}${exact ? "" : ", not of this state"}`);
+  }
+  const points = now.map((_, k) => now.length + k);
+  for (const [id, name] of [["area", "area"], ["separation", "gap"]]) {
+    const at = (values, step) => (step < 0 ? [] : [values[step]]);
+    Plotly.restyle(id, { x: now.map(({ run, step }) => at(run.pressure, step)), y: now.map(({ run, step }) => at(run[name], step)) }, points);
+  }
+  drawDistributions(now);
+  tell(now);
+}
+
+// The state in words and numbers.
+function tell(now) {
+  const place = Number(stop.value), count = leading.pressure.length;
+  const words = `${legOf(leading, place)}, p* = ${said(leading.pressure[place])}`;
+  byId("state").textContent = `${place + 1} of ${count}: ${words}`;
+  stop.setAttribute("aria-valuetext", `${place + 1} of ${count}, ${words}`);
+  const steps = leading.snapshots.map((each) => each.step);
+  byId("before").disabled = !steps.some((step) => step < place);
+  byId("after").disabled = !steps.some((step) => step > place);
+  const rows = now.map(({ model, run, step, exact }) => {
+    const cells = step < 0 ? ["–", "–", "–", "–"] : [said(run.pressure[step]), said(run.area[step]), said(run.gap[step]), run.spots[step]];
+    return `<tr><th scope="row" class="${model}">${WORDS[model]}</th>${cells.map((cell) => `<td class="num">${cell}</td>`).join("")}<td>${exact ? "yes" : "no"}</td></tr>`;
+  });
+  byId("values").innerHTML = "<table><thead><tr><th scope='col'>Model</th><th scope='col' class='num'><i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)</th>"
+    + "<th scope='col' class='num'><i>A</i>/<i>A</i><sub>0</sub></th><th scope='col' class='num'><i>u</i>/<i>h</i><sub>rms</sub></th>"
+    + `<th scope='col' class='num'>Spots</th><th scope='col'>Snapshot</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
+  byId("notices").replaceChildren(...now.flatMap(noticesOf).map((text) => Object.assign(document.createElement("p"), { className: "notice", textContent: text })));
+}
+
+function noticesOf({ model, run, step, snapshot, exact }) {
+  const found = [], who = `By ${WORDS[model]}`;
+  if (run.failure) found.push(`${who}: the run failed; ${run.failure}`);
+  if (step < 0) found.push(`${who}: the run has no such state.`);
+  else if (!run.snapshots.length) found.push(`${who}: the run has no snapshot, so there are neither spots nor distributions to show.`);
+  else if (!snapshot) found.push(`${who}: no snapshot up to here, so spots and distributions are not shown. The first is at p* = ${said(run.pressure[Math.min(...run.snapshots.map((each) => each.step))])}.`);
+  else if (!exact) found.push(`${who}: no snapshot here. Spots and distributions, pale, are those of the last one before: ${legOf(run, snapshot.step)}, p* = ${said(run.pressure[snapshot.step])}.`);
+  if (snapshot && !snapshot.map && !snapshot.circles) found.push(`${who}: the file of the run, which has the maps of contact, was not there.`);
+  return found;
+}
+
+// Another contact, model or scheme of colours: everything is drawn anew.
+function drawAll() {
+  mix();
+  drawMaps();
+  drawCurves();
+  drawStop();
+}
+function start() {
+  choose();
+  stop.max = leading.pressure.length - 1;
+  // It begins at the last snapshot, where there is most to see.
+  stop.value = Math.max(0, ...leading.snapshots.map((each) => each.step));
+  byId("log").checked = Object.values(runs).every((run) => run.pressure.every((value) => value > 0));
+  drawAll();
+}
+// To the nearest snapshot on one side.
+function jump(side) {
+  const steps = leading.snapshots.map((each) => each.step).filter((step) => (step - Number(stop.value)) * side > 0);
+  if (steps.length) stop.value = side < 0 ? Math.max(...steps) : Math.min(...steps);
+  drawStop();
+}
+
+for (const name of [...CHOICES, "model"]) byId(name).addEventListener("change", start);
+// While the slider is dragged, each picture shows the latest place only.
+let waiting = 0;
+stop.addEventListener("input", () => {
+  waiting ||= requestAnimationFrame(() => { waiting = 0; drawStop(); });
+});
+byId("before").addEventListener("click", () => jump(-1));
+byId("after").addEventListener("click", () => jump(1));
+byId("log").addEventListener("change", () => { drawCurves(); drawStop(); });
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+start();
