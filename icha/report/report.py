@@ -19,6 +19,7 @@ import xarray as xr
 from icha.analysis.checks import Check, worst
 from icha.analysis.validity import of_dataset
 from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.results import EXPLORER
 from icha.report.model_error import entry_section
 from icha.report.provenance import provenance
 from icha.report.studies import study_section
@@ -76,7 +77,8 @@ def write_report(
     configuration : text of the configuration as used.
     dataset_path : the campaign dataset's file, to be linked.
     files : further files to be linked, by what they are called.
-    results : the folder of the campaign's results, in which the runs and surfaces lie, to be linked.
+    results : the folder of the campaign's results, in which the runs and surfaces lie, to be linked, and where a page
+        for exploring will be once it has been asked for.
     citations : further sources to cite, such as those of measurements.
     further_software : packages that the campaign needs besides those that every campaign needs.
     """
@@ -113,6 +115,7 @@ def write_report(
         dataset_name=Path(dataset_path).name if dataset_path is not None else None,
         files=linked,
         results=link(results) if results is not None else None,
+        explorer=link(Path(results, EXPLORER)) if results is not None else None,
         most_rows=MOST_ROWS,
         folded=_FOLDED,
         paper=MODEL_PAPER.line,

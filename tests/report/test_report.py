@@ -98,6 +98,12 @@ def test_page_needs_nothing_from_outside(write, tmp_path):
     assert str(tmp_path) not in write()
 
 
+def test_page_says_how_to_move_along_the_paths(write, tmp_path):
+    text = write(results=tmp_path)
+    assert "<code>icha explore results/small</code>" in text and 'href="explore.html"' in text
+    assert "icha explore" not in write()
+
+
 def test_page_shows_parameters_results_and_checks(write):
     text = write()
     passed = f"all {len(check_campaign(small.tree()))} passed"
