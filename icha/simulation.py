@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
 from icha.contact.events import Events
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel
@@ -30,7 +30,7 @@ from icha.support.rules import Integer
 from icha.surfaces.moments import spectral_moments
 from icha.surfaces.surface import Surface
 
-# Snapshots farther up, in h_rms, would not fit the bins of the gap.
+# Snapshots farther up, in h_rms, are far above any contact.
 _HIGHEST_SNAPSHOT = 20.0
 
 # The snapshot of the largest tension on the way back.
@@ -102,7 +102,7 @@ def simulate(
             "united_until": path.united_until if chosen.united_by_rule else "",
             **_of_surface(surface, material, seed),
             **observables.of_contact(),
-            **bin_values("gap", GAP_BINS * surface.rms_height),
+            **bin_values("gap", gap_bins(surface)),
             **bin_values("pressure", PRESSURE_BINS * pressure_unit),
         }
         described_here = table | CYCLE | _targets(table, path)

@@ -239,6 +239,9 @@ def _shapes(run, snapshot, state, solution):
     contact = solution["contact"].transpose("y", "x").values == 1
     height = float(solution["rms_height"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
+    gaps = solution["gap_density"].values * height
+    # The last bin of a deep surface reaches farther than that of the others.
+    gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
         "gap_distribution_distance": gap_distribution_distance(state, solution) / height,
         "pressure_distribution_distance": pressure_distribution_distance(state, solution)
@@ -246,7 +249,7 @@ def _shapes(run, snapshot, state, solution):
         "jaccard": jaccard(spots, contact),
         "shared_of_icha": shared(spots, contact),
         "shared_of_boundary_elements": shared(contact, spots),
-        "gap_density": solution["gap_density"].values * height,
+        "gap_density": gaps,
         "pressure_density": solution["pressure_density"].values * pressure,
     }
 

@@ -7,7 +7,7 @@ import numpy as np
 from icha.boundary_elements.contact import BoundaryElements
 from icha.boundary_elements.patches import centres, edges, labelled, labels_at
 from icha.boundary_elements.states import CellState
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.bins import PRESSURE_BINS, gap_bins
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
 from icha.surfaces.surface import Surface
 
@@ -47,13 +47,7 @@ class PatchObservables:
         }
 
     def of_snapshot(self, state: CellState) -> dict:
-        """Distributions of gap and pressure, the patches, and the map of contact and pressure.
-
-        Raises
-        ------
-        ValueError
-            If a gap or a pressure lies beyond the bins.
-        """
+        """Distributions of gap and pressure, the patches, and the map of contact and pressure."""
         cells = self.contact.area_of_cells(state)
         gap = self._gap_density(state, cells)
         pressure, mean = self._pressure_density(state, cells)
@@ -77,10 +71,8 @@ class PatchObservables:
 
     def _gap_density(self, state, cells):
         """Density of the gap over the nominal area, outside contact: with the area, it is whole."""
-        edges_of_bins = GAP_BINS * self.surface.rms_height
-        gap = np.maximum(self.contact.gap(state), 0.0)
-        if gap.max() > edges_of_bins[-1]:
-            raise ValueError(f"gap: {gap.max():.3e} m exceeds the largest bin, {edges_of_bins[-1]:.3e} m")
+        edges_of_bins = gap_bins(self.surface)
+        gap = np.clip(self.contact.gap(state), 0.0, edges_of_bins[-1])
         outside = 1 - self.contact.space.on_grid(state.cells, cells)
         content, _ = np.histogram(gap, edges_of_bins, weights=outside)
         return content / gap.size / np.diff(edges_of_bins)
@@ -91,10 +83,9 @@ class PatchObservables:
         # The force of a cell acts on the part of it that touches; what that is beside its area is the same everywhere.
         weight = state.fraction * (np.sum(cells) / (np.sum(state.fraction) or 1.0))
         pressure = state.pressure / weight
-        if len(pressure) and np.abs(pressure).max() > edges_of_bins[-1]:
-            raise ValueError(f"pressure: {np.abs(pressure).max():.3e} Pa exceeds the bins, {edges_of_bins[-1]:.3e} Pa")
-        content, _ = np.histogram(pressure, edges_of_bins, weights=weight)
-        force, _ = np.histogram(pressure, edges_of_bins, weights=weight * pressure)
+        counted = np.clip(pressure, edges_of_bins[0], edges_of_bins[-1])
+        content, _ = np.histogram(counted, edges_of_bins, weights=weight)
+        force, _ = np.histogram(counted, edges_of_bins, weights=weight * pressure)
         mean = np.divide(force, content, out=np.zeros(len(content)), where=content > 0)
         return content / self.contact.heights.size / np.diff(edges_of_bins), mean
 

@@ -130,6 +130,12 @@ class MeasuredSurface(Section):
         description="What is removed besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid "
         "(`curvature`). Left out: `tilt`, or `none` for a periodic topography.",
     )
+    cutoff: Length | None = Field(
+        default=None,
+        description="Cut-off wavelength: shorter waves are taken out, before the edges are treated, by a Gaussian "
+        "S-filter (ISO 25178-3, areal filter of ISO 16610-61) with this nesting index, which halves waves of this "
+        "length. At least 4 pixels. Left out: nothing is filtered.",
+    )
     boundary: Literal["periodic", "window", "mirror", "free"] = Field(
         description="What lies beyond the edges: `periodic`: the topography repeats as it is; `window`: its heights "
         "fall smoothly to their mean towards the edges, and it repeats; `mirror`: the topography and its "
@@ -169,4 +175,7 @@ class MeasuredSurface(Section):
         settings = self.model_dump(exclude={"kind", "path"})
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
+        if self.cutoff is None:
+            # Known by its absence, so that results without it stay valid.
+            del settings["cutoff"]
         return settings

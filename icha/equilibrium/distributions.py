@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.asperity.law import SpotLaw
-from icha.contact.bins import GAP_BINS, GAPS_PER_DECADE, PRESSURE_BINS
+from icha.contact.bins import GAPS_PER_DECADE, PRESSURE_BINS, gap_bins
 from icha.equilibrium.states import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, row_blocks, windows
 from icha.support.parallel import on_cores
@@ -60,15 +60,10 @@ def gap_distribution(law: SpotLaw, surface: Surface, state: ContactState) -> Gap
     """P(u) from the gap field; cells on the edge of a spot count with the part that lies outside.
 
     integral of P(u) + A/A0 + overlap = 1; for a free square, 1 plus what its spots have beyond the edges. Where the
-    node of a cell lies inside a spot, the outer part of the cell has gap zero: it is the spot's edge. The field is
-    never held as a whole.
-
-    Raises
-    ------
-    ValueError
-        If a gap exceeds the largest bin, 31.6 h_rms.
+    node of a cell lies inside a spot, the outer part of the cell has gap zero: it is the spot's edge. The last bin also
+    counts what lies beyond it. The field is never held as a whole.
     """
-    edges = GAP_BINS * surface.rms_height
+    edges = gap_bins(surface)
     spots = state.spots
     field = DisplacementField(
         law,
@@ -88,11 +83,9 @@ def gap_distribution(law: SpotLaw, surface: Surface, state: ContactState) -> Gap
         place = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
         cut = np.flatnonzero(cover)
         hidden = np.bincount(place[cut], weights=np.clip(cover.ravel()[cut], 0.0, 1.0), minlength=len(edges))
-        return np.bincount(place, minlength=len(edges)) - hidden, u.max(), np.sum(cover)
+        return np.bincount(place, minlength=len(edges)) - hidden, np.sum(cover)
 
-    content, largest, covered = zip(*field.in_blocks(nodes_per_bin), strict=True)
-    if max(largest) > edges[-1]:
-        raise ValueError(f"gap: {max(largest):.3e} m exceeds the largest bin, {edges[-1]:.3e} m")
+    content, covered = zip(*field.in_blocks(nodes_per_bin), strict=True)
     content = np.sum(content, axis=0) / surface.grid**2
     beyond = 0.0
     if surface.free:
@@ -115,21 +108,15 @@ def _gap_bin(u, edges):
 def pressure_distribution(law: SpotLaw, surface: Surface, spots: Spots) -> PressureDistribution:
     """P(p) over the nominal area from the closed form for every spot (no grid).
 
-    integral of P(p) = A/A0; the sum of density, width and mean over the bins = F/A0.
-
-    Raises
-    ------
-    ValueError
-        If a pressure lies beyond the bins, which reach 500 E* h'_rms.
+    integral of P(p) = A/A0; the sum of density, width and mean over the bins = F/A0. The last bin, which ends at 500 E*
+    h'_rms, also counts what lies beyond it.
     """
     edges = PRESSURE_BINS * (law.material.contact_modulus * surface.rms_slope)
     a, R = spots.contact_radius, spots.radius_of_curvature
     area, force = np.zeros(len(edges)), np.zeros(len(edges))
     if len(a):
         largest = np.max(law.largest_pressure(a, R))
-        if largest > edges[-1]:
-            raise ValueError(f"pressure: {largest:.3e} Pa exceeds the largest bin, {edges[-1]:.3e} Pa")
-        for k, p in enumerate(edges):
+        for k, p in enumerate([*edges[:-1], max(edges[-1], largest)]):
             areas, forces = law.pressure_distribution(p, a, R)
             area[k], force[k] = np.sum(areas), np.sum(forces)
         # The edge of a JKR spot reaches minus infinity; what lies below the first edge belongs to the first bin.

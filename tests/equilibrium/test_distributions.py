@@ -1,5 +1,6 @@
 """Gap and pressure: fields and distributions against brute force, closed forms and their identities."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ from half_space import periodic_displacement
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
 from icha.equilibrium.distributions import _gap_bin, contact_cover, gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import Spots
@@ -251,7 +252,7 @@ def test_tension_only_with_adhesion(case):
     assert (tension > 0) == (contact.law.material.surface_energy > 0)
 
 
-def test_pressures_and_gaps_beyond_the_bins_are_refused():
+def test_pressures_and_gaps_beyond_the_bins_are_counted_in_the_last_one():
     surface, contact, state = pressed(0.0)
     sharp = Spots(
         state.spots.position,
@@ -261,9 +262,27 @@ def test_pressures_and_gaps_beyond_the_bins_are_refused():
         state.spots.approach,
         state.spots.members,
     )
-    with pytest.raises(ValueError, match="pressure"):
-        pressure_distribution(contact.law, surface, sharp)
-    from dataclasses import replace
+    pressures = pressure_distribution(contact.law, surface, sharp)
+    content = pressures.density * np.diff(pressures.edges)
+    assert content[-1] > 0
+    assert pressures.mean[-1] > pressures.edges[-1]
+    assert np.sum(content) == pytest.approx(np.sum(np.pi * sharp.contact_radius**2) / surface.period**2, rel=1e-9)
+    force = np.sum(contact.law.force(sharp.contact_radius, sharp.radius_of_curvature)) / surface.period**2
+    assert np.sum(content * pressures.mean) == pytest.approx(force, rel=1e-9)
 
-    with pytest.raises(ValueError, match="gap"):
-        gap_distribution(contact.law, surface, replace(state, separation=40 * surface.rms_height))
+    gaps = gap_distribution(contact.law, surface, replace(state, separation=40 * surface.rms_height))
+    content = gaps.density * np.diff(gaps.edges)
+    assert content[-1] > 0.9
+    assert np.sum(content) + contact.area_fraction(state) == pytest.approx(1, abs=1e-12)
+
+
+def test_the_last_bin_of_gaps_reaches_into_the_deepest_pit():
+    """On a flat plate with one deep pit the largest gap is the depth of the pit, far beyond 31.6 rms heights."""
+    n = 128
+    heights = 0.001 * np.cos(2 * np.pi * 8 * np.arange(n) / n) * np.ones((n, 1))
+    heights[5, 7] = -1.0
+    edges = gap_bins(Surface(heights, PERIOD))
+    assert len(edges) == len(GAP_BINS)
+    assert edges[-1] == pytest.approx(1.001, abs=1e-3)
+    shallow = Surface(np.delete(np.delete(heights, 5, axis=0), 7, axis=1), PERIOD)
+    np.testing.assert_array_equal(gap_bins(shallow), GAP_BINS * shallow.rms_height)

@@ -22,7 +22,8 @@ def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
         heights = np.concatenate([heights, heights[::-1]], axis=0)
         side = 2 * side
         said.append("joined by its mirror images")
-    grid = how.grid or heights.shape[0]
+    # Only periodic pixels can still be oblong.
+    grid = how.grid or max(heights.shape)
     if heights.shape != (grid, grid):
         heights = _resampled(heights, grid, free=how.boundary == FREE)
         said.append(f"resampled to {grid} x {grid} points")

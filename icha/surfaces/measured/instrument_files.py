@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from icha.surfaces.measured.found import Found, chosen_name, metres_of
-from icha.surfaces.measured.settings import Preparation, UnfitTopography
+from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
 
 
 def read_instrument(path: Path, how: Preparation) -> Found:
@@ -24,7 +24,10 @@ def read_instrument(path: Path, how: Preparation) -> Found:
         else:
             channel = file.channels[names.index(chosen_name(how.data, names, (), "channel"))]
         if channel.dim != 2:
-            raise UnfitTopography("data", f"is a line scan; allowed: an areal one, of {', '.join(names)}")
+            areal = [each.name for each in file.channels if each.dim == 2]
+            if not areal:
+                raise UnfitTopography("path", LINE_SCAN.format(max(channel.nb_grid_pts)))
+            raise UnfitTopography("data", f"is a line scan; allowed: a topography, of {', '.join(areal)}")
         said = channel.physical_sizes
         topography = channel.topography(**({"physical_sizes": (1.0, 1.0)} if said is None else {}))
         heights = np.ma.filled(np.ma.asarray(topography.heights()).astype(float), np.nan).T

@@ -9,8 +9,8 @@ from icha.support import in_words
 from icha.surfaces.measured.array_files import read_hdf5, read_netcdf, read_npy
 from icha.surfaces.measured.fourier_files import read_fourier
 from icha.surfaces.measured.instrument_files import read_instrument
-from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.text_files import columns_of_text, read_matrix, read_xyz
+from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
+from icha.surfaces.measured.text_files import columns_of_text, has_gwyddion_heading, read_matrix, read_xyz
 
 # Letters of what a library says about a file that it cannot read.
 _LONGEST_REASON = 160
@@ -94,6 +94,9 @@ def _read(path, name, how):
     heights = found.heights
     if heights.dtype.kind not in "iuf":
         raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; allowed: heights")
+    if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2):
+        # Two columns are x and z.
+        raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
     if heights.ndim != 2:
         raise UnfitTopography("path", f"holds an array of shape {heights.shape}; allowed: rows and columns of heights")
     if not heights.size:
@@ -110,4 +113,6 @@ def _format_of(path):
     if suffix in known:
         return known[suffix]
     columns = columns_of_text(path)
+    if columns is not None and has_gwyddion_heading(path):
+        return "matrix"
     return {None: "instrument", 3: "xyz", 4: "fourier"}.get(columns, "matrix")

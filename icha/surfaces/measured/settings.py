@@ -7,6 +7,10 @@ from dataclasses import dataclass
 WINDOW, MIRROR = "window", "mirror"
 
 
+# What is wrong with a file of one profile.
+LINE_SCAN = "is a line scan, one profile of {} points; allowed: a topography, with heights over x and y"
+
+
 class UnfitTopography(ValueError):
     """A file that is no topography or cannot be prepared as asked; `key`: the setting that is at fault."""
 
@@ -32,6 +36,7 @@ class Preparation:
     missing : "refuse" or "fill".
     crop : x, y, side (m) of the square; None: the largest, in the middle.
     detrend : "none", "tilt" or "curvature".
+    cutoff : nesting index of the S-filter, m; None: no filter.
     taper : with a window, the part of the side over which heights fall at each edge.
     grid : nodes along a side of the result; None: as the scan.
     """
@@ -47,5 +52,6 @@ class Preparation:
     missing: str = "refuse"
     crop: Mapping[str, float] | None = None
     detrend: str = "none"
+    cutoff: float | None = None
     taper: float | None = None
     grid: int | None = None

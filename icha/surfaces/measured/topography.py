@@ -2,8 +2,8 @@
 
 A measurement becomes a surface in this order, a module each: heights and lengths in metres (`scan`, by readers of
 `text_files`, `fourier_files`, `array_files` and `instrument_files`), the side that touches first up, a square cut out
-(`crop`), the trend removed (`trend`), missing points filled (`holes`), edges made what the boundary asks for, and the
-grid changed (`edges`).
+(`crop`), the trend removed (`trend`), missing points filled (`holes`), pixels made square (`pixels`), short waves taken
+out (`cutoff`), edges made what the boundary asks for, and the grid changed (`edges`).
 
 SurfaceTopography, which reads what instruments write, could remove trends and fill holes, too. It takes seconds to
 import, which every look at a configuration with a measured surface would cost, and has neither the cosine series of a
@@ -19,8 +19,10 @@ from pathlib import Path
 
 from icha.support.checksums import sha256_of
 from icha.surfaces.measured.crop import cropped
+from icha.surfaces.measured.cutoff import without_short_waves
 from icha.surfaces.measured.edges import bounded
 from icha.surfaces.measured.holes import filled
+from icha.surfaces.measured.pixels import squared
 from icha.surfaces.measured.scan import read_scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
 from icha.surfaces.measured.trend import detrended, refuse_flat
@@ -64,7 +66,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     part, said = cropped(scan, how)
     steps += said
     left = part
-    for step in (detrended, filled):
+    for step in (detrended, filled, squared, without_short_waves):
         left, said = step(left, how)
         steps += said
     refuse_flat(left, part, how)

@@ -1,0 +1,138 @@
+"""How well a scan resolves its surface: its summits, its spectrum with the noise of the instrument, and what to do."""
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.fft
+
+from icha.surfaces.measured.cutoff import LEAST_PIXELS
+from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.moments import radial_power_spectrum, ring_edges
+from icha.surfaces.summits import find_summits
+from icha.surfaces.surface import FREE, PERIODIC, Surface
+
+# The spectrum of a self-affine surface falls at least as q^-2 (its Hurst exponent is not negative), that of uncorrelated
+# noise does not fall. A floor falls less than halfway between the two, over at least this factor of wave numbers.
+_FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
+# A floor so far below the largest power is rounding.
+_ROUNDING = 1e-20
+# Cells of a wave in which its summits are resolved, and cells of a summit where the shortest waves have half of them:
+# isotropic surfaces have about 0.2 summits for every square of the shortest wave.
+RESOLVED_CELLS = 8
+LEAST_CELLS_OF_SUMMIT = 80
+# A grid is worth changing if it loses this part of its nodes along a side.
+_WORTH = 0.75
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Where the spectrum of a scan ends in noise.
+
+    power : of the noise, m^4. wavelength : m, of the wave that has as much power as the noise; shorter ones are mostly
+    noise. rms : of the noise's heights, m. slope_share : part of the mean square slope that these shorter waves have.
+    """
+
+    power: float
+    wavelength: float
+    rms: float
+    slope_share: float
+
+
+@dataclass(frozen=True, eq=False)
+class ScanResolution:
+    """A scan before its short waves are cut off, and the surface that is made of it.
+
+    measured : the scan as a square, without filter, edges and changes of its grid. used : the prepared surface.
+    cutoff : nesting index of its filter, m; None: it has none.
+    """
+
+    measured: Surface
+    used: Surface
+    cutoff: float | None
+
+    @cached_property
+    def summits(self) -> int:
+        """Number of summits of the prepared surface."""
+        try:
+            return len(find_summits(self.used))
+        except ValueError:  # there is none, as its runs will say
+            return 0
+
+    @property
+    def cells_per_summit(self) -> float:
+        """Nodes of the prepared surface for every summit."""
+        return self.used.grid**2 / max(self.summits, 1)
+
+    @cached_property
+    def noise(self) -> NoiseFloor | None:
+        """Floor of the scan's spectrum, None if it falls to its end."""
+        return noise_floor(self.measured)
+
+    @property
+    def advice(self) -> dict[str, float | int]:
+        """Keys of the configuration that would resolve the surface, in SI units; none if it is resolved."""
+        found = {}
+        cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
+        if self.noise is not None and cutoff < self.noise.wavelength * (1 - 1e-9):
+            found["cutoff"] = _rounded_up(max(self.noise.wavelength, LEAST_PIXELS * pixel))
+        elif self.cells_per_summit < LEAST_CELLS_OF_SUMMIT and cutoff < RESOLVED_CELLS * pixel * (1 - 1e-9):
+            found["cutoff"] = _rounded_up(RESOLVED_CELLS * pixel)
+        cutoff = found.get("cutoff", cutoff)
+        if cutoff:
+            grid = scipy.fft.next_fast_len(math.ceil(RESOLVED_CELLS * self.used.period / cutoff), real=True)
+            if grid <= _WORTH * self.used.grid:
+                found["grid"] = grid
+        return found if found.get("cutoff", 0.0) < self.measured.period / RESOLVED_CELLS else {}
+
+
+def scan_resolution(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
+    """Look at a scan; arguments and errors as `icha.surfaces.measured.topography.prepared_topography`."""
+    raw = {key: preparation[key] for key in preparation if key not in ("cutoff", "taper")}
+    if preparation["boundary"] != PERIODIC:
+        raw |= {"boundary": FREE, "grid": None}
+    measured = prepared_topography(path, raw).surface
+    used = prepared_topography(path, preparation).surface
+    return ScanResolution(measured, used, preparation.get("cutoff"))
+
+
+def noise_floor(surface: Surface) -> NoiseFloor | None:
+    """The floor in which the radial power spectrum of a surface ends; None if it falls to its end.
+
+    It is the longest tail of the spectrum through which the best power law falls less steeply than 1/q. Its power is
+    the geometric mean of the shorter half of its waves.
+    """
+    q, power = radial_power_spectrum(surface)
+    log_q, log_power = np.log(q), np.log(np.maximum(power, np.finfo(float).tiny))
+    tails = [k for k in range(len(q) - 2) if q[-1] >= _FLOOR_SPANS * q[k]]
+    begins = next((k for k in tails if np.polyfit(log_q[k:], log_power[k:], 1)[0] > _FLOOR_FALLS), None)
+    if begins is None:
+        return None
+    floor = float(np.exp(np.mean(log_power[(begins + len(q)) // 2 :])))
+    if floor < _ROUNDING * power.max():
+        return None
+    above = np.flatnonzero(power > 2 * floor)
+    if not len(above):  # noise, or waves shorter than pixels, is all there is
+        return None
+    k = above[-1]
+    # Between this ring and the next, on a line of logarithms.
+    there = q[k]
+    if k + 1 < len(q):
+        way = np.log(power[k] / (2 * floor)) / np.log(power[k] / power[k + 1])
+        there = q[k] * (q[k + 1] / q[k]) ** min(max(way, 0.0), 1.0)
+    slopes = power * q**2 * np.diff(ring_edges(surface) ** 2)
+    return NoiseFloor(
+        power=floor,
+        wavelength=float(2 * np.pi / there),
+        rms=math.sqrt(floor) * 2 * math.pi / surface.spacing,
+        slope_share=float(np.sum(slopes[q > there]) / np.sum(slopes)),
+    )
+
+
+def _rounded_up(length: float) -> float:
+    """To two digits."""
+    digit = 10.0 ** (math.floor(math.log10(length)) - 1)
+    return float(f"{math.ceil(length / digit * (1 - 1e-9)) * digit:.2g}")
