@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from icha.cli.options import Config, Cores, Folder, core_count
-from icha.cli.project import configuration_path, find_project, profile_settings, read_configuration, shown
+from icha.cli.project import Mistake, configuration_path, find_project, profile_settings, read_configuration, shown
+from icha.cli.scans import about_scan, check_picture, draw_scans
 from icha.support import in_words
 from icha.support.in_words import counted
 
@@ -15,6 +16,13 @@ from icha.support.in_words import counted
 def describe(
     config: Config = None,
     runs: Annotated[bool, typer.Option("--runs", help="List every file, not only the sums.")] = False,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw the measured surfaces, with their spectra, into this file (.png, .pdf or .svg).",
+            show_default=False,
+        ),
+    ] = None,
     cores: Cores = None,
     folder: Folder = None,
 ) -> None:
@@ -22,12 +30,38 @@ def describe(
 
     Nothing is computed. Times are estimates, good to about a factor of two; once some runs are done, their times are
     used. A run counts as done if its file was made with the present settings; `icha run -n` also sees changes of the
-    program.
+    program. Of measured surfaces it says how many summits they have, whether their spectra end in noise, and what is
+    advisable then.
     """
+    check_picture(plot)
     path = configuration_path(config)
     campaign = read_configuration(path).campaign
     found = find_project() or Path.cwd()
     tell(path, campaign, found, (folder or found).resolve(), core_count(cores), runs=runs)
+    _tell_of_scans(campaign, plot)
+
+
+def _tell_of_scans(campaign, plot: Path | None) -> None:
+    """Tell of the measured surfaces that are pressed, and draw them if asked."""
+    from icha.configuration.cases import run_cases
+    from icha.configuration.measured_surfaces import MeasuredSurface
+
+    pressed = {case.surface: campaign.surfaces[case.surface] for case in run_cases(campaign)}
+    measured = {name: section for name, section in pressed.items() if isinstance(section, MeasuredSurface)}
+    if not measured:
+        if plot is not None:
+            raise Mistake("--plot: draws measured surfaces; the campaign presses none")
+        return
+    from icha.surfaces.measured.resolution import scan_resolution
+
+    scans = {name: scan_resolution(section.path, section.preparation) for name, section in measured.items()}
+    typer.echo("")
+    for name, scan in scans.items():
+        for line in about_scan(name, scan):
+            typer.echo(line)
+    if plot is not None:
+        draw_scans(scans, plot)
+        typer.echo(f"drawn: {shown(plot)}")
 
 
 def tell(path: Path, campaign, project: Path, home: Path, cores: int, *, runs: bool = False, profile=None) -> None:

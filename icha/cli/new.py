@@ -1,6 +1,5 @@
 """Write a campaign to start from."""
 
-import json
 import os
 import re
 from pathlib import Path
@@ -9,7 +8,9 @@ from typing import Annotated
 
 import typer
 
+from icha.cli.measured_section import MeasuredSection, measured_section
 from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, shown
+from icha.cli.scans import about_scan, check_picture, draw_scans
 
 TEMPLATES = Path(__file__).parent / "templates"
 # Whether boundary elements stand beside the model.
@@ -33,6 +34,12 @@ def new(
             show_default=False,
         ),
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw the measured file, with its spectrum, into this file (.png, .pdf or .svg).", show_default=False
+        ),
+    ] = None,
     pull_off: Annotated[bool, typer.Option("--pull-off", help="Add a study of pull-off and hysteresis.")] = False,
     boundary_elements: Annotated[
         bool, typer.Option("--boundary-elements", help="Add runs by boundary elements.")
@@ -40,7 +47,8 @@ def new(
 ) -> None:
     """Write a commented campaign, config/campaigns/NAME.yaml, and say how to go on.
 
-    It runs as it is. With a measured file, first fill in what the file does not say; the command lists these keys.
+    It runs as it is. With a measured file, first fill in what the file does not say; the command lists these keys. It
+    also says how many summits the scan has, whether its spectrum ends in noise, and what is advisable then.
     """
     from icha.support.values import NAME_PATTERN
 
@@ -52,31 +60,26 @@ def new(
         raise Mistake(f"{name} is the campaign of {shown(campaigns(folder)[name])}; choose another name")
     if file.exists():
         raise Mistake(f"{shown(file)} is there already; choose another name, or remove it")
-    if measured is not None and boundary_elements:
-        raise Mistake(
-            "--boundary-elements and --measured cannot be combined: boundary elements need a periodic surface, and "
-            "the measured surface of the template is free"
-        )
     if data is not None and measured is None:
         raise Mistake("--data: names data in a measured file; allowed: only with --measured")
-    surface, section, to_fill_in = ("rough", _part("self_affine"), [])
-    if measured is not None:
-        surface, section, to_fill_in = _measured(measured, data, file.parent)
-    slopes = "[0.5]" if measured is None else "measured"
-    text = _part(
-        "campaign",
+    check_picture(plot)
+    if plot is not None and measured is None:
+        raise Mistake("--plot: draws a measured file; allowed: only with --measured")
+    own = None if measured is None else measured_section(measured, data, file.parent)
+    surface, section = ("rough", _part("self_affine")) if own is None else (own.name, own.text)
+    slopes = "[0.5]" if own is None else "measured"
+    values = dict(
         name=name,
         title=name.replace("_", " ").replace("-", " ").capitalize(),
-        runs="It runs once the keys marked `to fill in` have values." if to_fill_in else "It runs as it is.",
         schema=_relative(folder / "workflow/schemas/config.schema.json", file.parent),
         readme=_relative(folder / "config/README.md", folder),
         surface=surface,
         surfaces=section.rstrip("\n"),
         seeds="    seeds: 1..3                  # or a list; the figures show means and their confidence\n"
-        if measured is None
+        if own is None
         else "",
         slopes=slopes,
-        vary="hurst: [0.6, 0.8]" if measured is None else "contact_modulus: [1 MPa, 2 MPa]",
+        vary="hurst: [0.6, 0.8]" if own is None else "contact_modulus: [1 MPa, 2 MPa]",
         pull_off=_part("pull_off", surface=surface, slopes=slopes) if pull_off else "",
         models=_MODELS[boundary_elements],
         figures="".join(
@@ -90,11 +93,37 @@ def new(
         ),
     )
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+    _write(
+        file, values, "It runs as it is." if own is None else "It runs once the keys marked `to fill in` have values."
+    )
+    against = [] if own is None else _against(file, own)
+    if against:
+        _write(file, values, f"It runs once `icha describe {name}` says nothing against it any more.")
     typer.echo(f"{shown(file)} written")
-    for line in to_fill_in:
-        typer.secho(f"to fill in: {line}", fg="yellow")
+    if own is not None:
+        _tell(own, against, plot)
     typer.echo(f"next:  icha describe {name}    what it will compute\n       icha run {name}         compute it")
+
+
+def _write(file: Path, values: dict, runs: str) -> None:
+    """Write the campaign; `runs` says when it can be run."""
+    file.write_text(_part("campaign", **values, runs=runs).rstrip("\n") + "\n", encoding="utf-8")
+
+
+def _tell(section: MeasuredSection, against: list[str], plot: Path | None) -> None:
+    """Tell of a scan, what is to fill in, and what else is in the way; draw it if asked."""
+    to_scale = not section.to_fill_in.keys() - {"boundary"}
+    for line in about_scan(section.name, section.scan, to_scale=to_scale):
+        typer.echo(line)
+    if not to_scale:
+        typer.echo(f"{section.name}: `icha describe` looks at its spectrum once its units and size are filled in")
+    if plot is not None:
+        draw_scans({section.name: section.scan}, plot)
+        typer.echo(f"drawn: {shown(plot)}")
+    for key, why in section.to_fill_in.items():
+        typer.secho(f"to fill in: surfaces.{section.name}.{key} ({why})", fg="yellow")
+    for line in against:
+        typer.secho(f"to settle: {line}", fg="yellow")
 
 
 def _part(template: str, **values: str) -> str:
@@ -106,62 +135,18 @@ def _relative(path: Path, start: Path) -> str:
     return Path(os.path.relpath(path, start)).as_posix()
 
 
-def _measured(path: Path, data: str | None, start: Path) -> tuple[str, str, list[str]]:
-    """Name and section of a measured surface, and what of it is left to fill in."""
-    import numpy as np
+def _against(file: Path, section: MeasuredSection) -> list[str]:
+    """What is wrong with a configuration apart from what is to fill in, as `icha describe` will say it."""
+    from icha.configuration.errors import ConfigurationError
+    from icha.configuration.load import load_configuration
 
-    from icha.surfaces.measured.scan import read_scan
-    from icha.surfaces.measured.settings import Preparation, UnfitTopography
-
-    if path.is_dir():
-        raise Mistake(f"--measured {path}: is a folder; allowed: a file that holds a topography")
-    if not path.is_file():
-        raise Mistake(f"--measured {path}: no such file")
-    if not path.read_bytes().strip():
-        raise Mistake(f"--measured {path}: the file is empty; allowed: one that holds a topography")
-    assumed, missing = {}, {}
-    guesses = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
-    while True:
-        try:
-            scan = read_scan(path, Preparation("auto", "free", data, **assumed))
-            break
-        except UnfitTopography as error:
-            if error.key not in guesses or error.key in assumed:
-                how = "; say which by --data NAME" if error.key == "data" else ""
-                raise Mistake(f"--measured {path}: {error.key} {error}{how}") from None
-            assumed[error.key] = guesses[error.key]
-            missing[error.key] = str(error)
-    sides = None
-    if "height_unit" in missing and "size" not in missing:
-        # Coordinates without a unit would count in that of the heights, which is not known either.
-        bare = read_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
-        if bare.size != scan.size:
-            sides = bare.size
-            missing["lateral_unit"] = "is missing, and the file does not say it; left out, it is that of the heights"
-    rows, columns = scan.heights.shape
-    lines = [f"data: {json.dumps(data)}"] if data is not None else []
-    lines.append(f"# {columns} x {rows} points{_what_is_known(scan, missing, sides)}")
-    examples = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
-    for key in missing:
-        empty = " (empty: that of the heights)" if key == "lateral_unit" else ""
-        lines.append(f"{key}:        # to fill in, since the file does not say it{empty}: such as {examples[key]}")
-    if gaps := int(np.count_nonzero(~np.isfinite(scan.heights))):
-        lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
-    found = "".join(f"    {line}\n" for line in lines)
-    name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
-    section = _part("measured", surface=name, path=_relative(path.resolve(), start.resolve()), found=found)
-    return name, section, [f"surfaces.{name}.{key} ({why})" for key, why in missing.items()]
-
-
-def _what_is_known(scan, missing, sides) -> str:
-    """Size and heights of a scan; `sides` are in the file's coordinates, if it gives these without their unit."""
-    import numpy as np
-
-    known = ""
-    if sides is not None:
-        known += f" over {sides[0]:.4g} x {sides[1]:.4g} in its coordinates"
-    elif "size" not in missing:
-        known += f" over {scan.size[0] * 1e6:.4g} um x {scan.size[1] * 1e6:.4g} um"
-    if "height_unit" not in missing:
-        known += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
-    return known
+    try:
+        load_configuration(file, {"surfaces": {section.name: section.filled_in}})
+    except ConfigurationError as error:
+        lines = [line.partition(": ")[2] for line in str(error).splitlines()]
+        # Without their units, sizes and slopes are guesses.
+        guessed = {"size", "height_unit"} if section.to_fill_in.keys() - {"boundary"} else set()
+        return [
+            line for line in lines if not any(line.startswith(f"surfaces.{section.name}.{key}:") for key in guessed)
+        ]
+    return []

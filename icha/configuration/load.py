@@ -13,7 +13,13 @@ from icha.configuration.defaults import merged, place_in_defaults, with_defaults
 from icha.configuration.design import designed
 from icha.configuration.errors import ConfigurationError, line, problem_of
 from icha.configuration.measured_surfaces import MeasuredSurface
-from icha.configuration.plausibility import CONFIRMED, plausibility_problems, unusual_values
+from icha.configuration.plausibility import (
+    CONFIRMED,
+    needless_confirmations,
+    plausibility_problems,
+    unusual_topography,
+    unusual_values,
+)
 from icha.configuration.values import MEASURED
 from icha.configuration.yaml_files import dumped, read_yaml
 from icha.support.checksums import sha256_of
@@ -53,9 +59,9 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     from_file = read_yaml(path)
     written = merged(from_file, overrides or {})
     content = with_defaults(written)
-    unusual = unusual_values(written)
+    unusual, meant = unusual_values(written), written.get(CONFIRMED)
     # Told with whatever else is wrong, of which they may be the cause.
-    slips = list(plausibility_problems(unusual, written.get(CONFIRMED)))
+    slips = list(plausibility_problems(unusual, meant))
 
     def said(location, *what):
         return line(_origin(path, from_file, overrides or {}, location), location, *what)
@@ -75,8 +81,15 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     topographies, unread = _topographies(campaign)
     fail(unread)
     campaign = campaign.with_topographies(topographies)
-    fail([*campaign.problems(), *slips])
-    confirmed = [said(each.location, each.value, f"is unusual, but confirmed; usual: {each.usual}") for each in unusual]
+    for name, each in topographies.items():
+        location = "surfaces", campaign.origin("surfaces", name)
+        unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
+    slips = list(plausibility_problems(unusual, meant))
+    fail([*campaign.problems(), *slips, *needless_confirmations(unusual, meant)])
+    confirmed = [
+        said(each.location, each.value, f"is {each.source}unusual, but confirmed; usual: {each.usual}")
+        for each in unusual
+    ]
     return Configuration(campaign, dumped(written), str(path), (*campaign.warnings(), *confirmed))
 
 

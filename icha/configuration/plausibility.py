@@ -6,6 +6,7 @@ An unusual value is refused unless the list `confirmed` of the campaign names it
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from icha.support import in_words
 from icha.support.units import to_number, to_si
 from icha.support.values import Problem
 
@@ -62,17 +63,19 @@ USUAL = {
     "size": _SIDE,
     "rolloff_wavelength": _WAVE,
     "short_wavelength": _WAVE,
+    "cutoff": _WAVE,
     "rms_slope": _SLOPE,
     "rms_slopes": _SLOPE,
 }
 
 
 class Unusual(NamedTuple):
-    """An unusual value: where it is written, the value, and what is usual there."""
+    """An unusual value: where it is written, the value, what is usual there, and whence it is if it is not written."""
 
     location: tuple
     value: Any
     usual: Usual
+    source: str = ""
 
     @property
     def key(self) -> str:
@@ -96,20 +99,43 @@ def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
         yield Unusual(location, value, USUAL[name])
 
 
+def unusual_topography(location: tuple, section: Any, period: float, rms_slope: float | None) -> Iterator[Unusual]:
+    """What is unusual of a topography as its file has it.
+
+    Parameters
+    ----------
+    location : of its section. section : that. period : side of the square, m. rms_slope : its own; None if not asked for.
+    """
+    if getattr(section, "size", section) is None and not _SIDE.holds(f"{period!r} m"):
+        yield Unusual((*location, "size"), in_words.length(period), _SIDE, "as the file says, ")
+    if rms_slope is not None and not _SLOPE.holds(rms_slope):
+        about = f"rms slope {rms_slope:.3g}"
+        yield Unusual((*location, "height_unit"), about, _SLOPE, "as it follows from the units of heights and size, ")
+
+
 def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:
-    """Unusual values that are not confirmed, and what is confirmed without being unusual.
+    """Unusual values that are not confirmed.
 
     `confirmed` is the list as it is written; what is no such list is refused elsewhere.
     """
-    confirmed = [key for key in confirmed if isinstance(key, str)] if isinstance(confirmed, list) else []
     for each in unusual:
-        if each.key not in confirmed:
-            reason = f"is unusual; usual: {each.usual}; allowed: another value, or, if it is meant, this one with"
-            yield each.location, each.value, f"{reason} `{CONFIRMED}: [{each.key}]` at the top level"
+        if each.key not in _keys(confirmed):
+            reason = (
+                f"is {each.source}unusual; usual: {each.usual}; allowed: another value, or, if it is meant, this one"
+            )
+            yield each.location, each.value, f"{reason} with `{CONFIRMED}: [{each.key}]` at the top level"
+
+
+def needless_confirmations(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:
+    """What is confirmed without being unusual."""
     keys = dict.fromkeys(each.key for each in unusual)
-    for index, key in enumerate(confirmed):
+    for index, key in enumerate(_keys(confirmed)):
         if key not in keys:
             reason = (
                 f"is the key of no unusual value; allowed: {', '.join(keys) or 'nothing, for all values are usual'}"
             )
             yield (CONFIRMED, index), key, reason
+
+
+def _keys(confirmed):
+    return [key for key in confirmed if isinstance(key, str)] if isinstance(confirmed, list) else []

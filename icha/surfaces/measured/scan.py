@@ -57,7 +57,7 @@ def read_scan(path: Path, how: Preparation) -> Scan:
     """Read a file of any of the formats; errors as `icha.surfaces.measured.topography.prepared_topography`."""
     if not path.stat().st_size:
         raise UnfitTopography("path", "is empty; allowed: a file of heights")
-    name = _format_of(path) if how.format == "auto" else how.format
+    name = format_of(path) if how.format == "auto" else how.format
     found = _read(path, name, how)
     unit = how.height_unit or found.unit
     if unit is None:
@@ -106,7 +106,7 @@ def _read(path, name, how):
     return found
 
 
-def _format_of(path):
+def format_of(path: Path) -> str:
     """The format that a file has by the ending of its name and, if it is text, by its columns."""
     suffix = path.suffix.lower()
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}

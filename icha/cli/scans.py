@@ -1,0 +1,110 @@
+"""What is told and drawn of a scan before anything is computed with it."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from icha.cli.project import Mistake
+from icha.support import in_words
+
+# Endings of the pictures that can be drawn.
+PICTURES = (".png", ".pdf", ".svg")
+
+
+def check_picture(path: Path | None) -> None:
+    """Raise `Mistake` unless the path, if there is one, ends as a picture."""
+    if path is not None and path.suffix not in PICTURES:
+        raise Mistake(f"--plot {path}: ends in {path.suffix!r}; allowed: {', '.join(PICTURES)}")
+
+
+def about_scan(name: str, scan, *, to_scale: bool = True) -> Iterator[str]:
+    """Lines about the `icha.surfaces.measured.resolution.ScanResolution` of a surface of some name.
+
+    to_scale : whether the units of its heights and of its size are known.
+    """
+    from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT
+
+    used = scan.used
+    nodes = f"{used.grid} x {used.grid} nodes"
+    scale = f" {in_words.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}," if to_scale else ","
+    few = "; fewer than " if scan.cells_per_summit < LEAST_CELLS_OF_SUMMIT else "; at least "
+    yield (
+        f"{name}: {nodes}{scale} {in_words.counted(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} nodes for each"
+        f"{few}{LEAST_CELLS_OF_SUMMIT}, with which summits are resolved"
+    )
+    if not to_scale:
+        return
+    noise = scan.noise
+    if noise is None:
+        yield f"{name}: its spectrum falls to the shortest waves: no noise floor is seen"
+    else:
+        yield (
+            f"{name}: its spectrum ends in a noise floor of {in_words.length(float(f'{noise.rms:.2g}'))} rms; waves "
+            f"shorter than {in_words.length(float(f'{noise.wavelength:.2g}'))} are mostly noise, and have "
+            f"{noise.slope_share:.0%} of its mean square slope"
+        )
+    if scan.advice:
+        yield f"{name}: advisable: {' and '.join(f'`{key}: {value}`' for key, value in in_yaml(scan.advice).items())}"
+
+
+def in_yaml(advice: Mapping[str, float | int]) -> dict[str, str]:
+    """Advised keys with their values as a configuration has them."""
+    return {key: in_words.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
+
+
+def draw_scans(scans: Mapping, path: Path) -> None:
+    """Draw every scan, by its name, as a map beside its spectrum with the noise floor and the cut-off."""
+    from icha.figures.style import TWO_COLUMNS, new_figure, styled
+    from icha.support.atomic_files import whole_file
+
+    @styled
+    def drawn():
+        figure = new_figure(TWO_COLUMNS, 3.0 * len(scans))
+        for row, (name, scan) in zip(figure.subplots(len(scans), 2, squeeze=False), scans.items(), strict=True):
+            _map(figure, row[0], name, scan.used)
+            _spectrum(row[1], scan)
+        return figure
+
+    with whole_file(path) as temporary:
+        drawn().savefig(temporary, format=path.suffix[1:], dpi=150)
+
+
+def _map(figure, ax, name, surface):
+    import numpy as np
+
+    from icha.figures.style import unit_for
+
+    every = max(1, surface.grid // 1024)
+    across, along = (unit_for(value, "m") for value in (np.abs(surface.heights).max(), surface.period))
+    image = ax.imshow(
+        surface.heights[::every, ::every] * across[0],
+        extent=np.array([0, surface.period, 0, surface.period]) * along[0],
+        origin="lower",
+    )
+    figure.colorbar(image, ax=ax, label=f"height ({across[1]})")
+    ax.set_xlabel(f"x ({along[1]})")
+    ax.set_ylabel(f"y ({along[1]})")
+    ax.set_title(name)
+
+
+def _spectrum(ax, scan):
+    import numpy as np
+
+    from icha.figures.style import BLUE, GREEN, GREY, VERMILLION, quantity
+    from icha.surfaces.moments import radial_power_spectrum
+
+    q, power = radial_power_spectrum(scan.measured)
+    ax.loglog(q[power > 0], power[power > 0], color=BLUE, label="scan")
+    if scan.cutoff is not None:
+        k, used = radial_power_spectrum(scan.used)
+        # What is left of the shortest waves after the filter is rounding.
+        shown = used > 1e-3 * power[power > 0].min()
+        ax.loglog(
+            k[shown], used[shown], color=GREEN, ls="--", label=f"as used, cut off at {quantity(scan.cutoff, 'm')}"
+        )
+    if (noise := scan.noise) is not None:
+        ax.axhline(noise.power, color=VERMILLION, lw=0.8, ls=":", label=f"noise floor, {quantity(noise.rms, 'm')} rms")
+        ax.axvline(2 * np.pi / noise.wavelength, color=VERMILLION, lw=0.8, label=f"{quantity(noise.wavelength, 'm')}")
+    ax.axvline(np.pi / scan.measured.spacing / 4, color=GREY, lw=0.8, ls="-.", label="waves of 8 pixels")
+    ax.set_xlabel(r"wave number $q$ (rad/m)")
+    ax.set_ylabel(r"power spectrum $C(q)$ (m$^4$)")
+    ax.legend(loc="lower left")
