@@ -81,10 +81,8 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
         path=Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix(),
         found="".join(f"    {line}\n" for line in lines),
         boundary=_PERIODIC if boundary == "periodic" else _BOUNDARY,
-        cutoff=f"    # cutoff: {cutoff:<18} # {advised['cutoff']}shorter waves are filtered out: noise, and what pixels do "
-        "not resolve\n",
-        grid=f"# grid: {grid:<20} # {advised['grid']}resampled to this many nodes along a side: coarser is quicker, but "
-        "loses short waves",
+        cutoff=f"    # cutoff: {cutoff:<18} # {advised['cutoff']}shorter waves are filtered out\n",
+        grid=f"# grid: {grid:<20} # {advised['grid']}nodes along a side; fewer are quicker, but lose short waves",
     )
     if boundary != "periodic":
         missing = missing | {"boundary": "what lies beyond the edges: free, window, mirror or periodic"}

@@ -102,9 +102,18 @@ def _spectrum(ax, scan):
             k[shown], used[shown], color=GREEN, ls="--", label=f"as used, cut off at {quantity(scan.cutoff, 'm')}"
         )
     if (noise := scan.noise) is not None:
-        ax.axhline(noise.power, color=VERMILLION, lw=0.8, ls=":", label=f"noise floor, {quantity(noise.rms, 'm')} rms")
-        ax.axvline(2 * np.pi / noise.wavelength, color=VERMILLION, lw=0.8, label=f"{quantity(noise.wavelength, 'm')}")
+        ax.axhline(noise.power, color=VERMILLION, lw=0.8, ls=":", label=f"noise floor, {_short(noise.rms)} rms")
+        ax.axvline(
+            2 * np.pi / noise.wavelength, color=VERMILLION, lw=0.8, label=f"noise below {_short(noise.wavelength)}"
+        )
     ax.axvline(np.pi / scan.measured.spacing / 4, color=GREY, lw=0.8, ls="-.", label="waves of 8 pixels")
     ax.set_xlabel(r"wave number $q$ (rad/m)")
     ax.set_ylabel(r"power spectrum $C(q)$ (m$^4$)")
-    ax.legend(loc="lower left")
+    ax.legend(loc="upper right", frameon=True, framealpha=1, edgecolor="none", fontsize=7)
+
+
+def _short(length):
+    """A length to two digits."""
+    from icha.figures.style import quantity
+
+    return quantity(float(f"{length:.2g}"), "m")

@@ -87,8 +87,7 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
     slips = list(plausibility_problems(unusual, meant))
     fail([*campaign.problems(), *slips, *needless_confirmations(unusual, meant)])
     confirmed = [
-        said(each.location, each.value, f"is {each.source}unusual, but confirmed; usual: {each.usual}")
-        for each in unusual
+        said(each.location, each.value, f"is unusual{each.how}, but confirmed; usual: {each.usual}") for each in unusual
     ]
     return Configuration(campaign, dumped(written), str(path), (*campaign.warnings(), *confirmed))
 

@@ -78,6 +78,11 @@ class Unusual(NamedTuple):
     source: str = ""
 
     @property
+    def how(self) -> str:
+        """Whence it is, as messages add it."""
+        return f", {self.source}" if self.source else ""
+
+    @property
     def key(self) -> str:
         """How `confirmed` calls it: all entries of a list by the key of the list."""
         return ".".join(part for part in self.location if isinstance(part, str))
@@ -104,13 +109,15 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
 
     Parameters
     ----------
-    location : of its section. section : that. period : side of the square, m. rms_slope : its own; None if not asked for.
+    location, section : of the surface in the configuration.
+    period : side of the square, m.
+    rms_slope : its own; None if no study asks for it.
     """
     if getattr(section, "size", section) is None and not _SIDE.holds(f"{period!r} m"):
-        yield Unusual((*location, "size"), in_words.length(period), _SIDE, "as the file says, ")
+        yield Unusual((*location, "size"), in_words.length(period), _SIDE, "as the file has it")
     if rms_slope is not None and not _SLOPE.holds(rms_slope):
         about = f"rms slope {rms_slope:.3g}"
-        yield Unusual((*location, "height_unit"), about, _SLOPE, "as it follows from the units of heights and size, ")
+        yield Unusual((*location, "height_unit"), about, _SLOPE, "as units and size make it")
 
 
 def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:
@@ -120,9 +127,7 @@ def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Itera
     """
     for each in unusual:
         if each.key not in _keys(confirmed):
-            reason = (
-                f"is {each.source}unusual; usual: {each.usual}; allowed: another value, or, if it is meant, this one"
-            )
+            reason = f"is unusual{each.how}; usual: {each.usual}; allowed: another value, or, if it is meant, this one"
             yield each.location, each.value, f"{reason} with `{CONFIRMED}: [{each.key}]` at the top level"
 
 

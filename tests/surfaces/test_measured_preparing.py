@@ -155,18 +155,88 @@ def test_resampling_of_a_free_square_keeps_cosines(prepared, grid):
     assert surface.period == 10.0
 
 
-def test_pixels_that_are_not_square_need_a_grid(prepared):
-    y, x = (np.arange(n) + 0.5 for n in (10, 20))
-    heights = np.cos(2 * np.pi * y / 10)[:, None] + 0.5 * np.cos(4 * np.pi * x / 20)
-    with pytest.raises(UnfitTopography, match="20 x 10 points") as raised:
-        prepared(heights, boundary="free", size=(10.0, 10.0))
-    assert raised.value.key == "grid"
-    surface = prepared(heights, boundary="free", size=(10.0, 10.0), grid=16).surface
-    z = np.arange(16) + 0.5
-    wanted = np.cos(2 * np.pi * z / 16)[:, None] + 0.5 * np.cos(4 * np.pi * z / 16)
-    np.testing.assert_allclose(surface.heights, wanted, atol=1e-13)
-    with pytest.raises(UnfitTopography, match="no square"):
-        prepared(heights, boundary="free", size=(10.0, 7.3), grid=16)
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("boundary", "grid"), [("free", 16), ("free", None), ("mirror", None), ("periodic", 16)])
+def test_pixels_that_are_not_square_are_resampled(prepared, boundary, grid, turned):
+    """Whole cosines are what both series keep exactly: the cells are those of the shorter side of a pixel."""
+
+    def waves(ny, nx):
+        y, x = ((np.arange(n) + (0.5 if boundary != "periodic" else 0)) / n for n in (ny, nx))
+        return np.cos(2 * np.pi * y)[:, None] + 0.5 * np.cos(4 * np.pi * x)
+
+    heights = waves(10, 20)
+    surface = prepared(heights.T if turned else heights, boundary=boundary, size=(10.0, 10.0), grid=grid).surface
+    n = grid or 20
+    wanted = waves(n, n).T if turned else waves(n, n)
+    np.testing.assert_allclose(surface.heights[:n, :n], centred(wanted), atol=1e-12)
+    assert surface.grid == (2 * n if boundary == "mirror" else n)
+
+
+def rough_at(x, y):
+    """Heights of some waves, none shorter than 0.13, and of no period of the squares below."""
+    rng = np.random.default_rng(7)
+    q = rng.normal(size=(60, 2))
+    q *= (rng.uniform(6, 48, 60) / np.hypot(*q.T))[:, None]
+    phases = rng.uniform(0, 2 * np.pi, 60)
+    return sum(np.cos(qx * x + qy * y[:, None] + p) / np.hypot(qx, qy) for (qx, qy), p in zip(q, phases, strict=True))
+
+
+def test_square_pixels_keep_the_slope(prepared):
+    """As in a file of 128 nm x 315 nm: the slope is that of the same surface with square pixels of 128 nm."""
+    dx, dy, n = 0.0128, 0.0315, 160
+    x, y = (np.arange(n) + 0.5) * dx, (np.arange(80) + 0.5) * dy
+    result = prepared(rough_at(x, y), boundary="free", size=(n * dx, 80 * dy))
+    # 65 long pixels are 159.96 short ones.
+    n = 159
+    assert result.surface.period == pytest.approx(n * dx, rel=1e-12) and result.surface.grid == n
+    assert "resampled to 159 x 159 square ones, by the cosine series along y" in result.description
+    # The largest square in the middle begins where a long pixel does.
+    along = (np.arange(n) + 0.5) * dx
+    square = prepared(rough_at(along, (80 - 65) // 2 * dy + along), boundary="free", size=(n * dx, n * dx))
+    difference = result.surface.heights - square.surface.heights
+    inside = slice(8, -8)
+    # Near the edges across long pixels the cosine series is flat, and the scan is not.
+    assert np.std(difference[inside]) < 0.02 * square.surface.rms_height
+    assert result.rms_slope == pytest.approx(square.rms_slope, rel=0.02)
+
+
+def test_a_crop_of_pixels_that_are_not_square_is_a_square_to_less_than_a_pixel(prepared):
+    heights = rough_at(np.arange(100) * 0.128, np.arange(60) * 0.315)
+    keys = {"boundary": "free", "size": (12.8, 18.9)}
+    cropped = prepared(heights, crop={"x": 1.28, "y": 3.15, "side": 5.0}, **keys).surface
+    assert cropped.grid == 39 and 5.0 - 0.315 < cropped.period < 5.0
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free", "mirror"])
+def test_the_cutoff_is_that_of_iso_16610(prepared, boundary):
+    """A wave of the length of the nesting index is halved, one of twice it keeps 2^(-1/4), one of half it 2^-4."""
+    n = 96
+    x = (np.arange(n) + (0.5 if boundary != "periodic" else 0)) / n
+    for length, left in ((1 / 12, 0.5), (1 / 6, 2**-0.25), (1 / 24, 2**-4)):
+        heights = np.cos(2 * np.pi * x / length) * np.ones((n, 1))
+        result = prepared(heights, boundary=boundary, size=(1.0, 1.0), cutoff=1 / 12)
+        assert np.ptp(result.surface.heights) / np.ptp(heights) == pytest.approx(left, rel=2e-3)
+    assert "Gaussian S-filter (ISO 16610-61) with a nesting index of 0.0833333 m" in result.description
+
+
+def test_weights_of_the_cutoff_are_those_of_the_standard(prepared):
+    """s(x, y) = exp(-pi (x^2 + y^2)/(alpha cutoff)^2)/(alpha cutoff)^2 with alpha = sqrt(ln 2/pi), about a spike."""
+    n, cutoff = 65, 12.0
+    heights = np.zeros((n, n))
+    heights[32, 32] = 1.0
+    y, x = np.mgrid[-32:33, -32:33]
+    alpha = np.sqrt(np.log(2) / np.pi)
+    wanted = np.exp(-np.pi * (x**2 + y**2) / (alpha * cutoff) ** 2) / (alpha * cutoff) ** 2
+    surface = prepared(heights, boundary="free", size=(65.0, 65.0), cutoff=cutoff).surface
+    np.testing.assert_allclose(surface.heights, centred(wanted), atol=1e-6 * wanted.max())
+
+
+@pytest.mark.parametrize("cutoff", [3.9, 65.1])
+def test_a_cutoff_that_the_scan_does_not_hold_is_refused(prepared, cutoff):
+    heights = np.random.default_rng(1).normal(size=(65, 65))
+    with pytest.raises(UnfitTopography, match="allowed: from 4 pixels, 4 m, to the side of the square, 65 m") as raised:
+        prepared(heights, boundary="window", taper=0.1, size=(65.0, 65.0), cutoff=cutoff)
+    assert raised.value.key == "cutoff"
 
 
 @pytest.mark.parametrize("boundary", ["free", "mirror", "window"])
@@ -193,8 +263,9 @@ def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
         (np.empty((0, 12)), "path", "no heights"),
         (np.empty((12, 0)), "path", "no heights"),
         (np.ones((1, 1)), "path", "leaves 1 x 1 points"),
-        (np.arange(12.0)[None], "path", "leaves 12 x 1 points"),
-        (np.arange(12.0)[:, None], "path", "leaves 1 x 12 points"),
+        (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points; allowed: a topography"),
+        (np.arange(12.0)[:, None], "path", "is a line scan"),
+        (np.arange(24.0).reshape(12, 2), "path", "is a line scan"),
         (np.full((12, 12), np.nan), "path", "no height at all"),
         (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "would make up 132 of 144"),
         (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 among 144"),

@@ -247,6 +247,57 @@ def test_damaged_files_are_refused_with_a_remedy(tmp_path, name):
     assert str(tmp_path) not in str(raised.value)
 
 
+# As Gwyddion writes them, with its labels in the language of its menus.
+ENGLISH = ("Channel", "Width", "Height", "Value units")
+GERMAN = ("Kanal", "Breite", "Höhe", "Value units")
+
+
+@pytest.mark.parametrize("labels", [ENGLISH, GERMAN])
+@pytest.mark.parametrize("columns", [COLUMNS, 3])
+def test_heading_of_images_that_gwyddion_exports(tmp_path, labels, columns):
+    """Also where three numbers in a line would be taken for coordinates."""
+    heights = HEIGHTS[:, :columns] * 1e-9
+    values = ("Topography", f"{0.25 * columns:.2f} µm", f"{250 * ROWS:.1f} nm", "m")
+    heading = [f"# {label}: {value}" for label, value in zip(labels, values, strict=True)]
+    lines = ["\t".join(f"{height:.6e}" for height in row) for row in heights]
+    (tmp_path / "scan.txt").write_text("\n".join([*heading, *lines]) + "\n", encoding="utf-8")
+    for kind in ("auto", "matrix"):
+        read = scan(tmp_path / "scan.txt", format=kind)
+        np.testing.assert_allclose(read.heights, heights, rtol=1e-6)
+        np.testing.assert_allclose(read.size, (columns * 0.25 * UM, SIZE[1]), rtol=1e-6)
+    np.testing.assert_allclose(scan(tmp_path / "scan.txt", height_unit=UM).heights, heights * UM, rtol=1e-6)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+def test_heading_of_points_that_gwyddion_exports(tmp_path, encoding):
+    path = write_xyz(tmp_path / "scan.xyz")
+    units = "# Channel: Topography\n# Lateral units: {}\n# Value units: {}\n"
+    text = path.read_text()
+    path.write_text(units.format("nm", "nm") + text, encoding=encoding)
+    assert_read(scan(path))
+    path.write_text(units.format("µm", "nm") + text, encoding=encoding)
+    np.testing.assert_allclose(scan(path).size, np.multiply(SIZE, 1000))
+    # What is said goes before what the file says.
+    assert_read(scan(path, lateral_unit=NM))
+    assert_read(scan(path, lateral_unit=NM, height_unit=UM), UM)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("profile.txt", "\n".join(f"{k * 0.1} {k % 7}" for k in range(50))),
+        ("profile.txt", "\n".join(f"{k % 7}" for k in range(50))),
+        ("profile.xyz", "\n".join(f"{k * 0.1} 2.5 {k % 7}" for k in range(50))),
+        ("profile.csv", "X;Y;valid\n[mm];[mm];[1/0]\n" + "\n".join(f"{k * 0.1};{k % 7};1" for k in range(50))),
+    ],
+)
+def test_a_line_scan_is_refused_as_one(tmp_path, name, text):
+    (tmp_path / name).write_text(text + "\n")
+    with pytest.raises(UnfitTopography, match="is a line scan, one profile of 50 points; allowed: a topo") as raised:
+        scan(tmp_path / name, height_unit=NM, size=SIZE)
+    assert raised.value.key == "path"
+
+
 def test_what_is_missing_is_named(tmp_path):
     np.save(tmp_path / "scan.npy", HEIGHTS)
     for keys, key in (({"size": SIZE}, "height_unit"), ({"height_unit": NM}, "size")):

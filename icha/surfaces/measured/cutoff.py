@@ -19,8 +19,8 @@ _REACH = 6
 def without_short_waves(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
     """After the areal Gaussian filter of ISO 16610-61, whose nesting index is the cut-off: it halves that wave.
 
-    A wave of length l is multiplied by 2^-(cutoff/l)^2. At the edges heights go on by reflection (ISO 16610-28), those of
-    a periodic scan by its period.
+    A wave of length l is multiplied by 2^-(cutoff/l)^2. At the edges heights go on by reflection (ISO 16610-28),
+    those of a periodic scan by its period.
     """
     if how.cutoff is None:
         return scan, []

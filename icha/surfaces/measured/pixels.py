@@ -15,9 +15,9 @@ SQUARE = 1e-3
 def squared(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
     """On square cells as large as the shorter side of a pixel.
 
-    Lines along that side stay as they are. Across them, heights are those of their cosine series, which is band-limited:
-    it keeps all measured waves, hence the rms slope of each, and adds none that is shorter than two pixels. Periodic
-    scans are resampled by their Fourier series instead, when they get their grid (`icha.surfaces.measured.edges`).
+    Lines along that side stay as they are. Across them, heights are those of their cosine series, which is
+    band-limited: it keeps all measured waves, hence their rms slope, and adds none that is shorter than two pixels.
+    Periodic scans are resampled by their Fourier series, when they get their grid (`icha.surfaces.measured.edges`).
     """
     dx, dy = scan.pixel
     if how.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:

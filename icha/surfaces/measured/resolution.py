@@ -15,8 +15,8 @@ from icha.surfaces.moments import radial_power_spectrum, ring_edges
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface
 
-# The spectrum of a self-affine surface falls at least as q^-2 (its Hurst exponent is not negative), that of uncorrelated
-# noise does not fall. A floor falls less than halfway between the two, over at least this factor of wave numbers.
+# The spectrum of a self-affine surface falls at least as q^-2 (its Hurst exponent is not negative), that of
+# uncorrelated noise does not fall. A floor falls less than halfway between the two, over this factor of wave numbers.
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
 # A floor so far below the largest power is rounding.
 _ROUNDING = 1e-20
@@ -115,12 +115,10 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     if floor < _ROUNDING * power.max():
         return None
     above = np.flatnonzero(power > 2 * floor)
-    if not len(above):  # noise, or waves shorter than pixels, is all there is
-        return None
-    k = above[-1]
-    # Between this ring and the next, on a line of logarithms.
+    # Between this ring and the next, on a line of logarithms; the longest wave where noise is all there is.
+    k = above[-1] if len(above) else 0
     there = q[k]
-    if k + 1 < len(q):
+    if len(above) and k + 1 < len(q):
         way = np.log(power[k] / (2 * floor)) / np.log(power[k] / power[k + 1])
         there = q[k] * (q[k + 1] / q[k]) ** min(max(way, 0.0), 1.0)
     slopes = power * q**2 * np.diff(ring_edges(surface) ** 2)

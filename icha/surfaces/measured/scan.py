@@ -94,7 +94,7 @@ def _read(path, name, how):
     heights = found.heights
     if heights.dtype.kind not in "iuf":
         raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; allowed: heights")
-    if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2):
+    if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
         # Two columns are x and z.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
     if heights.ndim != 2:

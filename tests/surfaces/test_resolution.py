@@ -1,0 +1,94 @@
+"""What is seen of a scan before it is used: summits, the noise of the instrument, and what is advised."""
+
+import numpy as np
+import pytest
+from scans import preparation
+
+from icha import SelfAffineSpectrum, Surface
+from icha.surfaces.measured.resolution import noise_floor, scan_resolution
+from icha.surfaces.summits import find_summits
+
+SIDE, GRID = 100e-6, 200
+SPECTRUM = SelfAffineSpectrum(SIDE, 50e-6, 4e-6, 0.8, rms_slope=0.1)
+
+
+def noisy(noise, boundary="free", grid=GRID):
+    heights = SPECTRUM.realise(grid, 1).heights
+    return Surface(heights + noise * np.random.default_rng(1).normal(size=heights.shape), SIDE, boundary)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("noise", [1e-9, 10e-9, 50e-9])
+def test_noise_of_each_pixel_is_found_with_its_height(boundary, noise):
+    floor = noise_floor(noisy(noise, boundary))
+    assert floor.rms == pytest.approx(noise, rel=0.1)
+    # White noise of variance s^2 at every pixel has the spectrum s^2 (dx/2 pi)^2.
+    power = (noise * SIDE / GRID / (2 * np.pi)) ** 2
+    assert floor.power == pytest.approx(power, rel=0.2)
+    # The surface ends at 4 um; what is shorter is noise, and so is longer what is lower than the noise.
+    assert 3e-6 < floor.wavelength < 4.5e-6
+
+
+def test_the_share_of_the_slope_that_is_noise():
+    quiet, loud = (noise_floor(noisy(noise)).slope_share for noise in (1e-9, 50e-9))
+    assert quiet < 0.01 and loud > 0.5
+
+
+@pytest.mark.parametrize("hurst", [0.1, 0.5, 1.0])
+def test_a_spectrum_that_falls_to_its_end_has_no_floor(hurst):
+    for short in (SIDE / GRID * 2.001, SIDE / GRID * 8):
+        surface = SelfAffineSpectrum(SIDE, 50e-6, short, hurst, rms_slope=0.1).realise(GRID, 1)
+        assert noise_floor(surface) is None
+        assert noise_floor(Surface(surface.heights, SIDE, "free")) is None
+
+
+@pytest.fixture
+def looked_at(tmp_path):
+    def look(surface, **keys):
+        np.save(tmp_path / "scan.npy", surface.heights)
+        keys = {"height_unit": 1.0, "size": (surface.period, surface.period), "boundary": "free"} | keys
+        return scan_resolution(tmp_path / "scan.npy", preparation(**keys))
+
+    return look
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_against_noise_alone_no_cutoff_helps(looked_at, seed):
+    scan = looked_at(Surface(np.random.default_rng(seed).normal(size=(96, 96)), SIDE, "free"))
+    assert scan.noise.rms == pytest.approx(1, rel=0.1) and scan.noise.slope_share > 0.99
+    assert scan.advice == {}
+
+
+def test_above_the_noise_a_cutoff_is_advised_that_removes_it(looked_at):
+    scan = looked_at(noisy(50e-9))
+    assert scan.noise.wavelength <= scan.advice["cutoff"] <= 1.1 * scan.noise.wavelength
+    # Eight cells for every wave of the cut-off are enough.
+    again = looked_at(noisy(50e-9), cutoff=scan.advice["cutoff"])
+    assert again.advice == {} and again.noise == scan.noise
+    assert again.summits < 0.5 * scan.summits
+    clean = looked_at(noisy(0.0), cutoff=scan.advice["cutoff"])
+    assert abs(again.used.rms_slope / clean.used.rms_slope - 1) < 0.05
+
+
+def test_summits_are_those_of_the_surface_that_is_used(looked_at):
+    for keys in ({"boundary": "free"}, {"boundary": "mirror"}, {"boundary": "window", "taper": 0.1, "grid": 96}):
+        scan = looked_at(noisy(10e-9), **keys)
+        assert scan.summits == len(find_summits(scan.used))
+        assert scan.cells_per_summit == pytest.approx(scan.used.grid**2 / scan.summits)
+        assert scan.measured.grid == GRID
+
+
+def test_summits_as_small_as_pixels_are_to_be_filtered_until_they_are_resolved(looked_at):
+    fine = SelfAffineSpectrum(SIDE, 50e-6, 2.001 * SIDE / GRID, 0.8, rms_slope=0.1).realise(GRID, 1)
+    scan = looked_at(fine)
+    assert scan.noise is None and scan.cells_per_summit < 80
+    assert scan.advice == {"cutoff": pytest.approx(8 * SIDE / GRID)}
+    again = looked_at(fine, **scan.advice)
+    assert again.cells_per_summit > 80 and again.advice == {}
+
+
+def test_a_resolved_surface_needs_nothing_and_a_needlessly_fine_grid_is_told(looked_at):
+    resolved = SelfAffineSpectrum(SIDE, 50e-6, 10e-6, 0.8, rms_slope=0.1).realise(GRID, 1)
+    scan = looked_at(resolved, boundary="periodic")
+    assert scan.noise is None and scan.advice == {} and scan.cells_per_summit > 80
+    assert looked_at(resolved, boundary="periodic", cutoff=10e-6).advice == {"grid": 80}
