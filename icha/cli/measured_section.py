@@ -13,7 +13,7 @@ from icha.cli.scans import in_yaml
 _TEMPLATE = Path(__file__).parent / "templates/measured.yaml"
 # What stands in the place of what is left to fill in while the rest is checked, in SI units and in a configuration.
 _GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
-_GUESSED = {"height_unit": "nm", "size": "100 um", "lateral_unit": "um", "boundary": "window"}
+_GUESSED = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
 _EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
 
 _BOUNDARY = """\
@@ -86,7 +86,8 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     )
     if boundary != "periodic":
         missing = missing | {"boundary": "what lies beyond the edges: free, window, mirror or periodic"}
-    return MeasuredSection(name, text, missing, {key: _GUESSED[key] for key in missing}, resolution)
+    guessed = _GUESSED | {"size": [f"{columns} um", f"{rows} um"]}
+    return MeasuredSection(name, text, missing, {key: guessed[key] for key in missing}, resolution)
 
 
 def _check_file(path):
@@ -114,7 +115,11 @@ def _read(path, data):
                 raise Mistake(f"--measured {path}: {error.key} {error}{how}") from None
             assumed[error.key] = _GUESSES[error.key]
             missing[error.key] = str(error)
-    if "height_unit" in missing and "size" not in missing:
+    if "size" in missing:
+        # Pixels are square, as a rule.
+        rows, columns = scan.heights.shape
+        assumed["size"] = columns * 1e-6, rows * 1e-6
+    elif "height_unit" in missing:
         # Coordinates without a unit would count in that of the heights, which is not known either.
         bare = read_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
         if bare.size != scan.size:

@@ -23,6 +23,7 @@ from icha.cli.events import Watch, last_line, reason_of
 from icha.cli.live import LiveView
 from icha.cli.show import sparkline
 from icha.configuration.cases import run_cases
+from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
 from icha.configuration.settings import run_sha256
 from icha.datasets.campaign_file.write import write_campaign
@@ -34,6 +35,7 @@ from icha.planning.constants import FITTED
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, start_up, time_on, total
 from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
+from icha.surfaces.spectrum import SelfAffineSpectrum
 
 HEAVY = ["scipy", "pandas", "xarray", "matplotlib", "netCDF4", "snakemake"]
 
@@ -166,8 +168,106 @@ def test_one_of_several_datasets_of_a_measured_file_is_chosen_by_its_name(projec
     assert written.exit_code == 0 and "to fill in: surfaces.my.size" in written.output
     file = Path("config/campaigns/two.yaml")
     assert "It runs once the keys marked" in file.read_text() and "lateral_unit" not in file.read_text()
-    file.write_text(file.read_text().replace("size: ", "size: 16 um"))
+    file.write_text(file.read_text().replace("size: ", "size: 16 um").replace("boundary: ", "boundary: free"))
     assert load_configuration(file).campaign.surfaces["my"].data == "second"
+
+
+def write_scan(file, heights, size):
+    """As Gwyddion exports it: with size and units."""
+    heading = ["# Channel: Z", f"# Width: {size[0]}", f"# Height: {size[1]}", "# Value units: m"]
+    rows = [" ".join(f"{height:.8e}" for height in row) for row in heights]
+    Path(file).write_text("\n".join([*heading, *rows]) + "\n")
+
+
+def rough_heights(noise=0.0, grid=64, side=10e-6):
+    heights = SelfAffineSpectrum(side, side, side / 8, 0.8, rms_slope=0.1).realise(grid, 1).heights
+    return heights + noise * np.random.default_rng(1).normal(size=heights.shape)
+
+
+@pytest.mark.parametrize("boundary", ["free", "window", "mirror", "periodic"])
+def test_of_a_file_that_says_all_only_the_boundary_is_left_to_fill_in(project, boundary):
+    write_scan("scan.txt", rough_heights(), ("10 um", "10 um"))
+    written = icha("new", "mine", "--measured", "scan.txt")
+    assert written.exit_code == 0, written.output
+    assert written.output.count("to fill in: ") == 1 and "to settle" not in written.output
+    file = Path("config/campaigns/mine.yaml")
+    text = file.read_text()
+    assert "It runs once the keys marked `to fill in` have values." in text
+    told = icha("describe", "mine")
+    assert told.exit_code == 2
+    assert "surfaces.scan.boundary: (empty) is not a choice; allowed: 'periodic', 'window', 'mirror' or 'free'" in (
+        " ".join(told.output.split())
+    )
+    # Each choice is explained there.
+    for choice in ("free", "window", "mirror", "periodic"):
+        assert any(line.strip().startswith(f"#   {choice}  ") for line in text.splitlines())
+    file.write_text(text.replace("boundary: ", f"boundary: {boundary}"))
+    assert load_configuration(file).warnings == ()
+
+
+def test_what_describe_would_refuse_is_said_when_the_campaign_is_written(project):
+    """A scan of 160 m, as a file with a wrong unit has it."""
+    write_scan("far.txt", rough_heights() * 1e7, ("160 m", "160 m"))
+    written = icha("new", "far", "--measured", "far.txt")
+    told = " ".join(written.output.split())
+    assert written.exit_code == 0
+    key = "surfaces.far.size"
+    assert f"to settle: {key}: '160 m' is unusual, as the file has it; usual: 1 nm to 1 m" in told
+    assert f"allowed: another value, or, if it is meant, this one with `confirmed: [{key}]` at the top level" in told
+    file = Path("config/campaigns/far.yaml")
+    text = file.read_text().replace("boundary: ", "boundary: free")
+    assert "It runs once `icha describe far` says nothing against it any more." in text
+    file.write_text(text)
+    refused = icha("describe", "far")
+    assert refused.exit_code == 2 and f"{key}: '160 m' is unusual" in " ".join(refused.output.split())
+    file.write_text(f"{text}\nconfirmed: [{key}]\n")
+    (warning,) = load_configuration(file).warnings
+    assert f"{key}: '160 m' is unusual, as the file has it, but confirmed" in warning
+    file.write_text(text.replace("touches_first", "size: 160 um\n    touches_first"))
+    with pytest.raises(ConfigurationError, match=r"surfaces\.far\.height_unit: 'rms slope .*' is unusual, as units"):
+        load_configuration(file)
+
+
+def test_scans_that_cannot_be_used_get_no_campaign(project):
+    for name, heights, reason in (
+        ("small", rough_heights()[:6], "leaves 6 x 6 points"),
+        ("flat", np.ones((20, 20)), "heights that are all the same"),
+        ("profile", rough_heights()[:1].T, "is a line scan, one profile of 64 points"),
+    ):
+        np.savetxt(f"{name}.txt", heights)
+        refused = icha("new", name, "--measured", f"{name}.txt")
+        assert refused.exit_code == 2 and reason in " ".join(refused.output.split())
+        assert not Path(f"config/campaigns/{name}.yaml").exists()
+
+
+def test_a_scan_is_looked_at_before_anything_is_computed(project):
+    write_scan("scan.txt", rough_heights(noise=20e-9), ("10 um", "10 um"))
+    written = icha("new", "mine", "--measured", "scan.txt", "--plot", "scan.png", "--boundary-elements")
+    lines = written.output.splitlines()
+    assert Path("scan.png").read_bytes()[:4] == b"\x89PNG"
+    noise = next(line for line in lines if "noise floor" in line)
+    rms, wavelength = re.search(r"noise floor of (\S+) nm rms; waves shorter than (\S+) um are", noise).groups()
+    assert float(rms) == pytest.approx(20, rel=0.1) and 0.5 < float(wavelength) < 2
+    advice = next(line for line in lines if "advisable" in line)
+    cutoff = re.search("`cutoff: ([^`]*)`", advice)[1]
+    file = Path("config/campaigns/mine.yaml")
+    assert f"# cutoff: {cutoff} " in file.read_text() and "# advised: " in file.read_text()
+    text = file.read_text().replace("boundary: ", "boundary: window")
+    file.write_text(text)
+    told = icha("describe", "mine", "--plot", "mine.svg")
+    assert (
+        told.exit_code == 0
+        and f"advisable: `cutoff: {cutoff}`" in told.output
+        and "<svg" in Path("mine.svg").read_text()
+    )
+    summits = [int(re.search(r"(\d+) summits?, ", each.output)[1]) for each in (written, told)]
+    # What is advised is taken by taking the sign of a remark away; the noise is seen as before, its summits are not.
+    file.write_text(text.replace("# cutoff: ", "cutoff: "))
+    filtered = icha("describe", "mine")
+    assert "noise floor of " + rms in filtered.output and "`cutoff" not in filtered.output
+    assert int(re.search(r"(\d+) summits?, ", filtered.output)[1]) < min(summits) / 2
+    assert icha("describe", "smoke", "--plot", "none.png").exit_code == 2
+    assert icha("describe", "mine", "--plot", "scan.bmp").exit_code == 2
 
 
 @pytest.mark.parametrize(

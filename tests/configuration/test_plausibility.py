@@ -53,6 +53,10 @@ def test_slips_are_found_wherever_values_are_written(load, refused, tmp_path):
         load(overrides={"materials": {"soft": {"contact_modulus": "25 mPa"}}})
 
 
+def test_a_cutoff_has_a_usual_range_too(refused):
+    refused("surfaces.rough", measured_surface(cutoff="2 m"), "surfaces.rough.cutoff: '2 m' is unusual; usual: 0.1 nm")
+
+
 @pytest.mark.parametrize("entry", ["materials.soft.contact_modulus", "materials.hard.contact_modulus", "materials"])
 def test_what_is_not_unusual_cannot_be_confirmed(entry, refused):
     refused("confirmed", [entry], f"confirmed[0]: {entry!r} is the key of no unusual value; allowed: nothing, for all")
