@@ -112,11 +112,11 @@ def _write(file: Path, values: dict, runs: str) -> None:
 
 def _tell(section: MeasuredSection, against: list[str], plot: Path | None) -> None:
     """Tell of a scan, what is to fill in, and what else is in the way; draw it if asked."""
-    to_scale = not section.to_fill_in.keys() - {"boundary"}
+    to_scale = not against and not section.to_fill_in.keys() - {"boundary"}
     for line in about_scan(section.name, section.scan, to_scale=to_scale):
         typer.echo(line)
     if not to_scale:
-        typer.echo(f"{section.name}: `icha describe` looks at its spectrum once its units and size are filled in")
+        typer.echo(f"{section.name}: `icha describe` looks at its spectrum once units and size are settled")
     if plot is not None:
         draw_scans({section.name: section.scan}, plot)
         typer.echo(f"drawn: {shown(plot)}")

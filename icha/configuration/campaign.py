@@ -45,8 +45,6 @@ from icha.support.values import (
 BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
 # Cells of boundary elements per shortest wavelength: fewer are refused, and fewer than that warned of.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
-# Rms slopes beyond this are rather a mistake about units than a surface.
-_STEEP = 3.0
 
 
 class Contact(NamedTuple):
@@ -270,7 +268,7 @@ class Campaign(Section):
         """What is allowed but not advisable."""
         found = []
         for name in dict.fromkeys(name for study in self.studies.values() for name in study.surfaces):
-            surface, topography = self.surfaces[name], self.topography(name)
+            surface = self.surfaces[name]
             origin = self.origin("surfaces", name)
             variant = "" if origin == name else f" (variant {name})"
             cells = self._cells_per_short_wave(name)
@@ -288,11 +286,6 @@ class Campaign(Section):
                     f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
                     f"wavelength{variant}, with which areas are off by a few per cent; recommended: "
                     f"{self._grid_of_cells(name, _ADVISABLE_CELLS)} or more"
-                )
-            if topography is not None and (topography.rms_slope or 0) > _STEEP:
-                found.append(
-                    f"surfaces.{origin}: the topography has an rms slope of {topography.rms_slope:g}{variant}; check "
-                    "its units of height and length, its size, and whether some number stands for missing points"
                 )
         return found
 

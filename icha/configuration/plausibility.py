@@ -43,6 +43,8 @@ class Usual(NamedTuple):
 _SIDE = Usual("m", "1 nm", "1 m", "from a few atoms to a machine part")
 _WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
 _SLOPE = Usual("1", "1e-4", "5", "from superpolished mirrors, 1e-3, to fracture surfaces, about 1")
+# Why a measured slope may be unusual.
+_OF_SLOPE = "as units, size, or a number for missing points make it"
 # By key. Wide on purpose: what is asked for by reason lies in it, a wrong prefix of a unit as a rule does not.
 USUAL = {
     "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond against something rigid, 1150 GPa"),
@@ -117,7 +119,9 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
         yield Unusual((*location, "size"), in_words.length(period), _SIDE, "as the file has it")
     if rms_slope is not None and not _SLOPE.holds(rms_slope):
         about = f"rms slope {rms_slope:.3g}"
-        yield Unusual((*location, "height_unit"), about, _SLOPE, "as units and size make it")
+        yield Unusual(
+            (*location, "height_unit"), about, _SLOPE, "as units, size, or a number for missing points make it"
+        )
 
 
 def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:

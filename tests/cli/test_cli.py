@@ -224,7 +224,7 @@ def test_what_describe_would_refuse_is_said_when_the_campaign_is_written(project
     (warning,) = load_configuration(file).warnings
     assert f"{key}: '160 m' is unusual, as the file has it, but confirmed" in warning
     file.write_text(text.replace("touches_first", "size: 160 um\n    touches_first"))
-    with pytest.raises(ConfigurationError, match=r"surfaces\.far\.height_unit: 'rms slope .*' is unusual, as units"):
+    with pytest.raises(ConfigurationError, match=r"surfaces\.far\.height_unit: 'rms slope .*' is unusual, as"):
         load_configuration(file)
 
 

@@ -104,7 +104,16 @@ def test_mistakes_about_measured_surfaces(changes, message, load, tmp_path):
     assert all("allowed: " in line or "needed: " in line for line in lines), lines
 
 
-def test_slopes_that_no_surface_has_are_a_warning(load):
+def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):
     changes = {"surfaces.rough": measured_surface(height_unit="um"), "studies.one.rms_slopes": "measured"}
-    (warning,) = load(changes).campaign.warnings()
-    assert "surfaces.rough: the topography has an rms slope of 145" in warning and "units" in warning
+    key = "surfaces.rough.height_unit"
+    refused("", changes, f"{key}: 'rms slope 146' is unusual, as units, size, or a number for missing points make it; ")
+    (warning,) = load(changes | {"confirmed": [key]}).warnings
+    assert f"{key}: 'rms slope 146' is unusual" in warning and "but confirmed; usual: 1e-4 to 5" in warning
+
+
+def test_a_surface_without_a_cutoff_has_the_checksum_that_it_had_before_there_was_one(load):
+    settings = load({"surfaces.rough": measured_surface()}).campaign.surfaces["rough"].preparation
+    assert "cutoff" not in settings
+    settings = load({"surfaces.rough": measured_surface(cutoff="4 um")}).campaign.surfaces["rough"].preparation
+    assert settings["cutoff"] == 4e-6
