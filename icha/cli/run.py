@@ -109,7 +109,8 @@ def run(
     if not anyway:
         settings = profile_settings(_profile(profile, home) if profile else home / "profiles/default")
         _ask_if_wanting(items, asked, core_count(cores), folder / "results" / campaign.name, settings)
-    _say_what_holds(expected_validity(campaign))
+    if not set(asked) - set(TARGETS):
+        _say_what_holds(expected_validity(campaign))
     watch = Watch(expected_seconds(items, f"results/{campaign.name}"), environment=FITTED.workflow.environment)
     if plain or not console.is_terminal:
         view = PlainView(watch, campaign.name, folder, lambda line: print(line, flush=True))

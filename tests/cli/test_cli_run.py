@@ -45,6 +45,16 @@ def run(project, *arguments):
     return subprocess.run(program, stderr=subprocess.STDOUT, **how)
 
 
+def at_work(process):
+    """Wait until a call has ended its first job."""
+    said = []
+    for line in process.stdout:
+        said.append(line)
+        if line.startswith("["):
+            return
+    raise AssertionError("".join(said))
+
+
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
     folder = copy_project(REPOSITORY, tmp_path_factory.mktemp("cli") / "project")
@@ -125,8 +135,7 @@ def test_it_goes_on_after_it_was_stopped(project):
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     process = subprocess.Popen(program, stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=heed, **how)
-    said = process.stdout.readline()
-    assert said.startswith("["), said
+    at_work(process)
     process.send_signal(signal.SIGINT)
     rest = process.communicate(timeout=200)[0]
     assert process.returncode == 1
