@@ -11,9 +11,17 @@ import icha.figures
 from icha.figures.declaration import Declaration
 
 
+_NUMBERED = re.compile(r"fig(\d+)_")
+
+
+def figure_number(name: str) -> int:
+    """The number of a figure, which it has everywhere: that in its name."""
+    return int(_NUMBERED.match(name)[1])
+
+
 def _names() -> list[str]:
-    matches = (re.match(r"fig(\d+)_", module.name) for module in pkgutil.iter_modules(icha.figures.__path__))
-    return [match.string for match in sorted(filter(None, matches), key=lambda match: (int(match[1]), match.string))]
+    names = [module.name for module in pkgutil.iter_modules(icha.figures.__path__) if _NUMBERED.match(module.name)]
+    return sorted(names, key=lambda name: (figure_number(name), name))
 
 
 def figure_module(name: str) -> ModuleType:

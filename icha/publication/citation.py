@@ -91,6 +91,8 @@ def citation_cff(publication: Publication, commit: str) -> str:
                 "type": "article",
                 "title": MODEL_PAPER.title,
                 "authors": [{"family-names": family, "given-names": given} for given, family in MODEL_PAPER.authors],
+                "year": MODEL_PAPER.year,
+                "url": MODEL_PAPER.address,
             }
         ],
     }
@@ -208,8 +210,13 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
 def _datacite_paper() -> dict[str, Any]:
     """The paper of the model."""
     return {
-        "relatedItemType": "JournalArticle",
+        "relatedItemType": "Preprint",
         "relationType": "Cites",
+        "relatedItemIdentifier": {
+            "relatedItemIdentifier": f"arXiv:{MODEL_PAPER.arxiv}",
+            "relatedItemIdentifierType": "arXiv",
+        },
+        "publicationYear": str(MODEL_PAPER.year),
         "titles": [{"title": MODEL_PAPER.title}],
         "creators": [
             {"name": f"{family}, {given}", "nameType": "Personal", "givenName": given, "familyName": family}

@@ -275,7 +275,8 @@ def _add_paper(crate: ROCrate) -> Entity:
         key = f"#person/{quote(f'{given} {family}')}"
         names = {"name": f"{given} {family}", "givenName": given, "familyName": family}
         people.append(crate.dereference(key) or _add(crate, key, "Person", **names))
-    return _add(crate, "#paper", "ScholarlyArticle", name=MODEL_PAPER.title, author=people)
+    described = {"name": MODEL_PAPER.title, "author": people, "datePublished": str(MODEL_PAPER.year)}
+    return _add(crate, MODEL_PAPER.address, "ScholarlyArticle", **described)
 
 
 def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:

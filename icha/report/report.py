@@ -20,6 +20,7 @@ from icha.analysis.checks import Check, worst
 from icha.analysis.validity import of_dataset
 from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.results import EXPLORER
+from icha.figures.registry import figure_number
 from icha.report.model_error import entry_section
 from icha.report.provenance import provenance
 from icha.report.studies import study_section
@@ -128,20 +129,23 @@ def write_report(
 
 
 def _pictures(figures, studies, link):
-    """What the page shows of the figures: those of one study with it, after those of none or of several."""
+    """What the page shows of the figures: those of one study with it, after those of none or of several.
+
+    They have the numbers of their names, so that a figure has one number in the page, in its files and in the docs.
+    """
     places = [None, *studies]
     own = [each.studies[0] if len(each.studies) == 1 and each.studies[0] in studies else None for each in figures]
     ordered = sorted(zip(own, figures, strict=True), key=lambda pair: places.index(pair[0]))
     return [
         {
             "name": figure.name,
-            "number": number,
+            "number": figure_number(figure.name),
             "caption": figure.caption,
             "data": base64.b64encode(Path(figure.png).read_bytes()).decode("ascii"),
             "pdf": link(figure.pdf),
             "study": study,
         }
-        for number, (study, figure) in enumerate(ordered, 1)
+        for study, figure in ordered
     ]
 
 

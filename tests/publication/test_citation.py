@@ -111,7 +111,8 @@ def test_the_paper_of_the_model_is_cited_as_the_program_and_every_run_cite_it(pu
     assert asperities.MODEL.references.startswith(f"{MODEL_PAPER.line}; ")
     assert zenodo_metadata(publication)["references"] == [asperities.MODEL.references.split("; ")[0]]
     (item,) = datacite_metadata(publication)["relatedItems"]
-    assert item["titles"] == [{"title": paper["title"]}] and "relatedItemIdentifier" not in item
+    assert item["titles"] == [{"title": paper["title"]}] and item["publicationYear"] == str(paper["year"])
+    assert web_address(item["relatedItemIdentifier"]["relatedItemIdentifier"]) == paper["url"]
     assert [(creator["givenName"], creator["familyName"]) for creator in item["creators"]] == names
 
 

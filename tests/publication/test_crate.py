@@ -186,7 +186,7 @@ def test_who_made_it_under_which_licence_and_who_paid(entities):
     assert references(root["funder"])[0] == "https://doi.org/10.13039/501100000780"
     assert {entities[name]["identifier"] for name in references(root["funding"])} == {"284382", "7 b"}
     cited = [
-        "#paper",
+        MODEL_PAPER.address,
         "https://doi.org/10.1007/s11249-017-0900-2",
         "https://arxiv.org/abs/1606.03166",
         "https://example.org/page",
@@ -209,6 +209,7 @@ def test_the_paper_of_the_model_is_cited_beside_what_the_publication_names(entit
     cited = [entities[name] for name in references(entities["./"]["citation"])]
     (paper,) = (each for each in cited if each["name"] == MODEL_PAPER.title)
     assert paper["@type"] == "ScholarlyArticle" and len(cited) > 1
+    assert paper["@id"] == MODEL_PAPER.address and paper["datePublished"] == str(MODEL_PAPER.year)
     authors = [entities[name] for name in references(paper["author"])]
     assert [(author["givenName"], author["familyName"]) for author in authors] == list(MODEL_PAPER.authors)
     # Whoever wrote it and made the data is the same person, with all that is said of them.

@@ -331,16 +331,21 @@ def test_means_over_the_seeds_have_their_confidence(write):
     assert cells["0.01"].split("<br>")[0] == f"{np.mean(areas):.4f} ± {_half_width(areas):.4f}"
 
 
-def test_figures_stand_with_their_study_and_are_numbered_as_they_come(write, tmp_path):
+def test_figures_stand_with_their_study_and_have_the_numbers_of_their_files(write, tmp_path):
     def figure(name, studies):
         files = [tmp_path / "figures" / f"fig1_jkr.{ending}" for ending in ("png", "pdf")]
         return ReportFigure(name, f"Caption of {name}.", *files, studies)
 
-    figures = [figure("late", ("single",)), figure("early", ("slopes",)), figure("both", ("slopes", "single"))]
+    figures = [
+        figure("fig5_late", ("single",)),
+        figure("fig9_early", ("slopes",)),
+        figure("fig2_both", ("slopes", "single")),
+    ]
     text = write(figures=figures)
     order = re.findall(r'<figure id="(.*?)">|<h3 id="(study-.*?)">', text)
-    assert [one or other for one, other in order] == ["both", "study-slopes", "early", "study-single", "late"]
-    assert re.findall(r"<b>Figure (\d)\.</b> Caption of (\w+)", text) == [("1", "both"), ("2", "early"), ("3", "late")]
+    assert [one or other for one, other in order] == ["fig2_both", "study-slopes", "fig9_early", "study-single", "fig5_late"]
+    numbers = re.findall(r"<b>Figure (\d+)\.</b> Caption of fig(\d+)_", text)
+    assert numbers == [("2", "2"), ("9", "9"), ("5", "5")]
 
 
 @pytest.mark.parametrize("name", ["measured", "dataset", "surfaces", "report"])
