@@ -25,7 +25,7 @@ def reference_dataset(
     reduced_pressures=REDUCED_PRESSURES,
     attrs: Mapping[str, str] = {},
 ) -> xr.Dataset:
-    """Theories of a surface, and the points of the literature.
+    """Theories of a surface, and published points of surfaces of its kind.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def reference_dataset(
     -------
     Dataset with Persson's theory along `reduced_pressure`, that of Bush, Gibson & Thomas along `linear_point`, those
     of Greenwood & Williamson and of Fuller & Tabor along `summit_point`, at the areas `summit_area_fraction`, and
-    published points along `gfmd_point`.
+    published points, if they are of such a surface, along `gfmd_point`.
     """
-    variables = _persson(np.asarray(reduced_pressures, float), spectrum) | _published()
+    variables = _persson(np.asarray(reduced_pressures, float), spectrum) | _published(spectrum)
     if moments is not None:
         variables |= _separate_summits(moments, adhesive)
     described = discovery(
@@ -129,10 +129,19 @@ def _separate_summits(moments, adhesive):
     }
 
 
-def _published():
+def _published(spectrum):
+    """Points by Green's function molecular dynamics, where they are of surfaces of this spectrum."""
     gfmd = literature("gfmd_area")
+    if spectrum is None or not _without_rolloff(spectrum, gfmd["hurst"], gfmd["cutoff_ratio"]):
+        return {}
     points = gfmd["citation"] + " " + gfmd["description"]
     return {
         f"gfmd_{name}": _variable("gfmd_point", np.array(gfmd[name]), f"{long_name}, GFMD", points)
         for name, long_name in (("reduced_pressure", _PRESSURE), ("area_fraction", _AREA))
     }
+
+
+def _without_rolloff(spectrum, hurst, cutoff_ratio):
+    """Whether a spectrum falls from the period on, with this Hurst exponent, down to this part of the period."""
+    found = (spectrum.hurst, spectrum.rolloff_wavelength / spectrum.period, spectrum.period / spectrum.short_wavelength)
+    return bool(np.allclose(found, (hurst, 1.0, cutoff_ratio), rtol=1e-3))

@@ -178,11 +178,26 @@ def test_reference_dataset_is_complete_and_byte_stable(tmp_path):
     assert float(dataset["summit_area_fraction"].max()) == pytest.approx(0.1)
     theories = [name for name in dataset if name.startswith(("persson", "bush", "greenwood", "gfmd", "fuller"))]
     labels = {"fuller_tabor_rms_slope", "fuller_tabor_material"}
-    assert len(theories) == 12
+    assert len(theories) == 10
     assert all("references" in dataset[name].attrs for name in theories if name not in labels)
     assert {"persson_reduced_separation", "persson_reduced_stiffness"}.isdisjoint(reference_dataset())
     assert not [name for name in reference_dataset(spectrum()) if name.startswith(("greenwood", "fuller"))]
     assert not [name for name in reference_dataset(spectrum(), moments) if name.startswith("fuller")]
+
+
+def test_published_points_are_of_their_own_surface_alone():
+    gfmd = literature("gfmd_area")
+    own = {"period": 1e-4, "rolloff_wavelength": 1e-4, "short_wavelength": 1e-6, "hurst": 0.8}
+    for changed, there in (
+        ({}, True),
+        ({"rolloff_wavelength": 2e-5}, False),
+        ({"short_wavelength": 2e-6}, False),
+        ({"hurst": 0.7}, False),
+    ):
+        dataset = reference_dataset(icha.SelfAffineSpectrum(**own | changed))
+        assert ("gfmd_area_fraction" in dataset) == there
+    assert reference_dataset(icha.SelfAffineSpectrum(**own))["gfmd_area_fraction"].values.tolist() == gfmd["area_fraction"]
+    assert "gfmd_area_fraction" not in reference_dataset()
 
 
 def test_reference_dataset_holds_the_theories_at_their_own_slopes():
