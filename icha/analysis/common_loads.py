@@ -13,7 +13,7 @@ from icha.datasets.campaign import loading_stops, reduced_gap
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPLETE
 from icha.datasets.variables.terms import Variable, term
-from icha.support.statistics import Ensemble, ensemble
+from icha.support.statistics import ensemble
 
 # Loads at which curves are compared, per decade.
 _POINTS_PER_DECADE = 8
@@ -157,8 +157,10 @@ def _spreads(on_grid):
     return found
 
 
-def mean_curve(curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: bool) -> tuple[np.ndarray, Ensemble]:
-    """Mean of the curves of an ensemble, one for each seed, at common positive loads, with its confidence band.
+def at_common_loads(
+    curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """The curves of an ensemble, one for each seed, at common positive loads.
 
     Parameters
     ----------
@@ -168,22 +170,22 @@ def mean_curve(curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: 
     Returns
     -------
     The loads, those of the members where they are the same and else evenly spaced by their logarithm over the range
-    that all cover (none if there is no such range), and the statistics at them.
+    that all cover (none if there is no such range), and the values (members, loads) at them.
     """
     curves = [(load[load > 0], values[load > 0]) for load, values in curves]
     loads = [np.sort(load) for load, _ in curves]
     if all(load.shape == loads[0].shape and np.allclose(load, loads[0], rtol=_SAME_LOAD, atol=0) for load in loads):
-        return loads[0], ensemble([values[np.argsort(load, kind="stable")] for load, values in curves])
+        return loads[0], np.array([values[np.argsort(load, kind="stable")] for load, values in curves])
     at = _common_grid(loads)
     if not len(at):
-        return at, ensemble(np.empty((len(curves), 0)))
-    return at, ensemble([interpolated(load, values, at, logarithmic=logarithmic) for load, values in curves])
+        return at, np.empty((len(curves), 0))
+    return at, np.array([interpolated(load, values, at, logarithmic=logarithmic) for load, values in curves])
 
 
-def mean_way(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, Ensemble]]:
-    """Mean over seeds of reduced pressure and contact area on one leg of a path, at common displacements.
+def at_common_displacements(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Reduced pressure and contact area of an ensemble on one leg of a path, at common displacements.
 
-    They are counted from where the leg is loaded most, so that legs that meet there meet in the mean as well. Where a
+    They are counted from where the leg is loaded most, so that legs that meet there meet in their mean as well. Where a
     member is separated, pressure and area are zero; ways that end in contact end where the first of them does.
 
     Parameters
@@ -192,8 +194,8 @@ def mean_way(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, Ensemble
 
     Returns
     -------
-    Means of the mean separations over the rms height, in the order of the leg, and the statistics of
-    `reduced_pressure` and `contact_area_fraction` at them.
+    Means of the mean separations over the rms height, in the order of the leg, and `reduced_pressure` and
+    `contact_area_fraction` (members, separations) at them.
     """
     separations = [way["reduced_separation"].values for way in ways]
     closest = [float(separation.min()) for separation in separations]
@@ -208,11 +210,9 @@ def mean_way(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, Ensemble
             order = np.argsort(separation, kind="stable")
             beyond = 0.0 if apart else None
             members.append(np.interp(least + at, separation[order], way[name].values[order], right=beyond))
-        found[name] = ensemble(members)
-    at = at + np.mean(closest)
-    if not falling:
-        return at, found
-    return at[::-1], {name: Ensemble(*(each[::-1] for each in own)) for name, own in found.items()}
+        found[name] = np.array(members)
+    order = slice(None, None, -1 if falling else 1)
+    return (at + np.mean(closest))[order], {name: values[:, order] for name, values in found.items()}
 
 
 def _spread(area, axis):

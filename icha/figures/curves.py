@@ -2,27 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.models import ASPERITIES
 from icha.datasets.labels import RunLabels
+from icha.datasets.variables.model_error import SHORT_RANGE
+from icha.figures.ensembles import draw_members, lines_handles
+from icha.figures.legends import legend_below, named_handles, words_handle
+from icha.figures.palette import (
+    ASPERITIES_NAME,
+    MODEL_MARKERS,
+    PLACE_MARKERS,
+    closed_look,
+    material_colours,
+    material_layers,
+    model_handle,
+    place_markers,
+)
 from icha.figures.scale import MOST_COLOURS, Scale, materials_scale, places_scale
-from icha.figures.select import Snapshots, name_of_place, path_steps, snapshot_label, study_runs, ways_back
+from icha.figures.select import (
+    Snapshots,
+    name_of_place,
+    path_steps,
+    shown_model,
+    snapshot_label,
+    study_runs,
+    ways_back,
+)
 from icha.figures.style import (
     BLACK,
-    COLOURS,
     GREY,
-    MARKERS,
     legend_handle,
     line_artist,
-    line_look,
     material_label,
     panel_label,
-    slope_label,
 )
-from icha.support.statistics import Ensemble, ensemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,21 +74,24 @@ class Line(NamedTuple):
 
 
 class Curves(NamedTuple):
-    """The lines of a study, the colours of its materials, and the scale of colours where there are many lines."""
+    """The lines of a study, the colours of its materials, the scale of colours where there are many lines, and legend.
+
+    `handles` name materials, surfaces and slopes as far as the study has several of them, and the model.
+    """
 
     lines: list[Line]
     colours: dict[str, str]
     scale: Scale | None
-
-    @property
-    def several_seeds(self) -> bool:
-        """Whether there are means to be drawn."""
-        return any(len(line.runs) > 1 for line in self.lines)
+    handles: dict[str, Line2D]
 
     @property
     def unloaded(self) -> bool:
         """Whether there are ways back."""
         return any(way for line in self.lines for way in line.back)
+
+
+# More lines than this are drawn thin.
+_FEW_LINES = 6
 
 
 def study_curves(campaign: xr.DataTree, study: str) -> Curves:
@@ -88,67 +108,74 @@ def study_curves(campaign: xr.DataTree, study: str) -> Curves:
     for labels, run in study_runs(campaign, study, ragged=False):
         members.setdefault((labels.material, labels.surface, labels.rms_slope), []).append((labels, run))
     dataset = campaign[study].to_dataset()
-    materials = [str(name) for name in dataset["material"].values]
+    materials = [name for name in dataset["material"].values.tolist() if name in {material for material, *_ in members}]
     places = list(dict.fromkeys((surface, slope) for _, surface, slope in members))
-    colours = {name: COLOURS[(k + 1) % len(COLOURS)] for k, name in enumerate(materials)}
-    of_place, scale = {}, None
+    colours, of_place, scale = material_colours(campaign), {}, None
     if len(places) > MOST_COLOURS:
         scale = places_scale(places)
         of_place, colours = dict(zip(places, scale.colours, strict=True)), dict.fromkeys(materials, BLACK)
     elif len(materials) > MOST_COLOURS:
-        own = [name for name in materials if name in {material for material, *_ in members}]
-        scale = materials_scale(dataset, own)
-        colours = dict(zip(own, scale.colours, strict=True))
+        scale = materials_scale(dataset, materials)
+        colours = dict(zip(materials, scale.colours, strict=True))
+    layers = material_layers(dataset, materials)
+    markers = place_markers(places)
+    by_elements = shown_model(dataset) != ASPERITIES
     lines = []
     for (material, *place), own in members.items():
         place = tuple(place)
         (first, *_), runs = zip(*own, strict=True)
-        adhesive = float(runs[0]["surface_energy"]) > 0
-        kind = materials.index(material) if of_place or len(places) == 1 else places.index(place)
-        # Only what differs within the study is named, and not what the scale tells.
-        name = [] if scale and (len(materials) == 1 or not of_place) else [material_label(dataset, material)]
-        if not of_place:
-            name += [place[0]] if len({surface for surface, _ in places}) > 1 else []
-            name += [slope_label(place[1])] if len({slope for _, slope in places}) > 1 else []
         colour = of_place.get(place, colours[material])
-        look = {
-            "ls": "none",
-            "color": colour,
-            "marker": MARKERS[0 if scale and not of_place and len(places) == 1 else kind % len(MARKERS)],
-            "mec": colour,
-            "mfc": colour if adhesive else "white",
-            "mew": 0.9,
-            "label": ", ".join(name) or None,
-            "zorder": 4 if adhesive else 3,
-            # Open markers are larger, so that they show behind closed ones where the results agree.
-            "ms": 3.8 if adhesive else 5.6,
-        }
+        # Where surfaces and slopes have the colours of a scale, materials have the shapes.
+        marker = PLACE_MARKERS[materials.index(material) % len(PLACE_MARKERS)] if of_place else markers[place]
+        look = closed_look(colour, layers[material]) | {"ls": "none", "marker": marker}
+        if by_elements:
+            look |= {"marker": MODEL_MARKERS[SHORT_RANGE], "ms": look["ms"] + 2}
+        if len(members) > _FEW_LINES:
+            look |= {"lw": 0.6, "ms": 0.8 * look["ms"]}
         if scale:
             look |= {"ls": "-", "lw": 0.6, "ms": 0.6 * look["ms"], "mew": 0.6}
         lines.append(Line(first, [path_steps(run) for run in runs], [ways_back(run) for run in runs], look))
-    return Curves(lines, colours, scale)
+    return Curves(lines, colours, scale, _curve_handles(dataset, lines, scale, bool(of_place)))
 
 
-def material_looks(dataset: xr.Dataset, materials: Sequence[str]) -> tuple[list[dict], Scale | None]:
+def _curve_handles(dataset, lines, scale, many_places):
+    """What the legend names of the lines of a study, but for what the scale tells."""
+    name = ASPERITIES_NAME if shown_model(dataset) == ASPERITIES else SHORT_RANGE
+    several = any(len(line.runs) > 1 for line in lines)
+    shape = {"ls": "-" if several or scale else "none"} | ({} if many_places else {"marker": MODEL_MARKERS[name]})
+    materials = {line.labels.material: line.look for line in lines}
+    places = {(line.labels.surface, line.labels.rms_slope): line.look for line in lines}
+    handles = {}
+    if not scale or (many_places and len(materials) > 1):
+        for material, look in materials.items():
+            grey = {"color": GREY, "mec": GREY} if many_places else {}
+            handles[material_label(dataset, material)] = legend_handle(**look | shape | grey)
+    if len(places) > 1 and not many_places:
+        grey = {"ls": "none", "color": GREY, "mec": GREY, "mfc": "white", "ms": 5}
+        for surface, slope in place_markers(places):
+            handles[name_of_place(dataset, surface, slope)] = legend_handle(**places[surface, slope] | grey)
+    return handles | {name: model_handle(name, mfc="white")}
+
+
+def material_looks(campaign: xr.DataTree, study: str, materials: Sequence[str]) -> tuple[list[dict], Scale | None]:
     """Looks of the lines of a figure of one line for every material, and their scale where there are many."""
-    adhesive = [float(dataset["surface_energy"].sel(material=name)) > 0 for name in materials]
+    dataset = campaign[study].to_dataset()
     if len(materials) > MOST_COLOURS:
         scale = materials_scale(dataset, materials)
         return [{"color": colour, "ls": "-", "lw": 0.9, "marker": "o", "ms": 2} for colour in scale.colours], scale
+    colours, layers = material_colours(campaign), material_layers(dataset, materials)
     return [
-        line_look(k, adhesive=adhesive[k]) | {"label": material_label(dataset, name)}
-        for k, name in enumerate(materials)
+        closed_look(colours[name], layers[name]) | {"ls": "-", "marker": "o", "label": material_label(dataset, name)}
+        for name in materials
     ], None
 
 
 def say_which_snapshots(
     figure: Figure, panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[Snapshots], scale: Scale | None
 ) -> None:
-    """Letters and titles of the two panels of a figure of one snapshot, its scale, and what several seeds mean."""
+    """Letters and titles of the two panels of a figure of one snapshot, and its scale."""
     if scale:
         scale.draw(figure, list(panels))
-    if any(len(line.members) > 1 for line in lines):
-        panels[-1].add_line(band_handle(len(line.members) for line in lines))
     shown = lines[0].labels
     titles = (snapshot_label(*lines[-1].members[0]), name_of_place(dataset, shown.surface, shown.rms_slope))
     for axes, letter, title in zip(panels, "ab", titles, strict=True):
@@ -156,15 +183,10 @@ def say_which_snapshots(
         panel_label(axes, letter)
 
 
-def say_whose_theories(panels: Iterable[Axes], dataset: xr.Dataset) -> None:
-    """Name in the legends the first surface of a study, which theories are drawn for, where it has several."""
+def whose_theories(dataset: xr.Dataset) -> dict[str, Line2D]:
+    """What the legend says of the surface that theories are drawn for, the first of a study where it has several."""
     names = dataset["surface"].values.tolist()
-    for axes in panels if len(names) > 1 else ():
-        axes.plot([], [], ls="none", label=f"theories: {names[0]}")
-
-
-# A mean has about so many markers.
-_MEAN_MARKERS = 8
+    return words_handle(f"theories: {names[0]}") if len(names) > 1 else {}
 
 
 def draw_line(
@@ -175,75 +197,31 @@ def draw_line(
     logarithmic: bool,
     lines: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the points of a run by markers; of several seeds their mean at common loads by a line with its 95 % band.
+    """Draw the points of a run by markers; of several seeds their mean at common loads by a line, and their scatter.
 
     Parameters
     ----------
     points : load and value of the steps of a run.
     lines : number of lines in the panel.
-    logarithmic : whether means are interpolated on the logarithm of the values, where runs have not the same loads.
+    logarithmic : whether values are positive on a logarithmic axis.
 
     Returns
     -------
     What was drawn: loads and values.
     """
-    from icha.analysis.common_loads import mean_curve
+    from icha.analysis.common_loads import at_common_loads
 
     members = [points(run) for run in line.runs]
     if len(members) > 1:
-        load, over = mean_curve(members, logarithmic=logarithmic)
+        load, values = at_common_loads(members, logarithmic=logarithmic)
         if len(load):
-            draw_mean(axes, load, over, line.look, lines)
-            return load, over.mean
+            draw_members(axes, load, values, line.look, positive=logarithmic, lines=lines)
+            return np.tile(load, len(values)), values.ravel()
     # Runs without a common load have no mean.
-    for k, (load, values) in enumerate(members):
-        axes.plot(load, values, **line.look | ({} if k == 0 else {"label": None}))
+    for load, values in members:
+        axes.plot(load, values, **line.look)
     load, values = map(np.concatenate, zip(*members, strict=True))
     return load, values
-
-
-def draw_mean(axes: Axes, x: np.ndarray, over: Ensemble, look: dict, lines: int = 1) -> None:
-    """Draw the mean of an ensemble with its band, one of so many `lines` of a panel."""
-    every = max(1, -(-len(x) // _MEAN_MARKERS))
-    axes.plot(x, over.mean, **look | {"ls": "-", "lw": 0.9, "markevery": every})
-    draw_band(axes, x, over, look["color"], lines)
-
-
-def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, lines: int, **alone: object) -> None:
-    """Draw the values (members, k) of an ensemble: their mean with its band, or, with `alone` in its look, the one."""
-    if len(members) == 1:
-        axes.plot(x, members[0], **alone, **look)
-    else:
-        draw_mean(axes, x, ensemble(members), look, lines)
-
-
-def draw_band(axes: Axes, x: np.ndarray, over: Ensemble, colour: str, lines: int = 1) -> None:
-    """Shade the 95 % band of confidence of a mean, the paler the more there are; it does not widen the panel."""
-    limits = axes.dataLim.frozen()
-    look = {"alpha": _SHADE * min(1.0, _FEW_BANDS / lines), "lw": 0, "zorder": 1.5}
-    axes.fill_between(x, over.mean - over.confidence, over.mean + over.confidence, color=colour, **look)
-    axes.dataLim.set(limits)
-
-
-_SHADE = 0.22
-_FEW_BANDS = 3
-
-
-def band_handle(counts: Iterable[int]) -> Line2D:
-    """What the legend says of means and bands, of lines of so many seeds."""
-    counts = sorted({count for count in counts if count > 1})
-    words = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
-    look = {"color": GREY, "alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
-    return legend_handle(label=f"mean and 95 % band, n = {words} seeds", **look)
-
-
-def bars_handle(counts: Iterable[int]) -> dict[str, Line2D]:
-    """What the legend says of bars, of points of so many seeds; nothing where there are none."""
-    counts = sorted({int(count) for count in counts if count > 1})
-    if not counts:
-        return {}
-    words = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
-    return {f"means of n = {words} seeds, bars 95 %": legend_handle(color=GREY, marker="|", ls="none", ms=8)}
 
 
 def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
@@ -252,7 +230,7 @@ def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
     `panels` are axes, and load and value of a way as functions of its reduced pressure, contact area and reduced
     separation.
     """
-    from icha.analysis.common_loads import mean_way
+    from icha.analysis.common_loads import at_common_displacements
 
     ways = [
         (leg["reduced_pressure"].values, leg["contact_area_fraction"].values, leg["reduced_separation"].values)
@@ -261,8 +239,9 @@ def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
     if len(line.runs) > 1 and len({len(back) for back in line.back}) == 1:
         ways = []
         for legs in zip(*line.back, strict=True):
-            separation, over = mean_way(legs)
-            ways.append((over["reduced_pressure"].mean, over["contact_area_fraction"].mean, separation))
+            separation, found = at_common_displacements(legs)
+            pressure, area = (found[name].mean(axis=0) for name in ("reduced_pressure", "contact_area_fraction"))
+            ways.append((pressure, area, separation))
     for axes, points in panels:
         for way in ways:
             draw_unloading(axes, *points(*way), line.look["mec"])
@@ -274,31 +253,17 @@ def draw_unloading(axes: Axes, load: np.ndarray, values: np.ndarray, colour: str
     axes.add_artist(line_artist(np.where(load > 0, load, np.nan), values, color=colour, **UNLOADING))
 
 
-# More runs than this are named below the panels, and all lines if a panel had more names than this.
-_MOST_RUNS = 3
-_MOST_NAMES = 6
-
-
-def add_legends(figure: Figure, panels: dict, curves: Curves) -> None:
-    """Add a legend to every panel of `panels` (axes and corner); what would crowd them is named once, below.
-
-    The figure grows by the height of what stands below. Many lines have a scale of colours beside the panels.
-    """
+def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, Line2D] = {}) -> None:
+    """Add the legend of the curves and of what else is named in the panels, and their scale of colours, if any."""
     if curves.scale:
         curves.scale.draw(figure, list(panels))
-    if curves.several_seeds:
-        next(iter(panels)).add_line(band_handle(len(line.runs) for line in curves.lines))
-    runs = {line.look["label"] for line in curves.lines} - {None}
-    names = {axes: dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True)) for axes in panels}
-    known = {name: handle for own in names.values() for name, handle in own.items()}
-    if max(map(len, names.values())) - len(runs) * (len(runs) > _MOST_RUNS) > _MOST_NAMES:
-        below = known
-    else:
-        below = {name: handle for name, handle in known.items() if name in runs and len(runs) > _MOST_RUNS}
-    if below:
-        figure.set_figheight(figure.get_figheight() + 0.1 * len(below))
-        figure.legend(below.values(), below.keys(), loc="outside lower center", ncols=2)
-    for axes, corner in panels.items():
-        own = {name: handle for name, handle in names[axes].items() if name not in below}
-        if own:
-            axes.legend(own.values(), own.keys(), loc=corner)
+    seeds = lines_handles(len(line.runs) for line in curves.lines)
+    legend_below(figure, curves.handles | seeds | named_handles(panels) | dict(further))
+
+
+def plausible(values: np.ndarray) -> np.ndarray:
+    """The positive ones of some values that are no rounding errors beside the largest, for logarithmic axes."""
+    return values[values > _ROUNDING * values.max(initial=0.0)]
+
+
+_ROUNDING = 1e-7

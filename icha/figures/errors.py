@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.datasets.variables.model_error import FINITE_RANGE
-from icha.figures.curves import PRESSURE_LABEL, bars_handle
+from icha.figures.curves import PRESSURE_LABEL
+from icha.figures.ensembles import draw_points, points_handles
+from icha.figures.legends import legend_below, words_handle
+from icha.figures.palette import PLACE_MARKERS, closed_look, material_colours, material_layers, place_markers
 from icha.figures.scale import MOST_COLOURS, Scale, places_scale
 from icha.figures.select import NothingToDraw, study_errors
 from icha.figures.style import (
-    COLOURS,
     DASHES,
     GREY,
-    MARKERS,
     TWO_COLUMNS,
     legend_handle,
     logarithmic_axes,
@@ -25,7 +26,6 @@ from icha.figures.style import (
     slope_label,
     styled,
 )
-from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 _MOST_LINES = 2
 # Points of one load stand this far apart, as a factor, so that their bars do not hide each other.
 _APART = 1.025
+# Of one load alone the axis shows this much around it, as a factor.
+_ONE_LOAD = 4.0
 # Errors against another quantity of the boundary elements.
 _OTHER = {"ls": ":", "lw": 0.9, "marker": ".", "ms": 3}
 
@@ -43,7 +45,7 @@ class Quantity(NamedTuple):
     """A variable of the model error, the label of its axis, and its factor and limits on it (None: as they come).
 
     The variable `other`, if there is one, is a dotted line without markers where boundary elements with adhesion have a
-    finite range.
+    finite range. `positive` says whether it cannot be negative, and `words` explain it in the legend.
     """
 
     name: str
@@ -51,13 +53,15 @@ class Quantity(NamedTuple):
     factor: float = 1.0
     limits: tuple[float | None, float | None] = (None, None)
     other: str = ""
+    positive: bool = False
+    words: str = ""
 
 
 class _Curves(NamedTuple):
     """Curves (entry, surface, slope and material of each), and what tells them apart.
 
-    Of more surfaces and slopes than a few every material has a row of panels of its own, of many they have colours of
-    a scale.
+    Of more surfaces and slopes than a few every material has a row of panels of its own, and they have colours of a
+    scale, for those of the palette are the materials'.
     """
 
     entries: dict[str, xr.Dataset]
@@ -67,6 +71,7 @@ class _Curves(NamedTuple):
     interfaces: xr.Dataset
     own_rows: bool
     scale: Scale | None
+    palette: dict[str, str]
 
     def look(self, key: tuple) -> tuple[str, dict]:
         """Name of a curve in the legend, and arguments of `Axes.errorbar`."""
@@ -74,35 +79,32 @@ class _Curves(NamedTuple):
         # Solutions of the same state at a finite range, or on another grid.
         same = [each[0] for each in self.keys if each[1:] == key[1:]]
         again, truths = same.index(entry), [self.entries[each].attrs["truth"] for each in same]
-        place, kind = self.places.index((surface, slope)), self.materials.index(material)
-        colour = COLOURS[(place if self.own_rows else kind + 1) % len(COLOURS)]
-        colour = self.scale.colours[place] if self.scale else colour
+        colour = self.palette[material]
+        if self.own_rows:
+            colour = places_scale(self.places).colours[self.places.index((surface, slope))]
+        markers = place_markers(self.places) if not self.scale else {}
         name = [] if self.own_rows else [material_label(self.interfaces, material)]
         if not self.scale:
             name += [surface] if len({each for each, _ in self.places}) > 1 else []
             name += [slope_label(slope)] if len({each for _, each in self.places}) > 1 else []
         name += ["at finite range"] if len(set(truths)) > 1 and truths[again] == FINITE_RANGE else []
         name += [entry] if truths.index(truths[again]) < again else []
-        return ", ".join(name), {
-            "color": colour,
-            "marker": MARKERS[(0 if self.own_rows else place) % len(MARKERS)],
+        layers = material_layers(self.interfaces, [material] if self.own_rows else self.materials)
+        return ", ".join(name), closed_look(colour, layers[material]) | {
+            "marker": markers.get((surface, slope), PLACE_MARKERS[0]),
             "ls": DASHES[again % len(DASHES)],
-            "mfc": colour if float(self.entries[entry]["surface_energy"].sel(material=material)) > 0 else "white",
-            "ms": 4,
-            "lw": 0.9,
-            "elinewidth": 0.7,
-            "capsize": 1.5,
         }
 
 
 @styled
-def draw_errors(model_error: xr.DataTree, *, study: str, quantities: tuple[Quantity, ...]) -> Figure:
+def draw_errors(
+    campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, quantities: tuple[Quantity, ...]
+) -> Figure:
     """A panel for every quantity, with a curve for every surface, slope and material: means over the seeds.
-
-    Bars are the 95 % confidence of the means.
 
     Parameters
     ----------
+    campaign : the campaign dataset, from which materials have their colours.
     model_error : `icha.analysis.model_error.model_error` of the campaign.
     study : name of the study; all entries that compare its runs are drawn.
     quantities : what is drawn of them.
@@ -114,9 +116,9 @@ def draw_errors(model_error: xr.DataTree, *, study: str, quantities: tuple[Quant
     ValueError
         If the study has no boundary elements beside it.
     """
-    curves = _curves(model_error, study, quantities)
+    curves = _curves(model_error, study, quantities, material_colours(campaign))
     rows = [[material] for material in curves.materials] if curves.own_rows else [curves.materials]
-    fig = new_figure(TWO_COLUMNS, 0.55 + 2.35 * len(rows) + 0.085 * _legend_rows(curves))
+    fig = new_figure(TWO_COLUMNS, 0.55 + 2.35 * len(rows))
     panels = fig.subplots(len(rows), len(quantities), sharex=True, sharey="col", squeeze=False)
     letters = iter("abcdefghijklmnopqrstuvwxyz")
     named: dict[str, object] = {}
@@ -135,22 +137,29 @@ def draw_errors(model_error: xr.DataTree, *, study: str, quantities: tuple[Quant
             ax.axhline(0, color="0.6", lw=0.7, zorder=0)
             ax.set_ylabel(quantity.label)
             panel_label(ax, next(letters))
+    loads = np.concatenate([errors["reduced_pressure"].values for errors in curves.entries.values()])
     for ax, quantity in zip(panels[-1], quantities, strict=True):
+        if np.ptp(loads) == 0:
+            ax.set_xlim(loads[0] / _ONE_LOAD, loads[0] * _ONE_LOAD)
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylim(*quantity.limits)
     if any(each.other for each in quantities) and any(map(has_cohesive_zone, curves.entries.values())):
-        named["against the energetic area"] = legend_handle(color=GREY, **_OTHER)
-    named |= bars_handle(counts)
+        named["relative to the energetic area (energy of adhesion / that of full contact)"] = legend_handle(
+            color=GREY, **_OTHER
+        )
+    named |= points_handles(counts)
     if curves.scale:
         curves.scale.draw(fig, panels.ravel().tolist())
         named.pop("", None)
-    if named and (len(named) > 1 or "" not in named):
-        columns = 2 if max(map(len, named)) > 24 else 4
-        fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=columns)
+    if len(named) == 1:
+        named.pop("", None)
+    for quantity in quantities:
+        named |= words_handle(quantity.words) if quantity.words else {}
+    legend_below(fig, named)
     return fig
 
 
-def _curves(model_error, study, quantities):
+def _curves(model_error, study, quantities, palette):
     """What there is to be drawn of a study; raises what `draw_errors` does."""
     entries = study_errors(model_error, study)
     if not entries:
@@ -170,9 +179,8 @@ def _curves(model_error, study, quantities):
     places = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in keys))
     materials = list(dict.fromkeys(material for *_, material in keys))
     scale = places_scale(places) if len(places) > MOST_COLOURS else None
-    return _Curves(
-        entries, keys, places, materials, interfaces_of(entries, materials), len(places) > _MOST_LINES, scale
-    )
+    interfaces = interfaces_of(entries, materials)
+    return _Curves(entries, keys, places, materials, interfaces, len(places) > _MOST_LINES, scale, palette)
 
 
 def _compared(errors, quantities, **at):
@@ -184,20 +192,12 @@ def _draw_curve(row, errors, quantities, look, apart, counts):
     """Draw a curve in all panels of a row; returns its handle, and adds to `counts` numbers of seeds of its points."""
     p = errors["reduced_pressure"].values * apart
     for ax, quantity in zip(row, quantities, strict=True):
-        over = ensemble(errors[quantity.name].transpose("seed", ...).values)
-        bars = quantity.factor * over.confidence if over.count.max() > 1 else None
-        handle = ax.errorbar(p, quantity.factor * over.mean, bars, **look)
-        counts.update(over.count.tolist())
+        members = quantity.factor * errors[quantity.name].transpose("seed", ...).values
+        handle = draw_points(ax, p, members, look, positive=quantity.positive)
+        counts.update(np.isfinite(members).sum(axis=0).tolist())
         if quantity.other and has_cohesive_zone(errors):
             ax.plot(p, quantity.factor * errors[f"{quantity.other}_mean"].values, color=look["color"], **_OTHER)
     return handle
-
-
-def _legend_rows(curves):
-    """About how many rows the legend has, in units of half a line."""
-    keys, places = curves.keys, curves.places
-    names = len(places) + len(keys) - len({key[1:] for key in keys}) if curves.own_rows else len(keys)
-    return 2 * np.ceil(names / (4 if curves.own_rows else 2))
 
 
 def has_cohesive_zone(errors):

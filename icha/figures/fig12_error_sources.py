@@ -12,6 +12,8 @@ from icha.datasets import results
 from icha.datasets.labels import ContactLabels
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs
+from icha.figures.ensembles import POINTS_OF_SEEDS, draw_points, points_handles
+from icha.figures.legends import legend_below, named_handles
 from icha.figures.style import (
     BLACK,
     BLUE,
@@ -77,24 +79,25 @@ def inputs(campaign: Campaign, options: SourcesFigure, files: results.ResultFile
 DECLARATION = Declaration(
     description="Steps from the model to boundary elements, each of which changes one thing.",
     caption=(
-        "Sources of the model's error: between ICHA and boundary elements (BEM) one thing is changed at a time, on the "
-        "same topographies, without adhesion. Panels (a) and (b) show contact area and mean separation over those of "
-        "boundary elements on the true topography, against the reduced pressure F/(E* h'rms A0). The curves named "
-        "paraboloids are boundary elements on the upper envelope of the paraboloids of the summits instead of the "
-        "topography. Panel (c) shows what every step from boundary elements to the model adds to the logarithm of the "
-        "area; the steps add up to the black line. Panel (d) is for spots of one summit: it shows the area of the "
-        "patch over Hertz's area at the force of the patch itself, against the radius a of the patch times the wave "
-        "number q = (mean q^4 / mean q^2)^(1/2) of the surface. Its solid line joins medians, its dashed line medians "
-        "of what the fourth-order terms of the summits alone give; a few points lie above the frame. Panels (a) and "
-        "(b) have the mean and standard deviation over the seeds, panel (c) the means."
+        "Sources of the model's error: between interacting asperities (the model) and boundary elements (BEM) one "
+        "thing is changed at a time, on the same topographies, without adhesion. Panels (a) and (b) show contact area "
+        "and mean separation over those of boundary elements on the true topography, against the reduced pressure "
+        "F/(E* h'rms A0). The curves named paraboloids are boundary elements on the upper envelope of the paraboloids "
+        "of the summits instead of the topography. Panel (c) shows what every step from boundary elements to the "
+        "model adds to the logarithm of the area; the steps add up to the black line. Panel (d) is for spots of one "
+        "summit: it shows the area of the patch over Hertz's area at the force of the patch itself, against the "
+        "radius a of the patch times the wave number q = (mean q^4 / mean q^2)^(1/2) of the surface. Its solid line "
+        "joins medians, its dashed line medians of what the fourth-order terms of the summits alone give; a few "
+        "points lie above the frame. In panels (a) and (b) points of one load are drawn a little apart. "
+        f"{POINTS_OF_SEEDS} Panel (c) has the means."
     ),
     options=SourcesFigure,
     inputs=inputs,
 )
 
 LOOKS = {
-    "icha": ("ICHA", BLACK, "o", "-"),
-    "without_unions": ("ICHA without unions", BLUE, "s", "--"),
+    "icha": ("asperities (the model)", BLACK, "o", "-"),
+    "without_unions": ("asperities without unions", BLUE, "s", "--"),
     "independent": ("Hertz, no interaction", ORANGE, "v", ":"),
     "circular_paraboloids": ("BEM, circular paraboloids", GREEN, "^", "--"),
     "elliptic_paraboloids": ("BEM, elliptic paraboloids", VERMILLION, "D", "-"),
@@ -103,6 +106,8 @@ _EFFECT_COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION)
 # Patches of fewer boundary elements have no area to speak of.
 _LEAST_NODES = 20
 _BINS = 8
+# Points of one load stand this far apart, as a factor.
+_APART = 1.06
 # Where the frame of panel (d) ends.
 _HIGHEST_RATIO = 3.0
 
@@ -125,9 +130,9 @@ def figure(error_sources: Sequence[xr.Dataset]) -> Figure:
     _draw_single_spots(singles, error_sources)
     areas.set_ylabel(r"$A/A_{\mathrm{BEM}}$")
     separations.set_ylabel(r"$\bar{u}/\bar{u}_{\mathrm{BEM}}$")
-    areas.legend(loc="best", fontsize=7)
     for ax, letter in zip((areas, separations, steps, singles), "abcd", strict=True):
         panel_label(ax, letter)
+    legend_below(fig, named_handles([areas]) | points_handles([len(error_sources)]), columns=2)
     return fig
 
 
@@ -152,23 +157,13 @@ def one_study(error_sources: Sequence[xr.Dataset]) -> list[xr.Dataset]:
 
 def _draw_ratios(ax, error_sources, name):
     ax.axhline(1, color=GREY, lw=0.8)
-    for variant, (label, colour, marker, dashes) in LOOKS.items():
+    for k, (variant, (label, colour, marker, dashes)) in enumerate(LOOKS.items()):
         ratio = np.array(
             [one[name].sel(variant=variant) / one[name].sel(variant="boundary_elements") for one in error_sources]
         )
-        ax.errorbar(
-            error_sources[0]["reduced_pressure"],
-            ratio.mean(axis=0),
-            yerr=ratio.std(axis=0, ddof=1) if len(ratio) > 1 else None,
-            color=colour,
-            marker=marker,
-            ls=dashes,
-            ms=3.8,
-            lw=0.9,
-            elinewidth=0.6,
-            capsize=1.5,
-            label=label,
-        )
+        look = {"color": colour, "marker": marker, "ls": dashes, "ms": 3.8, "lw": 0.9, "label": label}
+        p = error_sources[0]["reduced_pressure"].values * _APART ** (k - (len(LOOKS) - 1) / 2)
+        draw_points(ax, p, ratio, look, positive=True)
     logarithmic_axes(ax, "x")
     ax.set_xlabel(PRESSURE_LABEL)
 
@@ -209,7 +204,7 @@ def _draw_single_spots(ax, error_sources):
         ax.plot(at, median, color=BLUE, marker="o", label="boundary elements", zorder=4)
         at, median = medians(x, expected)
         ax.plot(at, median, color=PURPLE, ls="--", label="fourth-order term", zorder=3)
-        ax.legend(loc="upper left")
+        ax.legend(loc="lower right")
     if len(x):
         ax.set_ylim(min(0.8, ratio.min()), min(_HIGHEST_RATIO, 1.2 * ratio.max()))
     ax.set_xlim(left=0)

@@ -12,19 +12,20 @@ from icha.contact.models import BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL, band_handle, draw_band
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.ensembles import draw_scatter, lines_handles
 from icha.figures.hysteresis import (
     BRANCH_DASHES,
     Lines,
-    legend_below,
     pull_off_step,
     unloaded_runs,
 )
+from icha.figures.legends import legend_below
 from icha.figures.options import TruthFigure, not_unloaded
+from icha.figures.palette import MODEL_MARKERS, WAY_BACK_MARKERS
 from icha.figures.select import branches, pick, runs_by_boundary_elements, ways_back
 from icha.figures.style import GREY, TWO_COLUMNS, legend_handle, new_figure, panel_label, slope_label, styled
-from icha.support.statistics import Ensemble
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -59,17 +60,19 @@ DECLARATION = Declaration(
     description="Pressure against mean separation and contact area against load, in loading and unloading.",
     caption=(
         "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over "
-        "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed). Tension is "
-        "negative. Symbols with a black edge mark pull-off, the largest tension on the last way back, if there is any. "
-        "Where slopes share a panel, symbols without an edge mark where the first way in ends. Insets enlarge the "
-        "region around zero load where the tension is small compared with the largest load. The energy lost per "
-        "nominal area is the area between the two ways in the plot of pressure against mean separation. Where several "
-        "seeds are drawn, the lines are means at common displacements from the turning point, with the 95 % confidence "
-        "band of the mean (Student's t), and the marks are means over the seeds. Steps are jumps of one spot or of "
-        "several. Dots (way in) and rings (way back), if there are any, are boundary elements at some of their states, "
-        "of the same topography and half-space. They are those in the limit of a short range of attraction or, where "
-        "the legend says so, those by an independent code at the finite range of the material, with the area corrected "
-        "by the perimeter of the contact."
+        "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed), by "
+        "interacting asperities. Tension is negative. Symbols with a black edge mark pull-off, the largest tension on "
+        "the last way back, if there is any. Where slopes share a panel, symbols without an edge mark where the first "
+        "way in ends. Insets enlarge the region around zero load where the tension is small compared with the largest "
+        "load. The energy lost per nominal area is the area between the two ways in the plot of pressure against mean "
+        "separation. Where several seeds are drawn, the lines are means at common displacements from the turning "
+        "point, and the marks are means over the seeds. With five seeds or more, the lines have the 95 % confidence "
+        "band of the mean (Student's t). With fewer, pale thin lines show the single seeds. Steps are jumps of one "
+        "spot or of several. Crosses, upright on the way in and oblique on the way back, if there are any, are "
+        "boundary elements at some of their states, of the same topography and half-space. They are those in the "
+        "limit of a short range of attraction or, as crosses with three arms where the legend says so, those by an "
+        "independent code at the finite range of the material, with the area corrected by the perimeter of the "
+        "contact."
     ),
     options=LoopsFigure,
     inputs=inputs,
@@ -86,16 +89,14 @@ _HEADROOM = 1.8
 _APART = 0.025
 _LOOP = {"lw": 0.9}
 _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
-_TRUTH = {"ls": "none", "marker": "o", "mew": 0.6, "zorder": 5}
-# Rings are wider than dots, so that both show where the ways agree.
-_DOT, _RING = 2.0, 3.4
+_TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 
 
 class _Loop(NamedTuple):
     """The runs of a loop, one for every seed, what is drawn of them, boundary elements, and the look of markers.
 
-    `ways` are branch, reduced separation, reduced pressure and contact area of every leg, the last two with their bands
-    where there are several seeds.
+    `ways` are branch, reduced separation, reduced pressure and contact area of every leg, the last two also of the
+    single members where there are several seeds.
     """
 
     runs: list[xr.Dataset]
@@ -109,20 +110,20 @@ class _Way(NamedTuple):
     reduced_separation: np.ndarray
     reduced_pressure: np.ndarray
     contact_area_fraction: np.ndarray
-    bands: dict[str, Ensemble]
+    members: dict[str, np.ndarray]
 
 
 def _ways(runs):
     """The legs of a run; of several seeds their means at common separations."""
-    from icha.analysis.common_loads import mean_way
+    from icha.analysis.common_loads import at_common_displacements
 
     legs = [list(branches(run)) for run in runs]
     if len(runs) == 1 or len({len(own) for own in legs}) > 1:
         return [_Way(name, *(leg[axis].values for axis in _COLUMNS), {}) for own in legs for name, leg in own]
     found = []
     for members in zip(*legs, strict=True):
-        separation, over = mean_way([leg for _, leg in members])
-        found.append(_Way(members[0][0], separation, *(over[name].mean for name in _COLUMNS[1:]), over))
+        separation, values = at_common_displacements([leg for _, leg in members])
+        found.append(_Way(members[0][0], separation, *(values[name].mean(axis=0) for name in _COLUMNS[1:]), values))
     return found
 
 
@@ -221,19 +222,23 @@ def _draw(ax, loop, axis, *, turn, lines):
     colour = loop.marker["mec"]
     for way in loop.ways:
         x, y = (getattr(way, name) for name in (axis.x, axis.y))
-        ax.plot(x, y, ls=BRANCH_DASHES[way.branch], color=colour, **_LOOP)
-        if axis.y in way.bands:
-            draw_band(ax, x, way.bands[axis.y], colour, lines)
+        dashes = BRANCH_DASHES[way.branch]
+        ax.plot(x, y, ls=dashes, color=colour, **_LOOP)
+        if way.members:
+            draw_scatter(
+                ax, way.members.get(axis.x, x), way.members[axis.y], colour, positive=False, lines=lines, ls=dashes
+            )
     if turn:
         ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in loop.runs]
-        ax.plot(*_mean_point(ends, axis), ls="none", zorder=5, **loop.marker)
+        ax.plot(*_mean_point(ends, axis), **loop.marker | {"ls": "none", "zorder": 5})
     pulls = [run.isel(step=at) for run in loop.runs if (at := pull_off_step(run)) is not None]
     if pulls:
         ax.plot(*_mean_point(pulls, axis), **loop.marker | _PULL_OFF)
     for truth in loop.truths:
-        for branch, face, size in (("loading", colour, _DOT), ("unloading", "none", _RING)):
+        for branch, markers in _CROSSES.items():
             way = truth.isel(step=truth["branch"].values == branch)
-            ax.plot(way[axis.x], way[axis.y], mec=colour, mfc=face, ms=size, markevery=_APART, **_TRUTH)
+            marker = markers[_truth_name(truth)]
+            ax.plot(way[axis.x], way[axis.y], color=colour, marker=marker, markevery=_APART, **_TRUTH)
 
 
 def _mean_point(states, axis):
@@ -284,17 +289,22 @@ def _handles(lines, rows, runs, truths):
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
     counts = [len(members) for members in runs.values()]
     if max(counts) > 1:
-        band = band_handle(counts)
-        handles[band.get_label()] = band
+        handles |= lines_handles(counts)
     if any(pull_off_step(run) is not None for members in runs.values() for run in members):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
-    if shown := [truth for labels in runs for truth in truths.get(labels, [])]:
-        # A run says by which model it is, a solution at a finite range does not.
-        runs_alone = all(truth.attrs.get("contact_model") == BOUNDARY_ELEMENTS for truth in shown)
-        name = SHORT_RANGE if runs_alone else FINITE_RANGE
-        for branch, face, size in (("loading", GREY, _DOT), ("unloading", "none", _RING)):
-            handles[f"{name}, {branch}"] = legend_handle(mec=GREY, mfc=face, ms=size, **_TRUTH)
+    shown = [truth for labels in runs for truth in truths.get(labels, [])]
+    for name in dict.fromkeys(map(_truth_name, shown)):
+        for branch, markers in _CROSSES.items():
+            handles[f"{name}, {branch}"] = legend_handle(color=GREY, marker=markers[name], **_TRUTH)
     return handles
+
+
+_CROSSES = {"loading": MODEL_MARKERS, "unloading": WAY_BACK_MARKERS}
+
+
+def _truth_name(truth):
+    """Which boundary elements these are: a run says by which model it is, a solution at a finite range does not."""
+    return SHORT_RANGE if truth.attrs.get("contact_model") == BOUNDARY_ELEMENTS else FINITE_RANGE
 
 
 def _truths(study, runs, loops):

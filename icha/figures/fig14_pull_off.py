@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
-from icha.figures.curves import bars_handle
+from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration
+from icha.figures.ensembles import POINTS_OF_SEEDS, points_handles
 from icha.figures.hysteresis import (
     Lines,
     averages,
     detached_runs_of,
     draw_averages,
-    legend_below,
+    say_which_model,
     several,
 )
+from icha.figures.legends import legend_below
 from icha.figures.options import StudyFigure, not_unloaded, studies_problems
 from icha.figures.select import pick
 from icha.figures.style import (
@@ -67,11 +69,11 @@ DECLARATION = Declaration(
         "Pull-off, the largest tension on the way back to complete separation, against the rms slope (a) and, where "
         "studies with several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached "
         "before (b). It is drawn as nominal pressure, or divided by the strength of the interface (the largest "
-        "attraction of the Lennard-Jones traction), or divided by the tension of all summits that pull their most, 3/2 "
-        "pi dgamma R, at once; the axis says which. Points are means over the seeds. Where there are several seeds, "
-        "bars are 95 % confidence intervals of the mean (Student's t). Without adhesion (open markers) there is no "
-        "pull-off. Where the values span decades, the axis is logarithmic down to the decade of the smallest value, "
-        "and linear from there to zero. Runs that were not separated completely are left out."
+        "attraction of the Lennard-Jones traction), or divided by the tension of all summits that pull their most, "
+        "3/2 pi Δγ R, at once; the axis says which. All runs are by the model that is named above the panel: of a "
+        f"study with both models those by interacting asperities alone. {POINTS_OF_SEEDS} Without adhesion (open "
+        "markers) there is no pull-off. Where the values span decades, the axis is logarithmic down to the decade of "
+        "the smallest value, and linear from there to zero. Runs that were not separated completely are left out."
     ),
     options=PullOffFigure,
 )
@@ -135,12 +137,11 @@ def figure(
     panels = fig.subplots(1, 2 if by_load else 1, squeeze=False)[0]
     means = []
     for ax, letter, drawn in zip(panels, "ab", (by_slope, by_load), strict=False):
-        shown = {key: averages(list(line.values())) for key, line in drawn.items()}
+        shown = {key: averages(list(line.values()), factor) for key, line in drawn.items()}
         for key, line in shown.items():
-            line = line._replace(y=factor * line.y, y_confidence=factor * line.y_confidence)
             draw_averages(ax, line, color=lines.colour(key), **lines.marker(key), **_LINE)
         means += shown.values()
-        _scale(ax, factor * np.concatenate([line.y for line in shown.values()]))
+        _scale(ax, np.concatenate([line.y for line in shown.values()]))
         panel_label(ax, letter)
     label = _QUANTITIES[quantity] + (f" ({unit})" if unit else "")
     panels[0].set_ylabel(label)
@@ -162,17 +163,16 @@ def figure(
         panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
         if len(loaded_slopes) == 1:
             panels[1].set_title(slope_label(*loaded_slopes), loc="right")
+    say_which_model(panels[0], campaign, [study, *load_studies])
     if lines.scale:
         lines.scale.draw(fig, list(panels))
-    legend_below(
-        fig, lines.handles(**_LINE) | bars_handle(np.concatenate([line.counts for line in means])), columns=len(panels)
-    )
+    legend_below(fig, lines.handles(**_LINE) | points_handles(np.concatenate([line.counts for line in means])))
     return fig
 
 
 def _scale(ax, values):
     """An axis on which all values have a place, logarithmic where they span decades."""
-    positive = values[values > 0]
+    positive = plausible(values)
     if len(positive) and positive.max() > _SPAN * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))
         ax.set_yscale("symlog", linthresh=least, linscale=0.4)

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from icha.figures.curves import bars_handle
+from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration, FigureOptions
-from icha.figures.hysteresis import Lines, averages, detached_runs_of, draw_averages, legend_below, several
+from icha.figures.ensembles import POINTS_OF_SEEDS, points_handles
+from icha.figures.hysteresis import Lines, averages, detached_runs_of, draw_averages, say_which_model, several
+from icha.figures.legends import legend_below
 from icha.figures.options import studies_problems
 from icha.figures.select import NothingToDraw
 from icha.figures.style import GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
@@ -44,17 +46,17 @@ DECLARATION = Declaration(
     caption=(
         "Panel (a) shows the hysteresis loss, which is the energy per nominal area that is dissipated on a path from "
         "first contact to the largest load and back to separation, against the largest contact area on the path over "
-        "the nominal area. Points are means over the seeds. Where there are several seeds, bars are 95 % confidence "
-        "intervals of the mean (Student's t). Lines are least-squares fits of a straight line to the points that "
-        "differ only in their largest load, if there are at least three. The legend gives its coefficient of "
-        "determination r² and the exponent of a power law through the same points, which is 1 where the loss is "
-        "proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found a linear growth). The axes are "
-        "logarithmic where both quantities span decades. Runs without adhesion have no value where the loss is divided "
-        "by the surface energy, and are left out there. Panel (b) shows what the loss consists of at the largest load "
-        "of every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and their undoing (a "
-        "property of the model, of either sign), jumps at controlled load, and the rest. The parts are divided by the "
-        "sum of their magnitudes; those below zero are gains. Bars carry the markers of (a). Runs that were not "
-        "separated completely are left out."
+        "the nominal area. All runs are by the model that is named above the panel: of a study with both models those "
+        f"by interacting asperities alone. {POINTS_OF_SEEDS} Lines are least-squares fits of a straight line to the "
+        "points that differ only in their largest load, if there are at least three. The legend gives its coefficient "
+        "of determination r² and the exponent of a power law through the same points, which is 1 where the loss is "
+        "proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found a linear growth). The axes "
+        "are logarithmic where both quantities span decades. Runs without adhesion have no value where the loss is "
+        "divided by the surface energy, and are left out there. Panel (b) shows what the loss consists of at the "
+        "largest load of every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and their "
+        "undoing (a property of the model, of either sign), jumps at controlled load, and the rest, which no event "
+        "explains. The parts are divided by the sum of their magnitudes; those below zero are gains. Bars carry the "
+        "markers of (a). Runs that were not separated completely are left out."
     ),
     options=LossFigure,
 )
@@ -120,39 +122,39 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     fig = new_figure(TWO_COLUMNS, 3.1)
     loss, parts = fig.subplots(1, 2, width_ratios=(1.25, 1)) if sticky else (fig.subplots(), None)
     quantity = "hysteresis_loss_over_surface_energy" if over_surface_energy else "hysteresis_loss"
-    drawn = {
-        key: averages([{seed: _point(run, quantity) for seed, run in seeds.items()} for seeds in line.values()])
+    points = {
+        key: [{seed: _point(run, quantity) for seed, run in seeds.items()} for seeds in line.values()]
         for key, line in (sticky if over_surface_energy else runs).items()
     }
-    largest = max(np.abs(line.y).max() for line in drawn.values())
+    largest = max(np.abs(averages(line).y).max() for line in points.values())
     factor, unit = (1.0, "") if over_surface_energy else unit_for(largest, "J/m²")
-    handles = {}
+    drawn, handles = {key: averages(line, factor) for key, line in points.items()}, {}
     for key, line in drawn.items():
-        line = line._replace(y=factor * line.y, y_confidence=factor * line.y_confidence)
         look = {"color": lines.colour(key), "ls": "none"} | lines.marker(key)
-        points = draw_averages(loss, line, **look)
+        handle = draw_averages(loss, line, **look)
         fit = linear_fit(line.x, line.y) if line.same_seeds else None
         if fit is not None:
             along = np.linspace(line.x.min(), line.x.max(), _FIT_POINTS)
             loss.plot(along, fit.intercept + fit.slope * along, color=lines.colour(key), lw=0.9, zorder=2)
         if not lines.scale:
-            handles[lines.name(key) + _words(fit)] = points
+            handles[lines.name(key) + _words(fit)] = handle
     x, y = (np.concatenate([getattr(line, name) for line in drawn.values()]) for name in "xy")
-    if all(np.all(values > 0) and values.max() > _SPAN * values.min() for values in (x, y)):
+    if all(len(plausible(values)) == len(values) and values.max() > _SPAN * values.min() for values in (x, y)):
         logarithmic_axes(loss)
     loss.axhline(0, color=GREY, lw=0.6, zorder=1)
     loss.set_xlabel(r"contact area at the largest load  $A/A_0$")
     loss.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")
     panel_label(loss, "a")
+    say_which_model(loss, campaign, studies)
     if sticky:
         shown = _draw_parts(parts, sticky, lines)
         panel_label(parts, "b")
         handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
-    handles |= bars_handle(np.concatenate([line.counts for line in drawn.values()]))
+    handles |= points_handles(np.concatenate([line.counts for line in drawn.values()]))
     if lines.scale:
         handles = lines.handles(ls="none") | handles
         lines.scale.draw(fig, [loss])
-    legend_below(fig, handles)
+    legend_below(fig, handles, columns=2)
     return fig
 
 

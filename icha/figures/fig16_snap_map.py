@@ -10,17 +10,15 @@ import numpy as np
 from icha.datasets import results
 from icha.figures.curves import SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.hysteresis import BRANCH_DASHES, legend_below
+from icha.figures.hysteresis import BRANCH_DASHES
+from icha.figures.legends import legend_below
 from icha.figures.maps import block_means, draw_whole
 from icha.figures.options import RunFigure, not_unloaded
 from icha.figures.select import NothingToDraw, run_on_topography, ways_back
 from icha.figures.style import (
     BLACK,
-    BLUE,
-    GREEN,
     GREY,
     TWO_COLUMNS,
-    VERMILLION,
     legend_handle,
     logarithmic_axes,
     material_label,
@@ -54,13 +52,14 @@ def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFile
 DECLARATION = Declaration(
     description="Where and when spots of one run snap into and out of contact.",
     caption=(
-        "Panel (a) shows where spots formed on the first way in and where they broke on the last way back, over the "
-        "topography of one period (the highest parts are white). With adhesion, a spot forms by a jump into contact "
-        "and breaks by a jump off. Without adhesion, it forms and breaks where the surfaces touch, without a jump. "
-        "Unions of two spots, and united spots that fell back into their asperities, are marked at the centre of the "
-        "united spot. The numbers in the legend count the marks. Panel (b) shows how many such events there have been "
-        "on the way in (solid, from the right) and on the way back (dashed, from the left), against the mean "
-        "separation, for every kind that occurred there."
+        "Events of one run by interacting asperities. Panel (a) shows where spots formed on the first way in and "
+        "where they broke on the last way back, over the topography of one period (the highest parts are white). With "
+        "adhesion, a spot forms by a jump into contact and breaks by a jump off. Without adhesion, it forms and "
+        "breaks where the surfaces touch, without a jump. Unions of two spots, and united spots that fell back into "
+        "their asperities, are marked at the centre of the united spot. The numbers in the legend count the marks. "
+        "Panel (b) shows how many such events there have been on the way in (solid, from the right) and on the way "
+        "back (dashed, from the left), against the mean separation, for every kind that occurred there, in the "
+        "colours of the marks; the curves of unions and of their undoing are thin."
     ),
     options=SnapMapFigure,
     inputs=inputs,
@@ -69,18 +68,25 @@ DECLARATION = Declaration(
 
 
 class _Kind(NamedTuple):
-    """An event: what it is called with and without adhesion, on which branch it is on the map, and its look."""
+    """An event: what it is called with and without adhesion, on which branch it is on the map, its look, and the width
+    of its curve.
+    """
 
     names: tuple[str, str]
     branch: str
     look: dict
+    width: float
 
 
+# Black is what forms, red what breaks; the colours of the palette are those of materials.
+_RED = (0.9, 0.0, 0.05)
 _KINDS = {
-    "jump_in": _Kind(("jump into contact", "contact formed"), "loading", {"marker": "o", "mfc": BLUE, "mec": BLUE}),
-    "jump_off": _Kind(("jump off", "contact broken"), "unloading", {"marker": "o", "mfc": "none", "mec": VERMILLION}),
-    "coalescence": _Kind(("union",) * 2, "loading", {"marker": "x", "mec": GREEN}),
-    "split": _Kind(("union undone",) * 2, "unloading", {"marker": "+", "mec": BLACK}),
+    "jump_in": _Kind(
+        ("jump into contact", "contact formed"), "loading", {"marker": "o", "mfc": BLACK, "mec": BLACK}, 1.3
+    ),
+    "jump_off": _Kind(("jump off", "contact broken"), "unloading", {"marker": "o", "mfc": "none", "mec": _RED}, 1.3),
+    "coalescence": _Kind(("union",) * 2, "loading", {"marker": "D", "mfc": "none", "mec": BLACK}, 0.6),
+    "split": _Kind(("union undone",) * 2, "unloading", {"marker": "+", "mec": _RED}, 0.6),
 }
 # Of so many events the marks have this size in points; of more they cover about the same part of the map.
 _FEW = 60
@@ -128,7 +134,7 @@ def figure(
     for ax, letter in ((where, "a"), (when, "b")):
         panel_label(ax, letter)
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
-    legend_below(fig, handles, columns=3)
+    legend_below(fig, handles)
     return fig
 
 
@@ -152,8 +158,8 @@ def _draw_places(ax, run, surface, events):
     handles = {}
     for name, own in marks.items():
         kind = _KINDS[name]
-        # A ring around a dot: a spot that formed and broke at the same place.
-        ring = 1.6 if name == "jump_off" else 1.0
+        # A ring around a dot and a square around a cross: what formed and broke at the same place.
+        ring = 1.6 if name in ("jump_off", "coalescence") else 1.0
         look = {"ls": "none", "ms": ring * size, "mew": 0.9} | kind.look
         (points,) = ax.plot(events["x"][own] * length, events["y"][own] * length, **look)
         if len(own):
@@ -177,7 +183,7 @@ def _draw_counts(ax, events):
         for branch, dashes in BRANCH_DASHES.items():
             own = (events["kind"] == name) & (events["branch"] == branch)
             if own.any():
-                _draw_count(ax, events["separation"][own], color=kind.look["mec"], ls=dashes, lw=1.1)
+                _draw_count(ax, events["separation"][own], color=kind.look["mec"], ls=dashes, lw=kind.width)
     most = max((line.get_ydata()[-1] for line in ax.get_lines()), default=1)
     if most > _FEW:
         logarithmic_axes(ax, "y")

@@ -32,10 +32,10 @@ DECLARATION = Declaration(
     caption=(
         "Force F (a) and contact radius a (b) of one asperity against its approach δ, by the theory of Johnson, "
         "Kendall and Roberts. On loading (solid) the asperity snaps into contact at A, where the gap falls to Wu's "
-        "jump-in distance; this distance depends on the Tabor parameter, which is 3 unless the configuration gives "
-        "another. On unloading (dashed) the asperity follows the stable branch to C, the jump-off point, and detaches. "
-        "B is the pull-off point under load control. The dotted line is the unstable branch. Negative forces are "
-        "tensile."
+        "jump-in distance. This distance alone depends on the Tabor parameter μ, which is given above panel (b): it "
+        "is an example, 3 unless the configuration gives another, and not that of the campaign's materials. On "
+        "unloading (dashed) the asperity follows the stable branch to C, the jump-off point, and detaches. B is the "
+        "pull-off point under load control. The dotted line is the unstable branch. Negative forces are tensile."
     ),
     options=JKRFigure,
     inputs=no_inputs,
@@ -89,6 +89,7 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
     for x, name in ((jump_in, r"$\Delta_{\mathrm{IN}}$"), (jump_off, r"$\Delta_{\mathrm{OFF}}$")):
         axes[1].axvline(x, ymin=0.05, ymax=0.86, color=GREY, lw=0.5, zorder=0)
         axes[1].text(x, 0.88, name, ha="center", va="bottom", transform=axes[1].get_xaxis_transform())
+    axes[1].set_title(rf"$\Delta_{{\mathrm{{IN}}}}$ for the example $\mu$ = {tabor_parameter:g}", loc="right")
     handles, names = axes[0].get_legend_handles_labels()
     axes[0].legend(handles[1:] + handles[:1], names[1:] + names[:1], loc="upper left")
     for ax, letter in zip(axes, "ab", strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,15 +11,19 @@ from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
     UNLOADING,
-    add_legends,
+    Line,
+    add_legend,
     draw_line,
     draw_ways_back,
     gap_label,
-    say_whose_theories,
+    plausible,
     study_curves,
+    whose_theories,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.ensembles import LINES_OF_SEEDS, draw_members
 from icha.figures.options import StudyFigure, is_compared
+from icha.figures.palette import FINITE_RANGE_MARKERS, MODEL_MARKERS
 from icha.figures.select import is_short_range, study_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
@@ -37,33 +41,32 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 
 
 DECLARATION = Declaration(
-    description="Contact area and mean separation against load, with theories.",
+    description="Contact area and mean separation against load, with theories, and what the logarithmic axes hide.",
     caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the "
-        "mean gap) against the reduced pressure "
-        "F/(E* h'rms A0), on double logarithmic axes. Markers are results of ICHA, one for each stop of the loading "
-        "path; open markers are without adhesion. Where there are several seeds, the lines are means over them at "
-        "common loads, with the 95 % confidence band of the mean (Student's t). Thin dashed lines, if there are any, "
-        "show unloading as long as the load is compressive. Upright crosses, if there are any, are boundary elements "
-        "in the limit of a short range of attraction, on the same topographies (means over their seeds), in the colour "
-        "of the material. Crosses with three arms, if there are any, are boundary elements by an independent code at "
-        "the finite interaction range of the material. Their area is corrected by the perimeter of the contact. At "
-        "ranges that a grid resolves they show practically no hysteresis; with adhesion they therefore bound the "
-        "result in the limit of short ranges (JKR), but do not determine it. Lines are the adhesionless theories of "
-        "Persson (area) and of Yang and Persson (separation), the linear law of Bush, Gibson and Thomas where few "
-        "summits touch, and the theories of separate summits of Greenwood and Williamson (no adhesion) and of Fuller "
-        "and Tabor (with adhesion, in the colour of the material). The theories use the spectral moments of the "
-        "surface, or of the first one if there are several. Oblique crosses are adhesionless Green's function "
-        "molecular dynamics (GFMD) of other surfaces (H = 0.8, q1/q0 = 100, no roll-off), reduced from published data."
+        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean "
+        "gap) against the reduced pressure F/(E* h'rms A0), on double logarithmic axes. Closed and open shapes are "
+        "interacting asperities, one for each stop of the loading path; open ones are without adhesion. "
+        f"{LINES_OF_SEEDS} Upright crosses, if there are any, are boundary elements in the limit of a short range of "
+        "attraction, on the same topographies (means over their seeds), in the colour of the material. Crosses with "
+        "three arms, if there are any, are boundary elements by an independent code at the finite interaction range "
+        "of the material; their area is corrected by the perimeter of the contact. At ranges that a grid resolves "
+        "they show practically no hysteresis; with adhesion they therefore bound the result in the limit of short "
+        "ranges (JKR), but do not determine it. The lower panels show in per cent by how much the asperities differ "
+        "from boundary elements at the same load; where there are none, from the adhesionless theories of Persson "
+        "(area) and of Yang and Persson (separation), as the label of the axis says. Thin dashed lines, if there are "
+        "any, show unloading as long as the load is compressive. Lines without markers are these theories, the linear "
+        "law of Bush, Gibson and Thomas where few summits touch, and the theories of separate summits of Greenwood "
+        "and Williamson (no adhesion) and of Fuller and Tabor (with adhesion, in the colour of the material). The "
+        "theories use the spectral moments of the surface, or of the first one if there are several. Oblique crosses, "
+        "if there are any, are published results of adhesionless Green's function molecular dynamics (GFMD) of "
+        "surfaces with this spectrum."
     ),
     options=StudyFigure,
     inputs=inputs,
 )
 
-
-# Boundary elements in the limit of a short range, and at finite ones; further solutions of the same states, on other
-# grids, have markers of their own.
-_CROSS, _FINITE_RANGE = "+", ("1", "2", "3", "4")
+# Height of the panels of differences, in heights of those above them.
+_LOWER = 0.42
 
 
 @styled
@@ -88,16 +91,18 @@ def figure(
     ValueError
         If there is no such study or no run in it.
     """
-    from matplotlib.ticker import FuncFormatter, NullFormatter
-
     curves = study_curves(campaign, study)
-    fig = new_figure(TWO_COLUMNS, 3.3)
-    left, right = fig.subplots(1, 2)
+    dataset, entries = campaign[study].to_dataset(), study_errors(model_error, study)
+    differences = _differences(curves, entries, references)
+    fig = new_figure(TWO_COLUMNS, 4.5)
+    rows = ["ab", "c" + ("d" if differences[1] else "b")]
+    axes = fig.subplot_mosaic(";".join(rows), height_ratios=(1, _LOWER))
+    left, right = axes["a"], axes["b"]
     pressures, areas, gaps = [], [], []
     for line in curves.lines:
         p, area = draw_line(left, line, _areas, logarithmic=True, lines=len(curves.lines))
         areas.append(area)
-        pressures.append(p[p > 0])
+        pressures.append(p)
         p, gap = draw_line(right, line, _separations, logarithmic=True, lines=len(curves.lines))
         gaps.append(gap)
         draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
@@ -105,33 +110,118 @@ def figure(
         logarithmic_axes(ax)
     if curves.unloaded:
         left.plot([], [], color=GREY, label="unloading", **UNLOADING)
-    for p, area, gap in _draw_solutions(left, right, curves.colours, study_errors(model_error, study)):
+    for p, area, gap in _draw_solutions(left, right, curves.colours, entries):
         pressures.append(p)
         areas.append(area)
         gaps.append(gap)
-    pressures, areas, gaps = map(np.concatenate, (pressures, areas, gaps))
-    gaps = gaps[gaps > 0]
-
-    x = (pressures.min() / 1.6, max(pressures.max() * 1.6, 0.3))
+    pressures, areas, gaps = (plausible(np.concatenate(values)) for values in (pressures, areas, gaps))
+    x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
+        if "gfmd_reduced_pressure" in references:
+            x = (x[0], max(x[1], 1.2 * float(references["gfmd_reduced_pressure"].max())))
         _draw_references(left, right, references, x)
-        _draw_separate_summits(left, right, references, campaign[study].to_dataset(), curves.colours)
-        say_whose_theories([left, right], campaign[study].to_dataset())
-    left.set_xlim(x)
-    right.set_xlim(x)
-    left.set_ylim(min(areas.min(), 1.6 * x[0]) / 1.5, 1)
-    right.set_ylim(gaps.min() / 1.6, gaps.max() * 1.6)
-    right.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    right.yaxis.set_minor_formatter(NullFormatter())
-    if np.log10(gaps.max() / gaps.min()) < 1.5:
-        right.set_yticks([t for t in (0.05, 0.1, 0.2, 0.5, 1, 2, 5) if gaps.min() / 1.6 < t < gaps.max() * 1.6])
-    for ax, letter in ((left, "a"), (right, "b")):
-        ax.set_xlabel(PRESSURE_LABEL)
-        panel_label(ax, letter)
+        _draw_separate_summits(left, right, references, dataset, curves.colours)
+    left.set_ylim(min(areas.min(), 1.6 * x[0]) / 1.5, min(1, 3 * areas.max()))
+    right.set_ylim(gaps.min() / 1.4, gaps.max() * 1.4)
+    _label_separations(right, gaps)
     left.set_ylabel(AREA_LABEL)
-    right.set_ylabel(gap_label(campaign[study].to_dataset()))
-    add_legends(fig, {left: "lower right", right: "lower left"}, curves)
+    right.set_ylabel(gap_label(dataset))
+    for ax, difference in zip((axes["c"], axes.get("d")), differences, strict=True):
+        if ax is not None:
+            _draw_difference(ax, difference, len(curves.lines))
+    for letter, ax in axes.items():
+        ax.set_xlim(x)
+        panel_label(ax, letter)
+    for letter, below in (("a", "c"), ("b", "d")):
+        axes[letter].tick_params(labelbottom=below not in axes)
+        axes.get(below, axes[letter]).set_xlabel(PRESSURE_LABEL)
+    add_legend(fig, [left, right], curves, whose_theories(dataset) if references is not None else {})
     return fig
+
+
+def _label_separations(ax, gaps):
+    """Label the separations by plain numbers, round ones where they span less than two powers of ten."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    if np.log10(gaps.max() / gaps.min()) < 1.5:
+        ax.set_yticks(
+            [t for t in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5) if gaps.min() / 1.4 < t < gaps.max() * 1.4]
+        )
+
+
+class _Difference(NamedTuple):
+    """What is drawn of a quantity in its lower panel: of every line loads and values (members, k), and the label."""
+
+    drawn: list[tuple[Line, np.ndarray, np.ndarray]]
+    label: str
+
+
+def _differences(curves, entries, references):
+    """The differences of contact area and separation in per cent, from boundary elements or else from theories."""
+    from icha.references.persson import persson_area
+
+    # The limit of a short range comes first: the other one with adhesion only bounds it.
+    ordered = sorted(entries.values(), key=lambda errors: not is_short_range(errors))
+    beside = [(line, found) for line in curves.lines if (found := _errors_of(line.labels, ordered)) is not None]
+    if beside:
+        return [
+            _Difference(
+                [(line, errors["reduced_pressure"].values, 100 * _by_seed(errors[name])) for line, errors in beside],
+                label,
+            )
+            for name, label in (
+                ("area_error", r"$A/A_{\mathrm{BEM}}-1$  (%)"),
+                ("separation_error", r"$\bar{u}/\bar{u}_{\mathrm{BEM}}-1$  (%)"),
+            )
+        ]
+    found = [_Difference(_from_theory(curves.lines, _areas, persson_area), r"$A/A_{\mathrm{Persson}}-1$  (%)")]
+    if references is None or "persson_reduced_separation" not in references:
+        return [*found, None]
+    known = (np.log(references["reduced_pressure"].values), references["persson_reduced_separation"].values)
+    drawn = _from_theory(curves.lines, _separations, lambda p: np.interp(np.log(p), *known))
+    return [*found, _Difference(drawn, r"$\bar{u}/\bar{u}_{\mathrm{Persson}}-1$  (%)")]
+
+
+def _errors_of(labels, ordered):
+    """The error of the runs of a line from the first of some entries that has it, or None."""
+    for errors in ordered:
+        slopes = np.flatnonzero(np.isclose(errors["rms_slope"].values, labels.rms_slope, rtol=1e-6))
+        if labels.material in errors["material"].values and labels.surface in errors["surface"].values and len(slopes):
+            own = errors.sel(material=labels.material, surface=labels.surface).isel(rms_slope=slopes[0])
+            if np.isfinite(own["area_error"].values).any():
+                return own.dropna("reduced_pressure", how="all", subset=["area_error"])
+    return None
+
+
+def _by_seed(values):
+    """Values (seeds, loads) of the seeds that have any."""
+    return values.dropna("seed", how="all").transpose("seed", "reduced_pressure").values
+
+
+def _from_theory(lines, points, theory):
+    from icha.analysis.common_loads import at_common_loads
+
+    found = []
+    for line in lines:
+        members = []
+        for run in line.runs:
+            load, values = points(run)
+            load, values = load[load > 0], values[load > 0]
+            members.append((load, 100 * (values / theory(load) - 1)))
+        found.append((line, *at_common_loads(members, logarithmic=False)))
+    return found
+
+
+def _draw_difference(ax, difference, lines):
+    """Draw the differences of all lines."""
+    for line, load, members in difference.drawn:
+        if len(load):
+            draw_members(ax, load, members, line.look | {"ls": "-", "lw": 0.6}, positive=False, lines=lines)
+    logarithmic_axes(ax, "x")
+    ax.axhline(0, color="0.6", lw=0.6, zorder=0)
+    ax.set_ylabel(difference.label)
 
 
 def _areas(run):
@@ -160,12 +250,12 @@ def _draw_solutions(left, right, colours, entries):
             there = np.isfinite(area)
             look = {
                 "ls": "none",
-                "marker": _CROSS if is_short_range(errors) else _FINITE_RANGE[again % len(_FINITE_RANGE)],
+                "marker": MODEL_MARKERS[name] if is_short_range(errors) else FINITE_RANGE_MARKERS[again % 4],
                 "mec": colours.get(material, GREY),
                 "mew": 1.0,
                 # The larger ones show behind the others where the results agree, as the runs' markers do.
                 "ms": 8 if float(own["surface_energy"]) > 0 else 11,
-                "zorder": 6,
+                "zorder": 6 + (float(own["surface_energy"]) > 0),
             }
             states.append((p[there], area[there], gap[there]))
             for ax, values in ((left, states[-1][1]), (right, states[-1][2])):
@@ -195,16 +285,9 @@ def _draw_references(left, right, references, limits):
         label="Bush, Gibson & Thomas",
         zorder=2,
     )
-    left.plot(
-        references["gfmd_reduced_pressure"].values,
-        references["gfmd_area_fraction"].values,
-        "x",
-        color=BLACK,
-        ms=6,
-        mew=1.2,
-        label="GFMD, no adhesion",
-        zorder=5,
-    )
+    if "gfmd_reduced_pressure" in references:
+        points = (references["gfmd_reduced_pressure"].values, references["gfmd_area_fraction"].values)
+        left.plot(*points, "x", color=BLACK, ms=6, mew=1.2, label="GFMD, no adhesion", zorder=5)
     if "persson_reduced_separation" in references:
         right.plot(
             p[shown],

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import draw_members, material_looks, say_which_snapshots
+from icha.figures.curves import material_looks, plausible, say_which_snapshots
 from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, lines_handles
+from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import SnapshotFigure, is_compared
+from icha.figures.palette import ASPERITIES_NAME, MODEL_MARKERS, model_handle
 from icha.figures.select import first_line, study_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, styled
+from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,17 +32,17 @@ DECLARATION = Declaration(
     description="Distributions of gap and pressure of every material, on the study's first surface.",
     caption=(
         "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure "
-        "p (b), at the load given in the figure; open markers are without adhesion. Where there are several seeds, the "
-        "lines are means over them, with the 95 % confidence band of the mean (Student's t). Gaps are in units of the "
-        "rms height, pressures in units of E* h'rms. Only contact carries pressure in this model, so the integral of "
-        "(b) is A/A0, and that of (a) is 1 - A/A0 minus the overlap fraction. Adhesion gives the tensile tail at "
-        "negative pressures. Broad pale lines, if there are any, are boundary elements in the limit of a short range "
-        "of attraction, on the same topographies (means over the seeds that have them), in the colour of the material; "
-        "their gaps are those out of contact, their pressures those in contact. Where the legend says so, they are "
-        "instead boundary elements by an independent code at the finite interaction range of the material. At ranges "
-        "that a grid resolves these show practically no hysteresis; with adhesion they therefore bound the result in "
-        "the limit of short ranges (JKR), but do not determine it. The line is Persson's theory of adhesionless "
-        "contact."
+        "p (b), at the load given in the figure. Solid lines with circles are interacting asperities; open circles "
+        f"are without adhesion. {LINES_OF_SEEDS} Gaps are in units of the rms height, pressures in units of E* h'rms. "
+        "Only contact carries pressure, so the integral of (b) is A/A0. That of (a) is 1 - A/A0 minus the overlap "
+        "fraction, which is the part of the nominal area outside the spots where the computed gap is negative. "
+        "Adhesion gives the tensile tail at negative pressures. Dashed lines with crosses, if there are any, are "
+        "boundary elements in the limit of a short range of attraction, on the same topographies (means over the "
+        "seeds that have them), in the colour of the material; their gaps are those out of contact, their pressures "
+        "those in contact. Where the legend says so, they are instead boundary elements by an independent code at the "
+        "finite interaction range of the material. At ranges that a grid resolves these show practically no "
+        "hysteresis; with adhesion they therefore bound the result in the limit of short ranges (JKR), but do not "
+        "determine it. The black line is Persson's theory of adhesionless contact."
     ),
     options=SnapshotFigure,
     inputs=inputs,
@@ -49,8 +52,8 @@ DECLARATION = Declaration(
 _LEAST_CELLS = 100
 # The same for the nodes in contact, which are few.
 _LEAST_NODES = 25
-_MOST_MARKERS = 40
-_BROAD = {"ls": "-", "lw": 3.6, "alpha": 0.35, "solid_capstyle": "butt", "zorder": 2.5}
+_MOST_MARKERS, _TRUTH_MARKERS = 40, 14
+_TRUTH = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 
 
 @styled
@@ -81,16 +84,17 @@ def figure(
 
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
-    looks, scale = material_looks(dataset, [line.labels.material for line in lines])
+    looks, scale = material_looks(campaign, study, [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2)
     lowest, highest, top, named, floor = -0.3, 0.3, 0.0, {}, []
     for line, look in zip(lines, looks, strict=True):
         u, densities = gap_densities(line.members)
-        draw_members(left, u, densities, look, len(lines), markevery=1 + len(u) // _MOST_MARKERS)
-        floor.append(densities.mean(axis=0).min())
+        drawn = {"positive": True, "lines": len(lines)}
+        draw_members(left, u, densities, look, **drawn, markevery=1 + len(u) // _MOST_MARKERS)
+        floor.append(plausible(densities.mean(axis=0)).min())
         p, densities = pressure_densities(line.members)
-        draw_members(right, p, densities, look, len(lines), markevery=3)
+        draw_members(right, p, densities, look, **drawn, markevery=3)
         density = densities.mean(axis=0)
         if len(density):  # before first contact there is no pressure
             shown = density > 1e-3 * density.max()
@@ -100,17 +104,16 @@ def figure(
         load = float(np.mean(loads))
         truths = _solutions(study_errors(model_error, study), line, loads)
         if truths:
-            broad = _BROAD | {"color": look["color"]}
-            left.plot(*solution_gap_points(*truths), **broad)
-            right.plot(*solution_pressure_points(*truths), **broad)
-            named[truths[0].attrs["truth"]] = None
+            name = truths[0].attrs["truth"]
+            for ax, points in ((left, solution_gap_points), (right, solution_pressure_points)):
+                at, density = points(*truths)
+                every = 1 + len(at) // _TRUTH_MARKERS
+                ax.plot(at, density, color=look["color"], marker=MODEL_MARKERS[name], markevery=every, **_TRUTH)
+            named[name] = model_handle(name, **_TRUTH)
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
     say_which_snapshots(fig, [left, right], dataset, lines, scale)
-    for name in named:
-        for ax in (left, right):
-            ax.plot([], [], **_BROAD | {"color": GREY}, label=name)
     if load > 0:
         line = np.linspace(0.002, highest, 300)
         right.semilogy(line, persson_pressure_density(line, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
@@ -123,10 +126,9 @@ def figure(
     if top > 0:
         right.set_ylim(top * 5e-5, top * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
-    if left.get_legend_handles_labels()[0]:
-        left.legend(loc="lower left")
-    if right.get_legend_handles_labels()[0]:
-        right.legend(loc="lower center", frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)
+    seeds = lines_handles(len(line.members) for line in lines)
+    models = {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, ls="-", lw=0.8, mfc="white")} | named
+    legend_below(fig, named_handles([left]) | models | seeds | named_handles([right]))
     return fig
 
 

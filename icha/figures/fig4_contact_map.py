@@ -15,7 +15,7 @@ from icha.figures.maps import block_means, draw_whole
 from icha.figures.options import RunFigure, SnapshotFigure
 from icha.figures.select import run_on_topography
 from icha.figures.spots import circles_in_cell, draw_spots
-from icha.figures.style import BLUE, TWO_COLUMNS, VERMILLION, new_figure, number, panel_label, styled, unit_for
+from icha.figures.style import TWO_COLUMNS, new_figure, number, panel_label, styled, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,17 +64,17 @@ def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | 
 DECLARATION = Declaration(
     description="Contact spots over the topography.",
     caption=(
-        "Contact spots (red circles, in true size and position) over the topography, whose highest parts are yellow. "
-        "The map shows one period of a periodic surface, where circles that cross a border continue at the opposite "
-        "one, or the whole of a free square, where they may extend beyond its edges. The load is given above the map. "
-        "The framed part around the largest spot is enlarged. Where there are boundary elements of the same topography "
-        "and state, panel (b) shows their contact beside that of ICHA, panel (c) its edge (black) with the enlarged "
-        "circles, and panel (d) where both are in contact and where only one of them is. The overlap is the area in "
-        "contact in both divided by the area in contact in at least one. The boundary elements are those in the limit "
-        "of a short range of attraction or, where map (b) says so, those by an independent code at the finite "
-        "interaction range of the material. The area of the latter is corrected by the perimeter of the contact. At "
-        "ranges that a grid resolves they show practically no hysteresis; with adhesion they therefore bound the "
-        "result in the limit of short ranges (JKR), but do not determine it."
+        "Contact spots by interacting asperities (red circles, in true size and position) over the topography, whose "
+        "highest parts are yellow. The map shows one period of a periodic surface, where circles that cross a border "
+        "continue at the opposite one, or the whole of a free square, where they may extend beyond its edges. The "
+        "load is given above the map. The framed part around the largest spot is enlarged. Where there are boundary "
+        "elements of the same topography and state, panel (b) shows their contact beside that of the asperities, "
+        "panel (c) its edge (black) with the enlarged circles, and panel (d) where both are in contact and where only "
+        "one of them is. The overlap is the area in contact in both divided by the area in contact in at least one. "
+        "The boundary elements are those in the limit of a short range of attraction or, where map (b) says so, those "
+        "by an independent code at the finite interaction range of the material. The area of the latter is corrected "
+        "by the perimeter of the contact. At ranges that a grid resolves they show practically no hysteresis; with "
+        "adhesion they therefore bound the result in the limit of short ranges (JKR), but do not determine it."
     ),
     options=MapFigure,
     inputs=inputs,
@@ -95,7 +95,8 @@ _WIDEST_OUTLINE = 0.35
 _PANEL = 190
 _RED = (0.9, 0.0, 0.05)
 # What is in contact at a node: nothing, ICHA, boundary elements, both.
-_STATES = (("", "0.94"), ("ICHA only", VERMILLION), ("boundary elements only", BLUE), ("both", "0.35"))
+# As in the enlarged part, asperities are red and boundary elements black.
+_STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
 
 @styled
@@ -159,7 +160,7 @@ def figure(
     else:
         _draw_solution(panels, view, run, at, solved)
         fig.suptitle(load, fontsize="medium")
-        whole.set_title(f"ICHA, {area}", loc="right")
+        whole.set_title(f"asperities, {area}", loc="right")
     _frame(panels, enlarged, view)
     bar = fig.colorbar(image, ax=panels, shrink=0.92 if solved is None else 0.46, pad=0.015, aspect=28)
     bar.set_label(f"height ({view.height_unit})")
@@ -297,7 +298,7 @@ def _draw_solution(panels, view, run, at, solved):
     keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]
     compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
     beside.set_title(rf"{solved.name}, $A/A_0$ = {solved.area:.3f}", loc="right")
-    compared.set_title(f"overlap {jaccard(spots_cover, contact):.2f}", loc="right")
+    compared.set_title(f"overlap (both / at least one) {jaccard(spots_cover, contact):.2f}", loc="right")
 
 
 def _frame(panels, enlarged, view):

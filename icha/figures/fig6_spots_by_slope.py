@@ -8,20 +8,17 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field
 
 from icha.figures.declaration import Campaign, Declaration
+from icha.figures.legends import legend_below
 from icha.figures.options import StudyFigure
+from icha.figures.scale import Scale
 from icha.figures.select import pick, study_runs
 from icha.figures.spots import circles_in_cell, draw_spots
 from icha.figures.style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY,
     TWO_COLUMNS,
-    VERMILLION,
     new_figure,
     number,
     panel_label,
+    slope_label,
     styled,
     unit_for,
 )
@@ -54,16 +51,14 @@ DECLARATION = Declaration(
         "relative_load and area_fraction."
     ),
     caption=(
-        "Contact spots of one topography that is scaled to several rms slopes, at the same load F/(E* A0) (a) and at "
-        "the same area A/A0 (b), in their true size. At a given load the steeper surface has less contact, and its "
-        "spots, drawn on top, lie within those of the flatter ones. At a given area the spots nearly coincide, so that "
-        "every slope fills a sector of its own there."
+        "Contact spots, by interacting asperities, of one topography that is scaled to several rms slopes, at the "
+        "same load F/(E* A0) (a) and at the same area A/A0 (b), in their true size. At a given load the steeper "
+        "surface has less contact, and its spots, drawn on top, lie within those of the flatter ones. At a given area "
+        "the spots nearly coincide, so that every slope fills a sector of its own there."
     ),
     options=SlopesFigure,
 )
 
-# From the largest slope to the smallest, as in the paper: blue, green, red.
-_SLOPE_COLOURS = (BLUE, GREEN, VERMILLION, PURPLE, ORANGE, SKY)
 _KINDS = ("relative_load", "area_fraction")
 _TITLES = {"relative_load": r"$F/(E^{\ast}A_0)$", "area_fraction": "$A/A_0$"}
 
@@ -104,9 +99,10 @@ def figure(
         ((labels.rms_slope, run) for labels, run in own if labels.material == material),
         key=lambda pair: -pair[0],
     )
-    colour = {slope: _SLOPE_COLOURS[k % len(_SLOPE_COLOURS)] for k, (slope, _) in enumerate(own)}
+    # From dark to bright; the colours of the palette are those of materials.
+    colour = dict(zip((slope for slope, _ in own), Scale([f"{slope:g}" for slope, _ in own]).colours, strict=True))
 
-    fig = new_figure(TWO_COLUMNS, 4.05)
+    fig = new_figure(TWO_COLUMNS, 3.8)
     panels = fig.subplots(1, 2, sharey=True)
     for ax, kind, letter in zip(panels, _KINDS, "ab", strict=True):
         drawn = []
@@ -142,8 +138,5 @@ def figure(
         panel_label(ax, letter)
         ax.set_title(f"{_TITLES[kind]} = {number(value)}", loc="right")
     panels[0].set_ylabel(f"y ({unit})")
-    handles = [
-        Patch(facecolor=colour[slope], label=rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}") for slope, _ in own
-    ]
-    fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    legend_below(fig, {slope_label(slope): Patch(facecolor=colour[slope]) for slope, _ in own})
     return fig

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import PRESSURE_LABEL, add_legends, draw_line, say_whose_theories, study_curves
+from icha.figures.curves import PRESSURE_LABEL, add_legend, draw_line, plausible, study_curves, whose_theories
 from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.ensembles import LINES_OF_SEEDS
 from icha.figures.options import StudyFigure
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
@@ -27,14 +28,14 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 DECLARATION = Declaration(
     description="Contact stiffness against load, with theory.",
     caption=(
-        "Contact stiffness K = -dp/du, the derivative of the nominal pressure p with respect to the mean separation u, "
-        "against the reduced pressure F/(E* h'rms A0). It is in units of E* h'rms/h_rms (a) and of p/h_rms (b), where "
-        "the law K = p/u0 is a constant. Markers are results of ICHA, from the tangent of the equilibrium with the "
-        "present spots; open markers are without adhesion. Where there are several seeds, the lines are means over "
-        "them at common loads, with the 95 % confidence band of the mean (Student's t). States under tension or with "
-        "negative stiffness cannot be shown on these axes. The line is the derivative of the adhesionless separation "
-        "of Yang and Persson for an infinite surface. On a finite surface, the stiffness at small loads lies above the "
-        "proportional law, since only its highest parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
+        "Contact stiffness K = -dp/du, the derivative of the nominal pressure p with respect to the mean separation "
+        "u, against the reduced pressure F/(E* h'rms A0). It is in units of E* h'rms/h_rms (a) and of p/h_rms (b), "
+        "where the law K = p/u0 is a constant. Markers are interacting asperities, whose stiffness is that of the "
+        "tangent of the equilibrium with the present spots; runs by boundary elements are not drawn. Open markers are "
+        f"without adhesion. {LINES_OF_SEEDS} States under tension or with negative stiffness cannot be shown on these "
+        "axes. The line is the derivative of the adhesionless separation of Yang and Persson for an infinite surface. "
+        "On a finite surface, the stiffness at small loads lies above the proportional law, since only its highest "
+        "parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
     ),
     options=StudyFigure,
     inputs=inputs,
@@ -70,7 +71,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     pressures, stiffnesses = np.concatenate(pressures), np.concatenate(stiffnesses)
     if not len(pressures):
         raise NothingToDraw(f"study {study}: no stop with a positive load and a positive stiffness to draw")
-    x = (pressures.min() / 1.6, pressures.max() * 1.6)
+    x = (plausible(pressures).min() / 1.6, pressures.max() * 1.6)
     ratio = stiffnesses / pressures
     if references is not None and "persson_reduced_stiffness" in references:
         p = references["reduced_pressure"].values
@@ -79,17 +80,17 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         look = {"ls": "-", "color": BLACK, "lw": 1, "label": "Yang & Persson", "zorder": 2}
         left.plot(p[shown], theory[shown], **look)
         right.plot(p[shown], theory[shown] / p[shown], **look)
-        say_whose_theories([left, right], campaign[study].to_dataset())
         ratio = np.concatenate([ratio, theory[shown] / p[shown]])
     for ax, letter in ((left, "a"), (right, "b")):
         ax.set_xlim(x)
         ax.set_xlabel(PRESSURE_LABEL)
         panel_label(ax, letter)
-    left.set_ylim(stiffnesses.min() / 2, stiffnesses.max() * 2)
+    left.set_ylim(plausible(stiffnesses).min() / 2, stiffnesses.max() * 2)
     right.set_ylim(0, 1.15 * ratio.max())
     left.set_ylabel(r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
     right.set_ylabel(r"$K h_{\mathrm{rms}}/p$")
-    add_legends(fig, {left: "lower right", right: "lower left"}, curves)
+    further = whose_theories(campaign[study].to_dataset()) if references is not None else {}
+    add_legend(fig, [left, right], curves, further)
     return fig
 
 

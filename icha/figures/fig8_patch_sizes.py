@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.curves import draw_members, material_looks, say_which_snapshots
+from icha.figures.curves import material_looks, say_which_snapshots
 from icha.figures.declaration import Declaration
+from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, lines_handles
+from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import SnapshotFigure
 from icha.figures.select import first_line
 from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, styled, unit_for
@@ -22,10 +24,9 @@ DECLARATION = Declaration(
     description="Sizes of the contact patches of every material, on the study's first surface.",
     caption=(
         "Sizes of the contact patches, which are the areas A of the spots (united spots count as one), at the load "
-        "given in the figure; open markers are without adhesion. Panel (a) shows the number density n(A) per area of a "
-        "patch and per nominal area, where bins with few patches are joined. Panel (b) shows the number of patches "
-        "larger than A per nominal area, down to the largest patch. Where there are several seeds, the lines are means "
-        "over them, with the 95 % confidence band of the mean (Student's t)."
+        "given in the figure, by interacting asperities; open markers are without adhesion. Panel (a) shows the "
+        "number density n(A) per area of a patch and per nominal area, where bins with few patches are joined. Panel "
+        f"(b) shows the number of patches larger than A per nominal area, down to the largest patch. {LINES_OF_SEEDS}"
     ),
     options=SnapshotFigure,
 )
@@ -60,7 +61,7 @@ def figure(
     """
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
-    looks, scale = material_looks(dataset, [line.labels.material for line in lines])
+    looks, scale = material_looks(campaign, study, [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2, sharex=True)
     for line, look in zip(lines, looks, strict=True):
@@ -68,19 +69,17 @@ def figure(
         factor, unit = unit_for(period, "m")
         cell = (period * factor) ** 2
         areas = [patch_areas(run, at) * factor**2 for run, at in line.members]
-        smooth = look | {"marker": "none", "lw": 1.2}
+        smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         for ax, points, own in ((left, patch_density, look), (right, patches_above, smooth)):
             area, values = points(areas, cell)
-            draw_members(ax, area, values, own, len(lines))
+            draw_members(ax, area, values, own, positive=True, lines=len(lines))
     for ax in (left, right):
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
     say_which_snapshots(fig, [left, right], dataset, lines, scale)
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    for ax, corner in ((left, "best"), (right, "lower left")):
-        if ax.get_legend_handles_labels()[0]:
-            ax.legend(loc=corner)
+    legend_below(fig, named_handles([left]) | lines_handles(len(line.members) for line in lines))
     return fig
 
 

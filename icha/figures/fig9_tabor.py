@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from icha.figures.curves import AREA_LABEL, bars_handle, gap_label
+from icha.figures.curves import AREA_LABEL, gap_label
 from icha.figures.declaration import Campaign, Declaration
+from icha.figures.ensembles import POINTS_OF_SEEDS, draw_points, points_handles
+from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import SnapshotFigure
+from icha.figures.palette import PLACE_MARKERS, material_colours, place_markers
 from icha.figures.scale import MOST_COLOURS, places_scale
 from icha.figures.select import NothingToDraw, snapshot_label, study_runs
-from icha.figures.style import COLOURS, GREY, MARKERS, TWO_COLUMNS, new_figure, panel_label, quantity, styled
+from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, quantity, styled
 from icha.support.statistics import ensemble
 from icha.support.values import Problem
 
@@ -39,13 +42,12 @@ DECLARATION = Declaration(
     ),
     caption=(
         "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean "
-        "gap), at the load given in the figure, against the Tabor parameter of the surface, which is "
-        "(R_c Δγ²/E*²)^(1/3) over the range of attraction, with R_c = 1/rms curvature. Runs that differ only in the "
-        "range are joined by a line: at a given "
-        "surface energy a longer range (smaller Tabor parameter) lets asperities jump into contact from farther away. "
-        "Where there are several seeds, the points are means over them, and the bars are 95 % confidence intervals of "
-        "the mean (Student's t). Dashed lines are without adhesion. A shaded region, if there is one, has "
-        "Tabor parameters for which the jump-in distance is not verified."
+        "gap), by interacting asperities at the load given in the figure, against the Tabor parameter of the surface, "
+        "which is (R_c Δγ²/E*²)^(1/3) over the range of attraction, with R_c = 1/rms curvature. Runs that differ only "
+        "in the range are joined by a line: at a given surface energy a longer range (smaller Tabor parameter) lets "
+        "asperities jump into contact from farther away. They have the colour of the first of their materials. "
+        f"{POINTS_OF_SEEDS} Dashed lines are without adhesion. A shaded region, if there is one, has Tabor parameters "
+        "for which the jump-in distance is not verified."
     ),
     options=TaborFigure,
 )
@@ -75,18 +77,19 @@ def figure(
     ValueError
         If there is no such study or snapshot, or no run with adhesion.
     """
-    curves, bare, shown = _points(campaign, study, kind, target)
+    curves, bare, colours, shown = _points(campaign, study, kind, target)
     fig = new_figure(TWO_COLUMNS, 3.1)
     panels = fig.subplots(1, 2)
     places = list(dict.fromkeys([*(place for place, _ in curves), *bare]))
     interfaces = list(dict.fromkeys(interface for _, interface in curves))
     scale = places_scale(places) if len(places) > MOST_COLOURS else None
+    markers = place_markers(places)
     drawn = []
     for (place, interface), points in curves.items():
         kind_of, place_of = interfaces.index(interface), places.index(place)
         look = {
-            "color": scale.colours[place_of] if scale else COLOURS[(kind_of + 1) % len(COLOURS)],
-            "marker": MARKERS[(kind_of if scale else place_of) % len(MARKERS)],
+            "color": scale.colours[place_of] if scale else colours[interface],
+            "marker": PLACE_MARKERS[kind_of % len(PLACE_MARKERS)] if scale else markers[place],
             "label": _name(interface, place, [] if scale else places),
         }
         drawn += _draw_curve(panels, points, look)
@@ -103,17 +106,19 @@ def figure(
         panel_label(ax, letter)
     panels[0].set_title(shown, loc="right")
     counts = [len(members) for points in curves.values() for members in points.values()]
-    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True)) | bars_handle(counts)
-    panels[0].legend(handles.values(), handles.keys(), loc="best")
+    legend_below(fig, named_handles(panels) | points_handles(counts))
     return fig
 
 
 def _points(campaign, study, kind, target):
     """Of every curve its points by range of attraction, a (Tabor parameter, area, separation) for each seed; those
-    without adhesion by place, (area, separation) for each seed; and what snapshot it is."""
+    without adhesion by place, (area, separation) for each seed; colours by modulus and energy; and what snapshot it is.
+    """
     from icha.datasets.campaign import find_snapshot
 
     curves: dict[tuple, dict[float, list]] = {}
+    colours: dict[tuple, str] = {}
+    of_material = material_colours(campaign)
     bare: dict[tuple, list] = {}
     for labels, run in study_runs(campaign, study, ragged=False):
         at = find_snapshot(run, kind, target)
@@ -122,6 +127,7 @@ def _points(campaign, study, kind, target):
         place = (labels.surface, labels.rms_slope)
         if float(run["surface_energy"]) > 0:
             interface = (float(run["contact_modulus"]), float(run["surface_energy"]))
+            colours.setdefault(interface, of_material[labels.material])
             points = curves.setdefault((place, interface), {})
             points.setdefault(float(run["interaction_range"]), []).append((float(run["tabor_parameter"]), *state))
         else:
@@ -129,18 +135,20 @@ def _points(campaign, study, kind, target):
         shown = snapshot_label(run, at)
     if not curves:
         raise NothingToDraw(f"study {study}: no complete run with adhesion, so none with a Tabor parameter")
-    return curves, bare, shown
+    return curves, bare, colours, shown
 
 
 def _draw_curve(panels, points, look):
     """Draw the means over the seeds in both panels; their Tabor parameters."""
-    over = [ensemble(members) for members in points.values()]
-    mu = np.array([each.mean[0] for each in over])
+    most = max(map(len, points.values()))
+    # Along members, points and (Tabor parameter, area, separation); NaN where a point has fewer members.
+    states = np.full((most, len(points), 3), np.nan)
+    for k, members in enumerate(points.values()):
+        states[: len(members), k] = members
+    mu = np.nanmean(states[..., 0], axis=0)
     order = np.argsort(mu)
     for k, ax in enumerate(panels, 1):
-        mean, confidence = (np.array([getattr(each, name)[k] for each in over])[order] for name in _DRAWN)
-        bars = confidence if np.isfinite(confidence).any() else None
-        ax.errorbar(mu[order], mean, bars, **look, lw=0.8, ms=4, elinewidth=0.6, capsize=1.5)
+        draw_points(ax, mu[order], states[:, order, k], look | {"lw": 0.8, "ms": 4}, positive=True)
     return mu.tolist()
 
 
@@ -158,9 +166,6 @@ def _finish(ax, smallest, largest):
     # Differences of a few per mille are not blown up to fill the panel.
     reach = max(0.65 * (top - bottom), _LEAST_REACH * 0.5 * (top + bottom))
     ax.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)
-
-
-_DRAWN = ("mean", "confidence")
 
 
 def _name(interface, place, places):

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets.labels import RunLabels
+from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import UNLOADING
+from icha.figures.ensembles import draw_means
 from icha.figures.errors import interfaces_of
+from icha.figures.palette import PLACE_MARKERS, closed_look, material_colours, material_layers, place_markers
 from icha.figures.scale import MOST_COLOURS, materials_scale, places_scale
-from icha.figures.select import NothingToDraw, study_runs, ways_back
-from icha.figures.style import COLOURS, GREY, MARKERS, legend_handle, material_label, slope_label
+from icha.figures.select import NothingToDraw, shown_model, study_runs, ways_back
+from icha.figures.style import GREY, legend_handle, material_label, slope_label
 from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-# More names than this are written smaller.
-_MANY_NAMES = 12
 BRANCH_DASHES = {"loading": "-", "unloading": UNLOADING["ls"]}
 
 
@@ -91,53 +93,58 @@ def pull_off_step(run: xr.Dataset) -> int | None:
 
 
 class Averages(NamedTuple):
-    """Means over seeds of the points of a line, half the widths of their 95 % bands (0 of a single seed), numbers of
-    seeds, and whether all points are of the same seeds.
+    """Means over seeds of the points of a line, lower and upper ends (2, k) of their 95 % bands (NaN of a single seed),
+    numbers of seeds, whether all points are of the same seeds, and x and y (seeds, k, 2) of every one (NaN where a
+    point has fewer).
     """
 
     x: np.ndarray
     y: np.ndarray
-    x_confidence: np.ndarray
-    y_confidence: np.ndarray
+    x_band: np.ndarray
+    y_band: np.ndarray
     counts: np.ndarray
     same_seeds: bool
+    members: np.ndarray
 
 
-def averages(points: Sequence[Mapping[int, tuple[float, float]]]) -> Averages:
+def averages(points: Sequence[Mapping[int, tuple[float, float]]], factor: float = 1.0) -> Averages:
     """Means over the seeds that all points of a line have, or over each point's own where they share none.
 
     Parameters
     ----------
-    points : for every point of the line x and y of every seed.
+    points : for every point of the line x and y of every seed, neither of them negative as a rule.
+    factor : unit of y, which it is multiplied by.
 
     Returns
     -------
     Averages in the order of x.
     """
     common = set.intersection(*(set(point) for point in points))
-    over = [ensemble([point[seed] for seed in sorted(common or point)]) for point in points]
-    mean, confidence, counts = (np.array([getattr(each, name) for each in over]) for name in _AVERAGED)
-    order = np.argsort(mean[:, 0], kind="stable")
-    return Averages(*mean[order].T, *np.nan_to_num(confidence[order].T), counts[order, 0], bool(common))
-
-
-_AVERAGED = ("mean", "confidence", "count")
+    members = np.full((max(map(len, points)), len(points), 2), np.nan)
+    for k, point in enumerate(points):
+        own = [point[seed] for seed in sorted(common or point)]
+        members[: len(own), k] = np.array(own) * (1.0, factor)
+    over = ensemble(members)
+    low, high = over.band(positive=True)
+    order = np.argsort(over.mean[:, 0], kind="stable")
+    bands = (np.array([low[order, axis], high[order, axis]]) for axis in (0, 1))
+    return Averages(*over.mean[order].T, *bands, over.count[order, 0], bool(common), members[:, order])
 
 
 def draw_averages(axes, line: Averages, **look):
-    """Draw the points of a line with bars of their 95 % confidence where there are several seeds."""
-    bars = {
-        name: confidence if np.any(confidence > 0) else None
-        for name, confidence in (("xerr", line.x_confidence), ("yerr", line.y_confidence))
-    }
-    return axes.errorbar(line.x, line.y, **bars, elinewidth=0.6, capsize=1.5, **look)
+    """Draw the points of a line, with bars of their 95 % confidence or with their seeds where these are few."""
+    # A coordinate that all seeds share, such as a slope, has no bar.
+    x_band = line.x_band if np.any(line.x_band[1] > line.x_band[0] * (1 + 1e-9)) else None
+    return draw_means(
+        axes, (line.x, x_band), (line.y, line.y_band), line.counts, np.moveaxis(line.members, -1, 0), look
+    )
 
 
 class Lines:
     """Look and name of every line of a figure: a colour for every material, a marker for every surface and slope.
 
-    The markers of lines without adhesion are open. A figure of one material has a colour for every surface and slope.
-    Of many materials, or many surfaces and slopes, those have colours of a `scale`, which is None otherwise.
+    The markers of lines without adhesion are open. A figure of one material has a colour of a map for every surface and
+    slope. Of many materials, or many surfaces and slopes, those have colours of a `scale`, which is None otherwise.
     """
 
     def __init__(self, campaign: xr.DataTree, studies: Sequence[str], keys: Sequence[tuple]):
@@ -146,6 +153,8 @@ class Lines:
         self.materials = list(dict.fromkeys(material for material, *_ in self.keys))
         self.places = list(dict.fromkeys((surface, slope) for _, surface, slope in self.keys))
         self.interfaces = interfaces_of({study: campaign[study].to_dataset() for study in studies}, self.materials)
+        self.palette, self.markers = material_colours(campaign), place_markers(self.places)
+        self.layers = material_layers(self.interfaces, self.materials)
         self.many_places = len(self.places) > MOST_COLOURS
         self.scale = places_scale(self.places) if self.many_places else None
         if not self.many_places and len(self.materials) > MOST_COLOURS:
@@ -153,7 +162,7 @@ class Lines:
 
     def adhesive(self, material: str) -> bool:
         """Whether a material has surface energy."""
-        return float(self.interfaces["surface_energy"].sel(material=material)) > 0
+        return self.layers[material].adhesive
 
     def colour(self, key: tuple) -> str:
         """Colour of a line."""
@@ -161,22 +170,18 @@ class Lines:
         if self.scale:
             at = self.places.index(tuple(place)) if self.many_places else self.materials.index(material)
             return self.scale.colours[at]
-        if len(self.materials) == 1:
-            return COLOURS[self.places.index(tuple(place)) % len(COLOURS)]
-        return COLOURS[(self.materials.index(material) + 1) % len(COLOURS)]
+        if len(self.materials) == 1 < len(self.places):
+            return places_scale(self.places).colours[self.places.index(tuple(place))]
+        return self.palette[material]
 
     def marker(self, key: tuple) -> dict:
         """Look of a line's markers, arguments of `Axes.plot`."""
         material, *place = key
-        colour = self.colour(key)
-        kind = self.materials.index(material) if self.many_places else self.places.index(tuple(place))
-        return {
-            "marker": MARKERS[kind % len(MARKERS)],
-            "mec": colour,
-            "mfc": colour if self.adhesive(material) else "white",
-            "mew": 0.8,
-            "ms": 4,
-        }
+        marker = self.markers[tuple(place)]
+        if self.many_places:
+            marker = PLACE_MARKERS[self.materials.index(material) % len(PLACE_MARKERS)]
+        look = closed_look(self.colour(key), self.layers[material])
+        return {name: look[name] for name in ("mec", "mfc", "mew", "ms", "zorder")} | {"marker": marker}
 
     def handles(self, **look) -> dict[str, Line2D]:
         """Legend of what tells the lines apart: materials by colour, surfaces and slopes by marker, in `look`.
@@ -226,13 +231,11 @@ class Lines:
         return ", ".join(filter(None, parts)) or material_label(self.interfaces, material)
 
 
-def legend_below(figure: Figure, handles: Mapping[str, object], columns: int = 2) -> None:
-    """Add a legend below the panels; the figure grows by its height."""
-    if not handles:
-        return
-    size = 8 if len(handles) <= _MANY_NAMES else 7
-    figure.set_figheight(figure.get_figheight() + 0.06 + 0.0194 * size * -(-len(handles) // columns))
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)
+def say_which_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -> None:
+    """Name above a panel the model whose runs of some studies it shows; those by the other one are not there."""
+    names = {ASPERITIES: "interacting asperities", BOUNDARY_ELEMENTS: SHORT_RANGE}
+    models = dict.fromkeys(shown_model(campaign[study].to_dataset()) for study in studies)
+    axes.set_title(", ".join(names[model] for model in models), loc="right")
 
 
 def several(name: str, studies: Sequence[str]) -> list[str]:

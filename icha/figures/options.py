@@ -161,6 +161,6 @@ def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iter
         yield from not_unloaded(campaign, (key, index), name, in_part=False)
 
 
-def model_error_only(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
-    """The inputs of a figure of the error of the model alone."""
-    return {"model_error": files.path(results.MODEL_ERROR)}
+def campaign_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
+    """The inputs of a figure of the error of the model: the campaign has the materials, which have their colours."""
+    return {"campaign": files.path(results.DATASET), "model_error": files.path(results.MODEL_ERROR)}

@@ -10,7 +10,6 @@ from types import ModuleType
 import icha.figures
 from icha.figures.declaration import Declaration
 
-
 _NUMBERED = re.compile(r"fig(\d+)_")
 
 

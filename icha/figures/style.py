@@ -6,7 +6,7 @@ Matplotlib is imported where something is drawn: whoever reads a configuration n
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
 from functools import wraps
 from typing import TYPE_CHECKING
@@ -27,7 +27,6 @@ TWO_COLUMNS = 7.1
 BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
 ORANGE, SKY, PURPLE, BLACK = "#E69F00", "#56B4E9", "#CC79A7", "#000000"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)))
 GREY = "0.45"
 
@@ -129,11 +128,6 @@ def panel_label(axes, letter: str) -> None:
     axes.set_title(f"({letter})", loc="left", fontweight="bold")
 
 
-def cycle(values: tuple, count: int) -> Iterator:
-    """The first `count` of `values`, from the start again when they run out."""
-    return (values[k % len(values)] for k in range(count))
-
-
 def number(value: float) -> str:
     """A value in text: `0.01`, `25`, `3.2 × 10⁻⁵` in mathtext."""
     if value == 0:
@@ -182,19 +176,3 @@ def material_label(study, material: str) -> str:
 def slope_label(slope: float) -> str:
     """An rms slope in text."""
     return rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"
-
-
-def line_look(index: int, *, adhesive: bool) -> dict:
-    """Look of the line and markers of the material `index` of a figure; open markers are without adhesion."""
-    colour = COLOURS[(index + 1) % len(COLOURS)]
-    return {
-        "color": colour,
-        "ls": DASHES[index % len(DASHES)],
-        "marker": MARKERS[index % len(MARKERS)],
-        "mfc": colour if adhesive else "white",
-        "mec": colour,
-        "ms": 3.4 if adhesive else 4.4,
-        "mew": 0.8,
-        "lw": 0.8,
-        "zorder": 4 if adhesive else 3,
-    }

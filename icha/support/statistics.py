@@ -6,6 +6,8 @@ import numpy as np
 
 # The part of such bands that hold the mean of infinitely many surfaces.
 CONFIDENCE = 0.95
+# Of fewer members the band is wider than their scatter: they are better shown one by one.
+ENOUGH = 5
 
 
 class Ensemble(NamedTuple):
@@ -19,6 +21,18 @@ class Ensemble(NamedTuple):
     deviation: np.ndarray
     confidence: np.ndarray
     count: np.ndarray
+
+    def band(self, *, positive: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper end of the band of the mean m: m ± c, or of a `positive` quantity m exp(± c/m).
+
+        The second is the interval of the logarithm of the mean, whose standard error is that of the mean over the mean
+        to first order (delta method). It stays above zero, and is the first where c is small. Where a mean is not
+        positive it is the first in any case.
+        """
+        above = (self.mean > 0) & positive
+        factor = np.exp(np.divide(self.confidence, self.mean, out=np.zeros_like(self.mean), where=above))
+        low = np.where(above, self.mean / factor, self.mean - self.confidence)
+        return low, np.where(above, self.mean * factor, self.mean + self.confidence)
 
 
 def ensemble(samples, axis: int = 0) -> Ensemble:

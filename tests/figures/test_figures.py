@@ -33,13 +33,12 @@ from icha.figures import (
 )
 from icha.figures.curves import GAP_LABEL, SEPARATION_LABEL, gap_label
 from icha.figures.maps import block_means
+from icha.figures.palette import material_colours, place_markers
 from icha.figures.scale import Scale, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
 from icha.figures.spots import circles_in_cell
 from icha.figures.style import (
     BLACK,
-    BLUE,
-    VERMILLION,
     logarithmic_axes,
     material_label,
     new_figure,
@@ -49,6 +48,7 @@ from icha.figures.style import (
     slope_label,
     unit_for,
 )
+from icha.references.persson import persson_area
 from icha.references.theories import reference_dataset
 from icha.support.statistics import ensemble
 from icha.surfaces.moments import spectral_moments
@@ -88,8 +88,8 @@ def draw(name, surface):
         "fig2_truth": lambda: fig2_area_and_gap.figure(compared.tree(), None, compared.errors(), study="one"),
         "fig3_truth": lambda: fig3_distributions.figure(compared.tree(), compared.errors(), study="one"),
         "fig4_truth": lambda: fig4_contact_map.figure(compared.tree(), surface, solution(), study="one"),
-        "fig10": lambda: fig10_model_error.figure(compared.errors(), study="one"),
-        "fig11": lambda: fig11_distribution_error.figure(compared.errors(), study="one"),
+        "fig10": lambda: fig10_model_error.figure(compared.tree(), compared.errors(), study="one"),
+        "fig11": lambda: fig11_distribution_error.figure(compared.tree(), compared.errors(), study="one"),
         "fig2_loops": lambda: fig2_area_and_gap.figure(cyclic.tree(), study="loops"),
         "fig5_loops": lambda: fig5_multi_slope.figure(cyclic.tree(), study="loops"),
         "fig9_one": lambda: fig9_tabor.figure(tree, study="single", kind="area_fraction"),
@@ -122,6 +122,11 @@ def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, name):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.pdf", "a.png", "b.pdf", "b.png"]
 
 
+def legend(figure):
+    """The names in the legend of a figure."""
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
 def lines(axes):
     return [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
 
@@ -136,9 +141,12 @@ def test_fig1_passes_through_the_known_points():
 
 def test_fig2_shows_every_run_and_the_references():
     figure = fig2_area_and_gap.figure(small.tree(), reference_dataset(small.SPECTRUM), study="slopes")
-    left, right = figure.axes
-    labels = {text.get_text() for text in left.get_legend().get_texts()}
-    assert {"Persson", "Bush, Gibson & Thomas", "GFMD, no adhesion"} <= labels
+    left, right = figure.axes[:2]
+    # Published points are those of another surface.
+    assert {"Persson", "Bush, Gibson & Thomas"} <= set(legend(figure)) and "GFMD, no adhesion" not in legend(figure)
+    published = icha.SelfAffineSpectrum(period=1e-4, rolloff_wavelength=1e-4, short_wavelength=1e-6, hurst=0.8)
+    other = fig2_area_and_gap.figure(small.tree(), reference_dataset(published), study="slopes")
+    assert "GFMD, no adhesion" in legend(other)
     drawn = [line for line in left.get_lines() if line.get_linestyle() == "None" and len(line.get_xdata()) == 4]
     assert len(drawn) == 4
     run = small.run(rms_slope=0.2, material="soft")
@@ -171,11 +179,8 @@ def test_stops_are_those_of_the_first_loading():
 def test_ways_back_are_thin_dashed_lines_in_the_colour_of_the_material(module):
     runs = {labels: run for labels, run in cyclic.runs().items() if (labels.study, labels.seed) == ("loops", 2)}
     figure = module.figure(campaign_tree(runs.items()), study="loops")
-    left, right = figure.axes
-    names = [text.get_text() for each in (*figure.axes, figure) for text in getattr(each, "texts", ())]
-    legends = [each for each in (left.get_legend(), right.get_legend(), *figure.legends) if each is not None]
-    names = [text.get_text() for legend in legends for text in legend.get_texts()]
-    assert names.count("unloading") == 1
+    left, right = figure.axes[:2]
+    assert legend(figure).count("unloading") == 1
     for axes in (left, right):
         ways = [line for line in axes.get_lines() if line.get_linewidth() == 0.7 and len(line.get_xdata())]
         markers = [line for line in axes.get_lines() if line.get_marker() not in ("None", "") and len(line.get_xdata())]
@@ -420,7 +425,7 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
         np.testing.assert_array_equal(curve.get_ydata(), [float(run[name].values[-1]) for run in own])
         assert set(bare.get_ydata()) == {float(runs["bare"][name].values[-1])}
     assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
-    assert len({text.get_text() for text in left.get_legend().get_texts()}) == 2
+    assert len(set(legend(left.figure))) == 2
     tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, "bare"), runs["bare"])])
     with pytest.raises(ValueError, match="study tabor: no complete run with adhesion"):
         fig9_tabor.figure(tree, study="tabor")
@@ -428,7 +433,7 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
 
 def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
     figure = fig2_area_and_gap.figure(compared.tree(), None, compared.errors(), study="one")
-    for axes, name in zip(figure.axes, ("contact_area_fraction", "reduced_separation"), strict=True):
+    for axes, name in zip(figure.axes[:2], ("contact_area_fraction", "reduced_separation"), strict=True):
         crosses = [line for line in axes.get_lines() if line.get_marker() == "1" and len(line.get_xdata())]
         runs = [line for line in axes.get_lines() if line.get_marker() not in ("1", "None")]
         assert len(crosses) == 2 and len(runs) == 2
@@ -437,8 +442,8 @@ def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
             truth = compared.errors()[entry][f"{name}_boundary_elements"].values
             np.testing.assert_allclose(line.get_ydata(), truth.mean(axis=1).ravel(), rtol=1e-12)
             assert sorted(set(line.get_xdata())) == list(compared.PRESSURES)
-        names = [text.get_text() for text in axes.get_legend().get_texts()]
-        assert names.count("boundary elements at finite range") == 1 and "boundary elements" not in names
+    names = legend(figure)
+    assert names.count("boundary elements at finite range") == 1 and "boundary elements" not in names
     alone = fig2_area_and_gap.figure(small.tree(), None, compared.errors(), study="single")
     assert not [line for line in alone.axes[0].get_lines() if line.get_marker() in ("+", "1")]
 
@@ -447,7 +452,7 @@ def test_fig2_marks_both_kinds_of_boundary_elements():
     figure = fig2_area_and_gap.figure(compared.tree(), None, compared.short_range_errors(), study="one")
     runs = compared.runs()
     for axes, name, factor in zip(
-        figure.axes, ("contact_area_fraction", "reduced_separation"), (1.5, 0.9), strict=True
+        figure.axes[:2], ("contact_area_fraction", "reduced_separation"), (1.5, 0.9), strict=True
     ):
         crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
         assert len(crosses) == 2
@@ -455,7 +460,7 @@ def test_fig2_marks_both_kinds_of_boundary_elements():
             own = [run[name].values for labels, run in runs.items() if labels.material == material]
             np.testing.assert_allclose(line.get_ydata(), factor * np.mean(own, axis=0), rtol=1e-9)
         assert len([line for line in axes.get_lines() if line.get_marker() == "1" and len(line.get_xdata())]) == 2
-    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    names = legend(figure)
     assert {"boundary elements", "boundary elements at finite range"} <= set(names) and len(names) == len(set(names))
 
 
@@ -464,14 +469,12 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
     adhesive = {(1.0, "soft"): small.MATERIALS["soft"], (1.0, "other"): icha.Material(1e6, 0.02, 2e-9)}
     references = reference_dataset(small.SPECTRUM, moments, adhesive)
     figure = fig2_area_and_gap.figure(compared.tree(), references, compared.errors(), study="one")
-    # Too many names for a panel: they stand below, each once.
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    names = legend(figure)
     assert {"Greenwood & Williamson", "Fuller & Tabor", "Yang & Persson", "boundary elements at finite range"} <= set(
         names
     )
     assert len(names) == len(set(names))
-    for axes, name in zip(figure.axes, ("summit_area_fraction", "reduced_separation"), strict=True):
-        assert axes.get_legend() is None
+    for axes, name in zip(figure.axes[:2], ("summit_area_fraction", "reduced_separation"), strict=True):
         drawn = [line for line in axes.get_lines() if line.get_linewidth() == 0.8 and len(line.get_xdata())]
         assert len(drawn) == 2  # Greenwood & Williamson, and Fuller & Tabor of the study's material
         values = references[name if name in references else f"greenwood_williamson_{name}"].values
@@ -485,24 +488,23 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
 def test_fig2_tells_further_solutions_of_the_same_states_apart():
     bare = compared.errors()["bare"].to_dataset()
     twice = xr.DataTree.from_dict({"/first": bare, "/finer": bare})
-    axes = fig2_area_and_gap.figure(compared.tree(), None, twice, study="one").axes[0]
-    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    figure = fig2_area_and_gap.figure(compared.tree(), None, twice, study="one")
+    axes, names = figure.axes[0], legend(figure)
     name = "boundary elements at finite range"
     assert name in names and f"{name}, finer" in names
     assert {"1", "2"} <= {line.get_marker() for line in axes.get_lines()}
 
 
 def test_fig3_shows_boundary_elements_of_the_same_state_only():
-    def broad(**options):
-        figure = fig3_distributions.figure(compared.tree(), compared.errors(), study="one", **options)
-        return [[line for line in axes.get_lines() if line.get_linewidth() > 3] for axes in figure.axes]
+    def crosses(errors):
+        figure = fig3_distributions.figure(compared.tree(), errors, study="one", target=3e-3)
+        return [[line for line in axes.get_lines() if line.get_marker() == "1"] for axes in figure.axes]
 
-    for shown, more in zip(broad(target=3e-3), (0, 1), strict=True):
-        # Both materials, and what the legends show: boundary elements, and in one of them bands.
-        assert len(shown) == 3 + more
+    colours = material_colours(compared.tree())
+    for shown in crosses(compared.errors()):
+        assert {line.get_color() for line in shown} == set(colours.values()) and all(line.is_dashed() for line in shown)
     only = compared.errors().isel(reduced_pressure=[1])
-    figure = fig3_distributions.figure(compared.tree(), only, study="one", target=3e-3)
-    assert all(line.get_linewidth() < 3 for axes in figure.axes for line in axes.get_lines() if len(line.get_xdata()))
+    assert crosses(only) == [[], []]
     # These solutions are the runs' own states, so that their points lie on those of the runs.
     truth = compared.errors()["bare"].to_dataset().isel(surface=0, seed=0, rms_slope=0, material=0, reduced_pressure=0)
     truth["solution_grid"] = 32
@@ -515,15 +517,12 @@ def test_fig3_shows_boundary_elements_of_the_same_state_only():
 
 def test_fig3_shows_the_limit_of_a_short_range_where_it_is_known():
     figure = fig3_distributions.figure(compared.tree(), compared.short_range_errors(), study="one", target=3e-3)
-    for axes in figure.axes:
-        names = [text.get_text() for text in axes.get_legend().get_texts()]
-        assert "boundary elements" in names and "boundary elements at finite range" not in names
+    assert "boundary elements" in legend(figure) and "boundary elements at finite range" not in legend(figure)
     # Of a load that those runs do not keep, it is the others.
     kept = [(labels, run.isel(snapshot=[1])) for labels, run in compared.patches()]
     errors = model_error(compared.tree(), compared.solutions_of_errors(), runs=kept)
     figure = fig3_distributions.figure(compared.tree(), errors, study="one", target=3e-3)
-    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert "boundary elements at finite range" in names
+    assert "boundary elements at finite range" in legend(figure)
 
 
 def test_fig3_joined_bins_keep_what_they_hold():
@@ -553,7 +552,7 @@ def test_fig4_puts_boundary_elements_beside_the_spots(surface):
     states = figure.axes[3].get_images()[0].get_array()[:-1, :-1]
     counts = {
         name: np.count_nonzero(np.all(states == to_rgb(colour), axis=-1))
-        for name, colour in (("icha", VERMILLION), ("truth", BLUE), ("both", "0.35"))
+        for name, colour in (("icha", (0.9, 0.0, 0.05)), ("truth", "black"), ("both", "0.72"))
     }
     assert counts["both"] + counts["icha"] == np.count_nonzero(covered)
     assert counts["both"] + counts["truth"] == np.count_nonzero(contact)
@@ -571,7 +570,7 @@ def test_fig4_shows_the_maps_of_the_other_model(surface):
     part = figure.axes[1].get_images()[1].get_array()[:-1, :-1]
     np.testing.assert_array_equal(part, shifted["contact_map"].values[1])
     own, other = truth["contact_map"].values[1] > 0, shifted["contact_map"].values[1] > 0
-    assert figure.axes[3].get_title(loc="right") == f"overlap {jaccard(own, other):.2f}"
+    assert figure.axes[3].get_title(loc="right").endswith(f"{jaccard(own, other):.2f}")
     other = shifted.assign(seed=2)
     with pytest.raises(ValueError, match=r"soft: the boundary elements given are of another contact: seed is 1"):
         fig4_contact_map.figure(compared.tree(), surface, truth=other, study="one")
@@ -594,8 +593,7 @@ def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
             assert np.all(np.isin(crosses.get_ydata(), own["contact_area_fraction"].values))
             drawn = {line.get_color() for line in axes.get_lines() if line.get_marker() not in ("+", "None")}
             assert crosses.get_color() in drawn
-        texts = [text.get_text() for axes in figure.axes if axes.get_legend() for text in axes.get_legend().get_texts()]
-        assert texts.count("boundary elements") == 1
+        assert legend(figure).count("boundary elements") == 1
 
 
 def test_fig4_refuses_the_boundary_elements_of_another_state(surface):
@@ -606,15 +604,14 @@ def test_fig4_refuses_the_boundary_elements_of_another_state(surface):
         fig4_contact_map.figure(compared.tree(), surface, other, study="one")
 
 
-def test_fig10_shows_means_and_scatter_of_the_errors_in_per_cent():
-    left, right = fig10_model_error.figure(compared.errors(), study="one").axes
+def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
+    left, right = fig10_model_error.figure(compared.tree(), compared.errors(), study="one").axes
     expected = 100 * (1 / np.array(list(compared.AREA_FACTORS.values())) - 1)
-    (adhesive, _, (bars,)), (bare, _, _) = left.containers
+    (adhesive, _, bars), (bare, _, _) = left.containers
     np.testing.assert_allclose(adhesive.get_ydata(), expected.mean())
-    for segment in bars.get_segments():
-        # Three seeds: 4.303 standard errors, by Student's table.
-        reach = 4.30265273 * expected.std(ddof=1) / np.sqrt(3)
-        np.testing.assert_allclose(segment[:, 1], expected.mean() + reach * np.array([-1, 1]))
+    # Three seeds are too few for a confidence interval: they are shown themselves.
+    dots = next(line for line in left.get_lines() if line.get_color() == adhesive.get_color() and dotted(line))
+    assert bars == () and sorted(set(np.round(dots.get_ydata(), 9))) == sorted(np.round(expected, 9))
     np.testing.assert_allclose(bare.get_ydata(), -20)
     np.testing.assert_allclose(right.containers[1][0].get_ydata(), 25)
     np.testing.assert_allclose(adhesive.get_xdata(), compared.PRESSURES, rtol=0.03)
@@ -626,15 +623,16 @@ def test_fig10_shows_means_and_scatter_of_the_errors_in_per_cent():
 
 
 def test_fig10_names_finite_ranges_where_the_limit_of_a_short_one_is_known():
-    figure = fig10_model_error.figure(compared.short_range_errors(), study="one")
+    figure = fig10_model_error.figure(compared.tree(), compared.short_range_errors(), study="one")
     left = figure.axes[0]
     assert len(left.containers) == 4
     for container in left.containers[:2]:
         np.testing.assert_allclose(container[0].get_ydata(), 100 * (1 / 1.5 - 1))
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert sum("at finite range" in name for name in names) == 2 and "against the energetic area" in names
+    assert sum("at finite range" in name for name in names) == 2
+    assert sum(name.startswith("relative to the energetic area (energy of adhesion") for name in names) == 1
     only = xr.DataTree.from_dict({"/one": compared.short_range_errors()["one"].to_dataset()})
-    figure = fig10_model_error.figure(only, study="one")
+    figure = fig10_model_error.figure(compared.tree(), only, study="one")
     assert not [line for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     assert not any("finite range" in name or "energetic" in name for name in names)
@@ -647,13 +645,13 @@ def test_errors_of_runs_that_all_failed_are_nothing_to_draw(module):
     for name, node in errors.children.items():
         empty[f"/{name}"].attrs = node.attrs
     with pytest.raises(NothingToDraw, match="study one: no run beside boundary elements is complete"):
-        module.figure(xr.DataTree.from_dict(empty), study="one")
+        module.figure(compared.tree(), xr.DataTree.from_dict(empty), study="one")
 
 
 def test_surfaces_of_different_slopes_are_compared_at_their_own_alone():
     errors = compared.errors_at_own_slopes()
     assert errors["adhesive"].sizes["surface"] == errors["adhesive"].sizes["rms_slope"] == 2
-    figure = fig10_model_error.figure(errors, study="one")
+    figure = fig10_model_error.figure(compared.tree(), errors, study="one")
     assert len(figure.axes[0].containers) == 4
     names = [text.get_text() for text in figure.legends[0].get_texts()]
     assert sum("other" in name for name in names) == sum("rough" in name for name in names) == 2
@@ -670,18 +668,18 @@ def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
     parts = {f"/{name}": many(node) for name, node in compared.errors().children.items()}
     for name, node in compared.errors().children.items():
         parts[f"/{name}"].attrs = node.attrs
-    figure = fig10_model_error.figure(xr.DataTree.from_dict(parts), study="one")
+    figure = fig10_model_error.figure(compared.tree(), xr.DataTree.from_dict(parts), study="one")
     *panels, bar = figure.axes
     assert [len(axes.containers) for axes in panels] == [9, 9, 9, 9]
     # Too many for a legend: a scale names them.
     assert bar.get_ylabel() == "s" and [text.get_text() for text in bar.get_yticklabels()] == list("012345678")
     names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert set(names) == {"means of n = 3 seeds, bars 95 %", "against the energetic area"}
+    assert len(names) == 2 and "single seeds beside their mean, n = 3" in names
     assert len({container[0].get_color() for container in panels[0].containers}) == 9
 
 
 def test_fig11_shows_distances_and_overlap():
-    axes = fig11_distribution_error.figure(compared.errors(), study="one").axes
+    axes = fig11_distribution_error.figure(compared.tree(), compared.errors(), study="one").axes
     for panel, name in zip(
         axes, ("pressure_distribution_distance", "gap_distribution_distance", "jaccard"), strict=True
     ):
@@ -695,7 +693,7 @@ def test_fig11_shows_distances_and_overlap():
 @pytest.mark.parametrize("module", COMPARED, ids=lambda module: module.__name__)
 def test_studies_without_boundary_elements_are_named(module):
     with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; there are some for one"):
-        module.figure(compared.errors(), study="slopes")
+        module.figure(compared.tree(), compared.errors(), study="slopes")
 
 
 def test_materials_that_differ_in_range_alone_are_told_apart_by_it():
@@ -751,20 +749,129 @@ def shaded(axes):
     return found
 
 
-def test_fig2_shows_means_with_bands_instead_of_every_seed():
+def dotted(line):
+    """Whether a line shows single seeds as dots."""
+    return line.get_marker() == "."
+
+
+def many_seeds(count=5):
+    return campaign_tree(
+        (RunLabels("many", "asperities", "rough", k, 1.0, "soft"), small.run(k)) for k in range(1, count + 1)
+    )
+
+
+def test_fig2_shows_means_with_bands_that_stay_above_zero():
+    figure = fig2_area_and_gap.figure(many_seeds(), study="many")
+    for axes, name in zip(figure.axes[:2], ("contact_area_fraction", "reduced_separation"), strict=True):
+        (mean,) = [line for line in axes.get_lines() if len(line.get_xdata()) == len(small.PRESSURES)]
+        over = ensemble([path_steps(small.run(k))[name].values for k in range(1, 6)])
+        np.testing.assert_allclose(mean.get_ydata(), over.mean, rtol=1e-12)
+        (edges,) = shaded(axes).values()
+        np.testing.assert_allclose(edges, over.band(positive=True), rtol=1e-12)
+        assert np.all(edges > 0) and axes.get_yscale() == "log"
+    assert legend(figure).count("mean and 95 % band, n = 5") == 1
+
+
+def test_of_few_seeds_figures_promise_no_confidence_and_show_every_seed():
     figure = fig2_area_and_gap.figure(compared.tree(), study="one")
-    for axes, name in zip(figure.axes, ("contact_area_fraction", "reduced_separation"), strict=True):
-        means = [line for line in axes.get_lines() if len(line.get_xdata()) == len(compared.PRESSURES)]
-        bands = shaded(axes)
-        assert len(means) == len(bands) == 2
-        for line, material in zip(means, ("soft", "hertz"), strict=True):
-            runs = [run for labels, run in compared.runs().items() if labels.material == material]
-            over = ensemble([path_steps(run)[name].values for run in runs])
-            np.testing.assert_allclose(line.get_ydata(), over.mean, rtol=1e-12)
-            for edge, sign in zip(bands[to_hex(line.get_color())], (-1, 1), strict=True):
-                np.testing.assert_allclose(edge, over.mean + sign * over.confidence, rtol=1e-12)
-    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert names.count("mean and 95 % band, n = 3 seeds") == 1
+    for axes, name in zip(figure.axes[:2], ("contact_area_fraction", "reduced_separation"), strict=True):
+        assert not shaded(axes)
+        for material, colour in material_colours(compared.tree()).items():
+            own = [run for labels, run in compared.runs().items() if labels.material == material]
+            values = [path_steps(run)[name].values for run in own]
+            drawn = [line for line in axes.get_lines() if line.get_color() == colour]
+            (mean,) = [line for line in drawn if line.get_marker() == "o"]
+            np.testing.assert_allclose(mean.get_ydata(), np.mean(values, axis=0), rtol=1e-12)
+            single = [line.get_ydata() for line in drawn if line.get_marker() == "None"]
+            np.testing.assert_allclose(single, values, rtol=1e-12)
+    names = legend(figure)
+    assert names.count("single seeds beside their mean, n = 3") == 1 and not any("95" in name for name in names)
+
+
+def test_fig2_shows_below_what_the_logarithmic_axes_hide():
+    figure = fig2_area_and_gap.figure(compared.tree(), None, compared.short_range_errors(), study="one")
+    for axes, factor in zip(figure.axes[2:], (1.5, 0.9), strict=True):
+        means = [line for line in axes.get_lines() if line.get_marker() == "o"]
+        assert len(means) == 2 and "BEM" in axes.get_ylabel() and axes.get_yscale() == "linear"
+        for line in means:
+            np.testing.assert_allclose(line.get_ydata(), 100 * (1 / factor - 1), rtol=1e-9)
+            np.testing.assert_array_equal(line.get_xdata(), compared.PRESSURES)
+    # Without boundary elements it is the difference from theory, of the separation only where there is one.
+    references = reference_dataset(small.SPECTRUM)
+    figure = fig2_area_and_gap.figure(small.tree(), references, study="slopes")
+    run = path_steps(small.run(material="hertz"))
+    p = run["reduced_pressure"].values
+    known = np.log(references["reduced_pressure"]), references["persson_reduced_separation"]
+    for axes, values, theory in (
+        (figure.axes[2], run["contact_area_fraction"].values, persson_area(p)),
+        (figure.axes[3], run["reduced_separation"].values, np.interp(np.log(p), *known)),
+    ):
+        expected = 100 * (values / theory - 1)
+        assert any(
+            np.allclose(line.get_ydata(), expected) for line in axes.get_lines() if len(line.get_xdata()) == len(p)
+        )
+        assert "Persson" in axes.get_ylabel()
+    assert len(fig2_area_and_gap.figure(small.tree(), study="slopes").axes) == 3
+
+
+def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_campaign(surface):
+    # Another study names the materials in another order.
+    first = [
+        (RunLabels("first", *labels[1:]), run) for labels, run in compared.runs().items() if labels.material == "hertz"
+    ]
+    tree, errors = campaign_tree([*first, *compared.runs().items()]), compared.short_range_errors()
+    colours = material_colours(tree)
+    assert list(colours) == ["hertz", "soft"] and len(set(colours.values())) == 2
+    soft = colours["soft"]
+    for figure in (
+        fig2_area_and_gap.figure(tree, None, errors, study="one"),
+        fig3_distributions.figure(tree, errors, study="one", target=3e-3),
+        fig5_multi_slope.figure(tree, study="one"),
+        fig7_stiffness.figure(tree, study="one"),
+        fig8_patch_sizes.figure(tree, study="one"),
+        fig9_tabor.figure(tree, study="one"),
+        fig10_model_error.figure(tree, errors, study="one"),
+        fig11_distribution_error.figure(tree, errors, study="one"),
+    ):
+        adhesive = next(text for text in legend(figure) if "= 50 mJ/m²" in text)
+        handle = figure.legends[0].legend_handles[legend(figure).index(adhesive)]
+        line = handle if hasattr(handle, "get_color") else handle.get_children()[0]
+        assert to_hex(
+            np.ravel(line.get_color())[0] if not isinstance(line.get_color(), str) else line.get_color()
+        ) == to_hex(soft)
+        drawn = [line for line in figure.axes[0].get_lines() if line.get_color() == soft]
+        assert drawn and {line.get_marker() for line in drawn} <= {"o", "+", "1", ".", "None", None}
+
+
+def test_materials_of_a_study_never_share_a_colour():
+    def tree(*studies):
+        return xr.DataTree.from_dict(
+            {f"/{k}": xr.Dataset(coords={"material": list(names)}) for k, names in enumerate(studies)}
+        )
+
+    many = [f"m{k:02d}" for k in range(20)]
+    colours = material_colours(tree(many[:8], many[8:], ["m00", "m12"]))
+    assert list(colours) == many
+    for own in (many[:8], many[8:], ["m00", "m12"]):
+        assert len({colours[name] for name in own}) == len(own)
+    # What is added at the end leaves the others as they are.
+    assert colours == {name: material_colours(tree(many[:8], many[8:], ["m00", "m12"], ["new"]))[name] for name in many}
+    assert place_markers([("a", 0.2), ("a", 1.0), ("b", 0.5)]) == {("a", 1.0): "o", ("a", 0.2): "s", ("b", 0.5): "^"}
+
+
+def test_legends_stand_off_the_data(surface):
+    for name in NAMES:
+        if name not in ("fig1", "fig4", "fig4_truth", "fig6", "fig6_one"):
+            figure = draw(name, surface)
+            assert len(figure.legends) == 1 and not any(axes.get_legend() for axes in figure.axes), name
+
+
+def test_rounding_errors_stretch_no_axis():
+    run = small.run().copy(deep=True)
+    run["contact_area_fraction"].values[0] = run["reduced_pressure"].values[0] = 1e-52
+    tree = campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)])
+    axes = fig2_area_and_gap.figure(tree, reference_dataset(small.SPECTRUM), study="one").axes[0]
+    assert min(*axes.get_xlim(), *axes.get_ylim()) > 1e-9
 
 
 def test_fig9_points_are_means_over_the_seeds():
@@ -772,10 +879,18 @@ def test_fig9_points_are_means_over_the_seeds():
     runs = {material: [] for material in ("soft", "hertz")}
     for labels, run in compared.runs().items():
         runs[labels.material].append(float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[0])]))
-    ((curve, _, (bars,)),) = left.containers
+    ((curve, _, bars),) = left.containers
     np.testing.assert_allclose(curve.get_ydata(), [np.mean(runs["soft"])])
-    over = ensemble(runs["soft"])
-    np.testing.assert_allclose(bars.get_segments()[0][:, 1], over.mean + over.confidence * np.array([-1, 1]))
+    (dots,) = [line for line in left.get_lines() if dotted(line)]
+    assert bars == () and sorted(dots.get_ydata()) == sorted(runs["soft"])
+    left = fig9_tabor.figure(many_seeds(), study="many").axes[0]
+    ((_, _, (bars,)),) = left.containers
+    at = [find_snapshot(small.run(k), None, None) for k in range(1, 6)]
+    areas = [
+        float(small.run(k).contact_area_fraction[int(small.run(k).snapshot_step[own])]) for k, own in enumerate(at, 1)
+    ]
+    np.testing.assert_allclose(bars.get_segments()[0][:, 1], ensemble(areas).band(positive=True))
+    left, _ = fig9_tabor.figure(compared.tree(), study="one").axes
     bare = next(line for line in left.get_lines() if line.is_dashed())
     np.testing.assert_allclose(bare.get_ydata(), np.mean(runs["hertz"]))
 
@@ -814,7 +929,7 @@ def test_fig5_tells_surfaces_apart(slopes):
         wanted = [small.run(1 + names.index(name), slope, material) for material in ("soft", "hertz")]
         for line, run in zip(drawn, wanted, strict=True):
             np.testing.assert_allclose(line.get_ydata(), path_steps(run)["contact_area_fraction"])
-    assert len(words) == len(places) + 2
+    assert len(words) == len(places) + 3  # two materials, and the model
 
 
 def test_theories_say_whose_they_are_where_there_are_several_surfaces():

@@ -50,8 +50,9 @@ def legend(figure):
 
 
 def curves(axes):
-    """The ways of the loops in an axes: solid and dashed lines."""
+    """The ways of the loops in an axes: solid and dashed lines, without the thin ones of single seeds."""
     lines = [line for line in axes.get_lines() if line.get_linestyle() != "None" and len(line.get_xdata()) > 2]
+    lines = [line for line in lines if line.get_linewidth() > 0.5]
     return [line for line in lines if line.get_linestyle() == "-"], [x for x in lines if x.get_linestyle() != "-"]
 
 
@@ -195,13 +196,13 @@ def test_fig13_lays_boundary_elements_over_the_run_they_belong_to(tree):
             np.testing.assert_array_equal(line.get_xdata(), part[x].values)
             np.testing.assert_array_equal(line.get_ydata(), part[y].values)
             assert line.get_markeredgecolor() == colour
-        assert [line.get_markerfacecolor() for line in own] == [colour, "none"]
+            assert [line.get_marker() for line in own] == ["1", "2"]
     name = "boundary elements at finite range"
     assert {f"{name}, loading", f"{name}, unloading"} <= set(legend(figure))
     assert not any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard", seed=1)))
     # Without a seed asked for it is one with boundary elements, and without any the mean over the seeds.
     assert any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard")))
-    assert "mean and 95 % band, n = 2 seeds" in legend(fig13_loops.figure(tree, study="hard"))
+    assert "single seeds beside their mean, n = 2" in legend(fig13_loops.figure(tree, study="hard"))
     stranger = shown.assign(surface_energy=0.06)
     with pytest.raises(ValueError, match=r"study hard: no run is of the same contact .* surface_energy 0\.06"):
         fig13_loops.figure(tree, [stranger], study="hard")
@@ -242,8 +243,11 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree, quantity):
     )
     np.testing.assert_array_equal(sticky[0].get_xdata(), slopes)
     np.testing.assert_allclose(sticky[0].get_ydata(), values.mean(axis=0))
-    # Two seeds: 12.706 standard errors, by Student's table.
-    np.testing.assert_allclose(bars(sticky, 1), 12.7062047 * values.std(axis=0, ddof=1) / np.sqrt(2), rtol=1e-6)
+    # Two seeds are too few for a confidence interval: they are shown themselves.
+    assert not bars(sticky, 1)
+    dots = next(line for line in left.get_lines() if line.get_marker() == ".")
+    np.testing.assert_allclose(sorted(dots.get_ydata()), sorted(values.ravel()))
+    assert left.get_title("right") == "interacting asperities"
     assert np.all(bare[0].get_ydata() == 0) and bare[0].get_markerfacecolor() == "white"
 
     sticky, bare = right.containers
@@ -289,7 +293,7 @@ def test_fig14_tells_slopes_of_the_loads_apart(tree):
     looks = {(each[0].get_color(), each[0].get_marker()) for each in figure.axes[1].containers}
     assert len(figure.axes[1].containers) == len(looks) == 4
     names = legend(figure)
-    assert names[-1] == "means of n = 2 seeds, bars 95 %" and len(names) == 5
+    assert names[-1] == "single seeds beside their mean, n = 2" and len(names) == 5
     assert sum("0.5" in name or "= 1$" in name or name.endswith("1") for name in names) >= 2
 
 
@@ -363,11 +367,12 @@ def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
     line = averages([{1: (2.0, 10.0), 2: (4.0, 30.0), 3: (9.0, 99.0)}, {2: (1.0, 6.0), 1: (1.0, 2.0)}])
     assert line.same_seeds
     assert line.x.tolist() == [1, 3] and line.y.tolist() == [4, 20]
-    # Two seeds: 12.706 standard errors, half the difference of both.
-    np.testing.assert_allclose(line.y_confidence, [12.7062047 * 2, 12.7062047 * 10], rtol=1e-7)
+    # Two seeds: 12.706 standard errors, half the difference of both; of the logarithm, for losses are positive.
+    np.testing.assert_allclose(np.log(line.y_band[1] / line.y), 12.7062047 * np.array([2 / 4, 10 / 20]), rtol=1e-7)
+    assert np.all(line.y_band[0] > 0)
     assert line.counts.tolist() == [2, 2]
     apart = averages([{1: (2.0, 10.0)}, {2: (3.0, 8.0)}])
-    assert not apart.same_seeds and apart.y.tolist() == [10, 8] and not apart.y_confidence.any()
+    assert not apart.same_seeds and apart.y.tolist() == [10, 8] and np.isnan(apart.y_band).all()
 
 
 def test_fig15_in_joule_shows_runs_without_adhesion_too(tree):

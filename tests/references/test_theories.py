@@ -196,7 +196,9 @@ def test_published_points_are_of_their_own_surface_alone():
     ):
         dataset = reference_dataset(icha.SelfAffineSpectrum(**own | changed))
         assert ("gfmd_area_fraction" in dataset) == there
-    assert reference_dataset(icha.SelfAffineSpectrum(**own))["gfmd_area_fraction"].values.tolist() == gfmd["area_fraction"]
+    assert (
+        reference_dataset(icha.SelfAffineSpectrum(**own))["gfmd_area_fraction"].values.tolist() == gfmd["area_fraction"]
+    )
     assert "gfmd_area_fraction" not in reference_dataset()
 
 

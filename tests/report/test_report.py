@@ -343,7 +343,13 @@ def test_figures_stand_with_their_study_and_have_the_numbers_of_their_files(writ
     ]
     text = write(figures=figures)
     order = re.findall(r'<figure id="(.*?)">|<h3 id="(study-.*?)">', text)
-    assert [one or other for one, other in order] == ["fig2_both", "study-slopes", "fig9_early", "study-single", "fig5_late"]
+    assert [one or other for one, other in order] == [
+        "fig2_both",
+        "study-slopes",
+        "fig9_early",
+        "study-single",
+        "fig5_late",
+    ]
     numbers = re.findall(r"<b>Figure (\d+)\.</b> Caption of fig(\d+)_", text)
     assert numbers == [("2", "2"), ("9", "9"), ("5", "5")]
 

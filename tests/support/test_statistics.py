@@ -6,7 +6,7 @@ import small_campaign as small
 import xarray as xr
 from scipy.stats import t, ttest_1samp
 
-from icha.analysis.common_loads import compare_runs, mean_curve, mean_way
+from icha.analysis.common_loads import at_common_displacements, at_common_loads, compare_runs
 from icha.datasets.campaign import campaign_tree, reduced_gap
 from icha.datasets.labels import LABELS, RunLabels
 from icha.support.statistics import ensemble
@@ -44,20 +44,45 @@ def test_members_without_a_value_do_not_count():
     assert np.isfinite(over.confidence).tolist() == np.isfinite(over.deviation).tolist() == [True, False, False]
 
 
+def test_bands_of_positive_quantities_stay_above_zero_and_are_the_others_where_they_are_narrow():
+    # Three members whose Student's band reaches far below zero.
+    over = ensemble([1e-3, 5e-3, 2e-2])
+    low, high = over.band()
+    assert (low, high) == pytest.approx((over.mean - over.confidence, over.mean + over.confidence)) and low < 0
+    low, high = over.band(positive=True)
+    assert 0 < low < over.mean < high
+    # In the logarithm it is symmetric, with the relative standard error of the mean as its unit.
+    assert (
+        np.log(high / over.mean) == pytest.approx(np.log(over.mean / low)) == pytest.approx(over.confidence / over.mean)
+    )
+    narrow = ensemble([0.999, 1.0, 1.001])
+    np.testing.assert_allclose(narrow.band(positive=True), narrow.band(), rtol=1e-5)
+    np.testing.assert_array_equal(ensemble([-1.0, 1.0]).band(positive=True), ensemble([-1.0, 1.0]).band())
+
+
+def test_bands_of_the_logarithm_hold_the_mean_as_often_as_they_say():
+    rng = np.random.default_rng(4)
+    members = np.exp(rng.normal(0.0, 0.3, (6, 40000)))
+    low, high = ensemble(members).band(positive=True)
+    mean = np.exp(0.3**2 / 2)
+    assert np.mean((low < mean) & (mean < high)) == pytest.approx(0.95, abs=0.012)
+
+
 def test_curves_of_the_same_stops_are_not_interpolated():
     load = np.array([1e-3, 1e-2, 1e-1])
-    at, over = mean_curve([(load, 2 * load), (load[::-1], 4 * load[::-1])], logarithmic=True)
+    at, members = at_common_loads([(load, 2 * load), (load[::-1], 4 * load[::-1])], logarithmic=True)
     np.testing.assert_array_equal(at, load)
-    np.testing.assert_array_equal(over.mean, 3 * load)
+    np.testing.assert_array_equal(members, [2 * load, 4 * load])
 
 
 def test_curves_of_other_stops_are_averaged_where_all_are():
     one, other = np.geomspace(1e-4, 1e-1, 9), np.geomspace(1e-3, 1.0, 7)
-    at, over = mean_curve([(one, 2 * one**0.9), (other, 4 * other**0.9)], logarithmic=True)
+    at, members = at_common_loads([(one, 2 * one**0.9), (other, 4 * other**0.9)], logarithmic=True)
+    over = ensemble(members)
     assert (at[0], at[-1]) == pytest.approx((1e-3, 1e-1))
     np.testing.assert_allclose(over.mean, 3 * at**0.9, rtol=1e-9)
     np.testing.assert_allclose(over.confidence, 12.7062047 * at**0.9, rtol=1e-7)
-    apart, _ = mean_curve(
+    apart, _ = at_common_loads(
         [(np.array([1e-3, 2e-3]), np.ones(2)), (np.array([1e-2, 2e-2]), np.ones(2))], logarithmic=True
     )
     assert len(apart) == 0
@@ -70,17 +95,17 @@ def way(separation, pressure):
 
 
 def test_ways_are_averaged_at_the_same_displacement_and_are_zero_when_separated():
-    at, over = mean_way([way([3, 2, 1], [0, 1, 2]), way([4.5, 3, 0.5], [0, 3, 8])])
+    at, found = at_common_displacements([way([3, 2, 1], [0, 1, 2]), way([4.5, 3, 0.5], [0, 3, 8])])
     # From where they are loaded most: at 1 and 0.5, which is 0.75 in the mean.
     assert (at[0], at[-1]) == pytest.approx((4.75, 0.75))
-    pressure = over["reduced_pressure"].mean
+    pressure = found["reduced_pressure"].mean(axis=0)
     assert pressure[0] == 0 and pressure[-1] == (2 + 8) / 2
     assert np.interp(-1.75, -at, pressure) == pytest.approx((1 + 6) / 2, rel=1e-2)
     assert np.interp(-3.75, -at, pressure) == pytest.approx((0 + 2) / 2, rel=1e-2)
     # On the way back, in its order; ways that end in contact end where the first of them does.
-    at, _ = mean_way([way([1, 2, 3], [2, 1, 0]), way([0.5, 3, 4.5], [8, 3, 0])])
+    at, _ = at_common_displacements([way([1, 2, 3], [2, 1, 0]), way([0.5, 3, 4.5], [8, 3, 0])])
     assert (at[0], at[-1]) == pytest.approx((0.75, 4.75))
-    at, _ = mean_way([way([1, 2, 3], [2, 1, 0.5]), way([0.5, 3, 4.5], [8, 3, 0.5])])
+    at, _ = at_common_displacements([way([1, 2, 3], [2, 1, 0.5]), way([0.5, 3, 4.5], [8, 3, 0.5])])
     assert (at[0], at[-1]) == pytest.approx((0.75, 2.75))
 
 

@@ -1,0 +1,51 @@
+"""Legends, which stand below the panels, off the data."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from icha.figures.style import GREY, legend_handle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# More names than this are written smaller.
+_MANY_NAMES = 12
+# Inches that an entry takes beside its name, and a character of it, in 8 point; and of the height of a row.
+_BESIDE, _CHARACTER, _ROW = 0.62, 0.062, 0.155
+_MOST_COLUMNS = 4
+
+
+def legend_below(figure: Figure, handles: Mapping[str, object], columns: int | None = None) -> None:
+    """Add a legend below the panels, in as many columns as have room; the figure grows by its height."""
+    if not handles:
+        return
+    size = 8 if len(handles) <= _MANY_NAMES else 7
+    if columns is None:
+        room = figure.get_figwidth() / (_BESIDE + _CHARACTER * max(map(_printed_length, handles))) * 8 / size
+        columns = min(max(1, int(room)), _MOST_COLUMNS, len(handles))
+    rows = -(-len(handles) // columns)
+    figure.set_figheight(figure.get_figheight() + 0.06 + _ROW * size / 8 * rows)
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)
+
+
+def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
+    """What is named in some panels, each name once."""
+    found: dict[str, object] = {}
+    for axes in panels:
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(name, handle)
+    return found
+
+
+def words_handle(text: str) -> dict[str, object]:
+    """An explanation in a legend, without a look of its own."""
+    return {text: legend_handle(color=GREY, ls="none")}
+
+
+def _printed_length(name):
+    """About how many characters a name has when its formulas are set."""
+    return len(re.sub(r"\\mathrm|\\prime|\\ast|\\bar|[{}$^_]", "", name).replace(r"\Delta\gamma", "Δγ"))
