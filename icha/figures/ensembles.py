@@ -60,7 +60,7 @@ def draw_scatter(
 ) -> None:
     """Draw how an ensemble scatters: a band, which does not widen the panel, or every member where they are few.
 
-    The members (members, k) have one x (k,), or each its own; `dashes` is the look of their lines if they are not solid.
+    The members (members, k) have one x (k,), or each its own. Their lines are solid unless `dashes` says otherwise.
     """
     x = np.broadcast_to(x, members.shape)
     if len(members) < ENOUGH:
