@@ -26,8 +26,17 @@ def on_cores(function: Callable, items: Iterable) -> list:
     count = min(cores(), len(items))
     if count <= 1:
         return [function(item) for item in items]
+    results, waiting = [None] * len(items), enumerate(items)
+
+    def work():
+        # Each thread takes the next item by itself: handing out many short ones would take as long as they do.
+        for number, item in waiting:
+            results[number] = function(item)
+
     with ThreadPoolExecutor(count) as pool:
-        return list(pool.map(function, items))
+        for done in [pool.submit(work) for _ in range(count)]:
+            done.result()
+    return results
 
 
 def blocks(length: int, size: int) -> list[slice]:
