@@ -1,6 +1,16 @@
 """ICHA: adhesive rough contact by interacting and coalescing Hertzian asperities."""
 
 import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # what editors and type checkers see of the names below
+    from icha.asperity.material import Material
+    from icha.path.targets import Path
+    from icha.simulation import ConvergenceError, simulate
+    from icha.surfaces.spectrum import SelfAffineSpectrum
+    from icha.surfaces.surface import Surface
+
+    __version__: str
 
 _HOME = {
     "SelfAffineSpectrum": "surfaces.spectrum",
@@ -10,10 +20,10 @@ _HOME = {
     "simulate": "simulation",
     "ConvergenceError": "simulation",
 }
-__all__ = sorted([*_HOME, "__version__"])
+__all__ = ["ConvergenceError", "Material", "Path", "SelfAffineSpectrum", "Surface", "__version__", "simulate"]
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> object:
     """Import the public names when they are first asked for, so that a script pays only for what it uses."""
     if name == "__version__":
         from importlib.metadata import version
@@ -24,6 +34,6 @@ def __getattr__(name):
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def __dir__():
+def __dir__() -> list[str]:
     """The public names."""
     return __all__

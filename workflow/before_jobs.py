@@ -54,16 +54,16 @@ def start_without_limit(workflow) -> None:
 class Origin:
     """The configuration file of a campaign, to which its results are to belong."""
 
-    def __init__(self, results: str, name: str, file: str, project: str):
+    def __init__(self, results: str, name: str, file: str, workflow: str):
         """Refuse results that belong to another file, before anything of them is touched."""
-        self.results, self.file, self.project = Path(results), Path(file).resolve(), Path(project)
-        if reason := belongs_to_another(self.results, name, self.file, self.project):
+        self.results, self.file, self.workflow = Path(results), Path(file).resolve(), Path(workflow)
+        if reason := belongs_to_another(self.results, name, self.file, self.workflow):
             raise SystemExit(f"{reason} Nothing was computed.")
 
     def claim(self) -> None:
         """Record that the results belong to it, where that can be written."""
         with contextlib.suppress(OSError):
-            claim(self.results, self.file, self.project)
+            claim(self.results, self.file, self.workflow)
 
 
 class Campaign:

@@ -7,7 +7,15 @@ from typing import Annotated
 import typer
 
 from icha.cli.options import Config, Cores, Folder, core_count
-from icha.cli.project import Mistake, configuration_path, find_project, profile_settings, read_configuration, shown
+from icha.cli.project import (
+    Mistake,
+    configuration_path,
+    profile_settings,
+    project,
+    read_configuration,
+    shown,
+    workflow_folder,
+)
 from icha.cli.scans import about_scan, check_picture, draw_scans
 from icha.support import in_words
 from icha.support.in_words import counted
@@ -36,8 +44,7 @@ def describe(
     check_picture(plot)
     path = configuration_path(config)
     campaign = read_configuration(path).campaign
-    found = find_project() or Path.cwd()
-    tell(path, campaign, found, (folder or found).resolve(), core_count(cores), runs=runs)
+    tell(path, campaign, workflow_folder(), (folder or project()).resolve(), core_count(cores), runs=runs)
     _tell_of_scans(campaign, plot)
 
 
@@ -64,18 +71,18 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
         typer.echo(f"drawn: {shown(plot)}")
 
 
-def tell(path: Path, campaign, project: Path, home: Path, cores: int, *, runs: bool = False, profile=None) -> None:
+def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: bool = False, profile=None) -> None:
     """Print what a campaign computes, what is there, what the rest costs, and what is in its way.
 
     Parameters
     ----------
     path : its configuration file.
     campaign : what that says.
-    project : the folder of the project.
+    workflow : the folder of the workflow.
     home : the folder in which results/ stands.
     cores : number of cores that are used.
     runs : whether every file is listed.
-    profile : folder of the profile of Snakemake that is used; the project's default one if left out.
+    profile : folder of the profile of Snakemake that is used; the workflow's default one if left out.
     """
     from rich.console import Console
 
@@ -97,7 +104,7 @@ def tell(path: Path, campaign, project: Path, home: Path, cores: int, *, runs: b
     _summary(console, items, spoilt, cores)
     for statement in expected_validity(campaign):
         console.print(f"[bold]{statement.about}:[/] {statement.text}", highlight=False, soft_wrap=True)
-    if reason := belongs_to_another(shown(results), campaign.name, path, project):
+    if reason := belongs_to_another(shown(results), campaign.name, path, workflow):
         console.print(f"[red]not to be run:[/] {reason}", highlight=False, soft_wrap=True)
     if problem := licence_problem(campaign):
         console.print(
@@ -105,7 +112,7 @@ def tell(path: Path, campaign, project: Path, home: Path, cores: int, *, runs: b
         )
     if missing := missing_software(campaign):
         console.print(f"[red]missing:[/] {missing}", highlight=False, soft_wrap=True)
-    for lack in wanting(items, cores, results, profile_settings(profile or project / "profiles/default")):
+    for lack in wanting(items, cores, results, profile_settings(profile or workflow / "profiles/default")):
         console.print(f"[red]not enough:[/] {lack}", highlight=False, soft_wrap=True)
 
 

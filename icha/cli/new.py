@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 from pathlib import Path
 from string import Template
 from typing import Annotated
@@ -9,10 +10,12 @@ from typing import Annotated
 import typer
 
 from icha.cli.measured_section import MeasuredSection, measured_section
-from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, shown
+from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, shown, workflow_folder
 from icha.cli.scans import about_scan, check_picture, draw_scans
 
 TEMPLATES = Path(__file__).parent / "templates"
+# What explains the keys of a configuration to editors and to people.
+_SCHEMA, _README = Path("workflow/schemas/config.schema.json"), Path("config/README.md")
 # Whether boundary elements stand beside the model.
 _MODELS = {
     False: "# models: [asperities, boundary_elements]",
@@ -56,8 +59,8 @@ def new(
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
         raise Mistake(f"{name!r} is not a name; allowed: lower-case letters, digits, '_' and '-'")
     file = folder / CAMPAIGNS / f"{name}.yaml"
-    if name in campaigns(folder) and not file.exists():
-        raise Mistake(f"{name} is the campaign of {shown(campaigns(folder)[name])}; choose another name")
+    if name in campaigns() and not file.exists():
+        raise Mistake(f"{name} is the campaign of {shown(campaigns()[name])}; choose another name")
     if file.exists():
         raise Mistake(f"{shown(file)} is there already; choose another name, or remove it")
     if data is not None and measured is None:
@@ -71,8 +74,8 @@ def new(
     values = dict(
         name=name,
         title=name.replace("_", " ").replace("-", " ").capitalize(),
-        schema=_relative(folder / "workflow/schemas/config.schema.json", file.parent),
-        readme=_relative(folder / "config/README.md", folder),
+        schema=_relative(_schema(folder), file.parent),
+        readme=_README.as_posix(),
         surface=surface,
         surfaces=section.rstrip("\n"),
         seeds="    seeds: 1..3                  # or a list; the figures show means and their confidence\n"
@@ -124,6 +127,18 @@ def _tell(section: MeasuredSection, against: list[str], plot: Path | None) -> No
         typer.secho(f"to fill in: surfaces.{section.name}.{key} ({why})", fg="yellow")
     for line in against:
         typer.secho(f"to settle: {line}", fg="yellow")
+
+
+def _schema(folder: Path) -> Path:
+    """The schema of configurations; outside of a clone a copy in config/, beside one of the page on all keys."""
+    workflow = workflow_folder()
+    if workflow == folder:
+        return folder / _SCHEMA
+    copies = [folder / "config" / file.name for file in (_SCHEMA, _README)]
+    for file, copy in zip((_SCHEMA, _README), copies, strict=True):
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(workflow / file, copy)
+    return copies[0]
 
 
 def _part(template: str, **values: str) -> str:

@@ -31,6 +31,9 @@ Cores = Annotated[
 Folder = Annotated[
     Path | None,
     typer.Option(
-        "--directory", "-d", help="Folder that holds results/. Left out: that of the project.", show_default=False
+        "--directory",
+        "-d",
+        help="Folder that holds results/. Left out: the clone, or the working directory.",
+        show_default=False,
     ),
 ]

@@ -1,4 +1,4 @@
-"""Where the project is, which configuration is meant, and how users are told of their mistakes."""
+"""Where campaigns and the workflow are, which configuration is meant, and how users are told of their mistakes."""
 
 import os
 import sys
@@ -7,6 +7,8 @@ from functools import wraps
 from pathlib import Path
 
 import typer
+
+from icha.support.program import own_workflow
 
 CAMPAIGNS = Path("config/campaigns")
 DEFAULT = Path("config/config.yaml")
@@ -45,7 +47,7 @@ def told(command: Callable) -> Callable:
 
 
 def find_project(start: Path | None = None) -> Path | None:
-    """The folder with the Snakefile, at or above `start` (the working directory if left out)."""
+    """The clone: the folder with the Snakefile, at or above `start` (the working directory if left out)."""
     start = (start or Path.cwd()).resolve()
     for folder in (start, *start.parents):
         if (folder / "Snakefile").is_file() and (folder / "workflow/rules/runs.smk").is_file():
@@ -54,42 +56,50 @@ def find_project(start: Path | None = None) -> Path | None:
 
 
 def project() -> Path:
-    """As `find_project`; raises `Mistake` where there is none."""
-    found = find_project()
-    if found is None:
-        raise Mistake(
-            f"no ICHA project at {Path.cwd()} or above it; go to the folder that was cloned, the one with the Snakefile"
-        )
-    return found
+    """The folder that holds the campaigns and results of whoever works here: the clone, else the working directory."""
+    return find_project() or Path.cwd()
+
+
+def workflow_folder() -> Path:
+    """The folder of the workflow that is run, with its Snakefile and profiles: the clone, else what is installed."""
+    return find_project() or own_workflow()
 
 
 def configuration_path(asked: str | None) -> Path:
-    """The configuration file that is meant: by its path, by the name of a campaign, or the project's default one.
+    """The configuration file that is meant: by its path, by the name of a campaign, or the default one.
 
     Raises
     ------
     Mistake
         If there is no such file.
     """
-    folder = find_project()
     if asked is None:
-        return shown(project() / DEFAULT)
+        own = project() / DEFAULT
+        return shown(own if own.is_file() else workflow_folder() / DEFAULT)
     if Path(asked).is_file():
         return Path(asked)
-    there = campaigns(folder) if folder else {}
+    there = campaigns()
     if asked in there:
         return shown(there[asked])
     if Path(asked).is_dir():
         raise Mistake(f"{asked}: is a folder; allowed: a YAML file, or the name of a campaign")
-    also = f" and no campaign of that name; there are: {', '.join(sorted(there))}" if there else ""
-    raise Mistake(f"{asked}: no such file{also}. `icha new NAME` writes a campaign to start from")
+    raise Mistake(
+        f"{asked}: no such file and no campaign of that name; there are: {', '.join(sorted(there))}. `icha new NAME` "
+        "writes a campaign to start from"
+    )
 
 
-def campaigns(folder: Path) -> dict[str, Path]:
-    """The files of a project's campaigns by the names that commands take: the default one has that in its file."""
-    named = {path.stem: path for path in sorted((folder / CAMPAIGNS).glob("*.yaml"))}
-    default = _name_in(folder / DEFAULT)
-    return ({default: folder / DEFAULT} if default else {}) | named
+def campaigns() -> dict[str, Path]:
+    """The files of campaigns by the names that commands take: those of the project, and those that come with ICHA.
+
+    The default file goes by the name that is in it.
+    """
+    named: dict[str, Path] = {}
+    for folder in (workflow_folder(), project()):  # where names are the same, the project's own go before
+        default = _name_in(folder / DEFAULT) if (folder / DEFAULT).is_file() else None
+        named |= {default: folder / DEFAULT} if default else {}
+        named |= {path.stem: path for path in sorted((folder / CAMPAIGNS).glob("*.yaml"))}
+    return named
 
 
 def _name_in(file: Path) -> str | None:

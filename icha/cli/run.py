@@ -25,6 +25,7 @@ from icha.cli.project import (
     project,
     read_configuration,
     shown,
+    workflow_folder,
 )
 from icha.support.in_words import counted
 
@@ -73,7 +74,7 @@ def run(
 
     Ctrl-C stops it; the next call continues from there.
     """
-    home = project()
+    workflow = workflow_folder()
     asked = list(targets or [])
     if config is not None and config in TARGETS and not Path(config).is_file():
         config, asked = None, [config, *asked]  # `icha run figures`
@@ -81,19 +82,26 @@ def run(
         config, asked = None, [config, *asked]  # `icha run -- --forceall`
     path = configuration_path(config)
     campaign = read_configuration(path).campaign
-    folder = (folder or home).resolve()
-    _refuse_results_of_another(folder / "results" / campaign.name, campaign.name, path, home)
+    folder = (folder or project()).resolve()
+    _refuse_results_of_another(folder / "results" / campaign.name, campaign.name, path, workflow)
     command = [
         *(sys.executable, "-m", "snakemake", *asked),
-        *("--snakefile", str(home / "Snakefile"), "--directory", str(folder)),
-        *(["--configfile", str(path.resolve())] if path.resolve() != (home / DEFAULT).resolve() else []),
+        *("--snakefile", str(workflow / "Snakefile"), "--directory", str(folder)),
+        *(["--configfile", str(path.resolve())] if path.resolve() != (workflow / DEFAULT).resolve() else []),
         *(["--cores", cores] if cores else []),
         # In the place of profiles/default, which would be found by itself.
-        *(["--workflow-profile", str(_profile(profile, home))] if profile else []),
+        *(["--workflow-profile", str(_profile(profile, workflow))] if profile else []),
     ]
     if dry_run:
-        planned = _rehearse([*command, "--dry-run"], home, campaign, asked)
-        tell(path, campaign, home, folder, core_count(cores), profile=_profile(profile, home) if profile else None)
+        planned = _rehearse([*command, "--dry-run"], workflow, campaign, asked)
+        tell(
+            path,
+            campaign,
+            workflow,
+            folder,
+            core_count(cores),
+            profile=_profile(profile, workflow) if profile else None,
+        )
         typer.echo(planned)
         return
     from rich.console import Console
@@ -107,7 +115,7 @@ def run(
     console = Console()
     items = plan(campaign, folder / "results" / campaign.name)
     if not anyway:
-        settings = profile_settings(_profile(profile, home) if profile else home / "profiles/default")
+        settings = profile_settings(_profile(profile, workflow) if profile else workflow / "profiles/default")
         _ask_if_wanting(items, asked, core_count(cores), folder / "results" / campaign.name, settings)
     if not set(asked) - set(TARGETS):
         _say_what_holds(expected_validity(campaign))
@@ -117,7 +125,7 @@ def run(
     else:
         view = LiveView(watch, campaign.name, folder, console)
     log = _log_file(folder, campaign.name)
-    status, stopped = _follow([*command, "--logger", "icha"], home, log, watch, view)
+    status, stopped = _follow([*command, "--logger", "icha"], workflow, log, watch, view)
     if status and watch.started is None and not stopped:
         try:
             _refuse_unknown(log.read_text(encoding="utf-8", errors="replace"), asked, campaign)
@@ -136,18 +144,18 @@ def run(
         raise typer.Exit(FAILED)
 
 
-def _refuse_results_of_another(results: Path, name: str, path: Path, home: Path) -> None:
+def _refuse_results_of_another(results: Path, name: str, path: Path, workflow: Path) -> None:
     from icha.planning.belonging import belongs_to_another
 
-    if reason := belongs_to_another(shown(results), name, path, home):
+    if reason := belongs_to_another(shown(results), name, path, workflow):
         raise Mistake(f"{reason} Nothing was begun")
 
 
-def _profile(asked: str, home: Path) -> Path:
-    for path in (Path(asked), home / "profiles" / asked):
+def _profile(asked: str, workflow: Path) -> Path:
+    for path in (Path(asked), workflow / "profiles" / asked):
         if (path / "config.yaml").is_file():
             return path.resolve()
-    there = sorted(path.parent.name for path in (home / "profiles").glob("*/config.yaml"))
+    there = sorted(path.parent.name for path in (workflow / "profiles").glob("*/config.yaml"))
     raise Mistake(f"--profile {asked}: no folder with a config.yaml; there are: {', '.join(there)}")
 
 
@@ -182,9 +190,9 @@ def _at_a_terminal() -> bool:
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
-def _rehearse(command: list[str], home: Path, campaign, asked: list[str]) -> str:
+def _rehearse(command: list[str], workflow: Path, campaign, asked: list[str]) -> str:
     """Have Snakemake plan what was asked for: how many jobs of which kind would run, or the end with why none can."""
-    done = subprocess.run(command, cwd=home, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    done = subprocess.run(command, cwd=workflow, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode == 0:
         return _planned(done.stdout)
     _refuse_unknown(done.stdout, asked, campaign)
@@ -244,7 +252,7 @@ def _log_file(folder: Path, campaign: str) -> Path:
     return Path(name)
 
 
-def _follow(command: list[str], home: Path, log: Path, watch, view) -> tuple[int, bool]:
+def _follow(command: list[str], workflow: Path, log: Path, watch, view) -> tuple[int, bool]:
     """Run Snakemake, feed its events to `watch` and what ends to `view`.
 
     Returns its exit status, and whether it was told to stop.
@@ -252,13 +260,13 @@ def _follow(command: list[str], home: Path, log: Path, watch, view) -> tuple[int
     stopped = []
     reading, writing = os.pipe()
     # The project's own, whatever is installed.
-    found = [str(home / "workflow/plugins"), *filter(None, [os.environ.get("PYTHONPATH")])]
+    found = [str(workflow / "workflow/plugins"), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = os.environ | {"ICHA_EVENTS": str(writing), "PYTHONPATH": os.pathsep.join(found)}
     with view, log.open("w", encoding="utf-8") as said:
         # In a process group of its own, so that Ctrl-C comes to it and its jobs once, from here.
         process = subprocess.Popen(
             command,
-            cwd=home,
+            cwd=workflow,
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=said,

@@ -1,7 +1,8 @@
 """Which configuration file the results of a campaign belong to: two files of one name would replace each other's.
 
-The file is recorded by its path from the project's folder, so that the record holds wherever the project is. Results
-without a record, those of older versions for one, belong to the first file that is run.
+The file is recorded by its path from the folder that holds results/, or else, if it came with the workflow, from there,
+so that the record holds wherever these folders are. Results without a record, those of older versions for one, belong
+to the first file that is run.
 """
 
 import os
@@ -13,17 +14,17 @@ from icha.support.atomic_files import whole_file
 RECORD = "belongs_to.txt"
 
 
-def belongs_to_another(results: Path, name: str, file: Path, project: Path) -> str | None:
+def belongs_to_another(results: Path, name: str, file: Path, workflow: Path) -> str | None:
     """That results belong to another configuration file, and what can be done about it; None if they do not.
 
     Parameters
     ----------
-    results : the campaign's folder of results.
+    results : the campaign's folder of results, FOLDER/results/NAME.
     name : of the campaign.
     file : its configuration file.
-    project : the folder of the project.
+    workflow : the folder of the workflow.
     """
-    owner, own = _recorded(results), _from(project, file)
+    owner, own = _recorded(results), _named(results, file, workflow)
     if owner in (None, own) or _is_kept(results, file):
         return None
     return (
@@ -33,11 +34,11 @@ def belongs_to_another(results: Path, name: str, file: Path, project: Path) -> s
     )
 
 
-def claim(results: Path, file: Path, project: Path) -> None:
+def claim(results: Path, file: Path, workflow: Path) -> None:
     """Record that results belong to a configuration file, unless they belong to one already."""
     if _recorded(results) is None and not _is_kept(results, file):
         with whole_file(results / RECORD) as temporary:
-            temporary.write_text(f"{_from(project, file)}\n", encoding="utf-8")
+            temporary.write_text(f"{_named(results, file, workflow)}\n", encoding="utf-8")
 
 
 def _recorded(results: Path) -> str | None:
@@ -52,5 +53,10 @@ def _is_kept(results: Path, file: Path) -> bool:
     return Path(file).resolve() == (results / CONFIGURATION).resolve()
 
 
-def _from(project: Path, file: Path) -> str:
-    return Path(os.path.relpath(Path(file).resolve(), Path(project).resolve())).as_posix()
+def _named(results: Path, file: Path, workflow: Path) -> str:
+    """How a file is recorded."""
+    folder = Path(os.path.abspath(results)).parent.parent
+    folder, workflow, file = (Path(path).resolve() for path in (folder, workflow, file))
+    if file.is_relative_to(workflow) and not file.is_relative_to(folder):
+        return f"{file.relative_to(workflow).as_posix()} of ICHA"
+    return Path(os.path.relpath(file, folder)).as_posix()

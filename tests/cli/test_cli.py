@@ -21,6 +21,7 @@ from icha.analysis.common_loads import compare_campaign
 from icha.cli import app
 from icha.cli.events import Watch, last_line, reason_of
 from icha.cli.live import LiveView
+from icha.cli.project import campaigns
 from icha.cli.show import sparkline
 from icha.configuration.cases import run_cases
 from icha.configuration.errors import ConfigurationError
@@ -358,11 +359,40 @@ def test_a_licence_that_no_deposit_can_have_is_told_before_anything_is_computed(
     assert (f"not to be published: {told}" in described.output) if told else "published" not in described.output
 
 
-def test_outside_of_a_project_the_program_says_so(tmp_path, monkeypatch):
+def test_outside_of_a_clone_the_workflow_that_is_installed_is_used(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for command in (["run"], ["describe"], ["new", "mine"]):
-        refused = icha(*command)
-        assert refused.exit_code == 2 and "no ICHA project" in refused.output
+    shipped = {path.stem for path in (REPOSITORY / "config/campaigns").glob("*.yaml")}
+    assert {*campaigns()} == {*shipped, "paper"}
+    assert icha("describe").output.startswith("paper: ")
+    assert icha("describe", "smoke").output.startswith("smoke: ")
+    taken = icha("new", "smoke")
+    assert taken.exit_code == 2 and "smoke is the campaign of " in taken.output
+    assert [*tmp_path.iterdir()] == []
+    assert icha("new", "mine").exit_code == 0
+    file = tmp_path / "config/campaigns/mine.yaml"
+    schema = file.parent / file.read_text().splitlines()[0].partition("$schema=")[2]
+    for copy, name in (
+        (schema, "workflow/schemas/config.schema.json"),
+        (tmp_path / "config/README.md", "config/README.md"),
+    ):
+        assert copy.read_bytes() == (REPOSITORY / name).read_bytes()
+    assert "configuration: config/campaigns/mine.yaml" in icha("describe", "mine").output
+    # What is in the folder goes before what was installed.
+    shutil.copyfile(file, tmp_path / "config/config.yaml")
+    assert "configuration: config/config.yaml" in icha("describe").output
+
+
+def test_a_shipped_campaign_and_a_copy_of_it_are_two_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shipped, own = REPOSITORY / "config/campaigns/smoke.yaml", tmp_path / "config/campaigns/smoke.yaml"
+    results = tmp_path / "results/smoke"
+    results.mkdir(parents=True)
+    claim(results, shipped, REPOSITORY)
+    assert belongs_to_another(results, "smoke", shipped, REPOSITORY) is None
+    said = belongs_to_another(results, "smoke", own, REPOSITORY)
+    assert f"{results} belongs to config/campaigns/smoke.yaml of ICHA, and config/campaigns/smoke.yaml has" in said
+    # The record holds wherever folder and workflow are.
+    assert (results / "belongs_to.txt").read_text() == "config/campaigns/smoke.yaml of ICHA\n"
 
 
 TINY = """
