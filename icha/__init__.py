@@ -3,15 +3,6 @@
 import importlib
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # what editors and type checkers see of the names below
-    from icha.asperity.material import Material
-    from icha.path.targets import Path
-    from icha.simulation import ConvergenceError, simulate
-    from icha.surfaces.spectrum import SelfAffineSpectrum
-    from icha.surfaces.surface import Surface
-
-    __version__: str
-
 _HOME = {
     "SelfAffineSpectrum": "surfaces.spectrum",
     "Surface": "surfaces.surface",
@@ -22,16 +13,25 @@ _HOME = {
 }
 __all__ = ["ConvergenceError", "Material", "Path", "SelfAffineSpectrum", "Surface", "__version__", "simulate"]
 
+if TYPE_CHECKING:  # for editors and type checkers; nothing is imported
+    from icha.asperity.material import Material
+    from icha.path.targets import Path
+    from icha.simulation import ConvergenceError, simulate
+    from icha.surfaces.spectrum import SelfAffineSpectrum
+    from icha.surfaces.surface import Surface
 
-def __getattr__(name: str) -> object:
-    """Import the public names when they are first asked for, so that a script pays only for what it uses."""
-    if name == "__version__":
-        from importlib.metadata import version
+    __version__: str
+else:
 
-        return version("icha")
-    if name in _HOME:
-        return getattr(importlib.import_module(f"icha.{_HOME[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    def __getattr__(name):
+        """Import the public names when they are first asked for, so that a script pays only for what it uses."""
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("icha")
+        if name in _HOME:
+            return getattr(importlib.import_module(f"icha.{_HOME[name]}"), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

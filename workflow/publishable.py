@@ -6,7 +6,7 @@ from icha.configuration.load import Configuration
 from icha.configuration.publication import needed
 from icha.publication.environment import refuse_other_environment
 from icha.publication.licences import licence_problem
-from icha.publication.source import Source, committed_source
+from icha.publication.source import Source, program_source
 
 
 def publishable_source(configuration: Configuration, project: str) -> Source:
@@ -19,7 +19,7 @@ def publishable_source(configuration: Configuration, project: str) -> Source:
     if problem := licence_problem(configuration.campaign):
         wrong.append(": ".join([configuration.origin, *problem]))
     try:
-        source = committed_source(project)
+        source = program_source(project)
     except ValueError as error:
         wrong.append(str(error))
     try:

@@ -62,13 +62,13 @@ def web_address(identifier: str) -> str:
     return identifier
 
 
-def citation_cff(publication: Publication, commit: str) -> str:
+def citation_cff(publication: Publication, revision: str) -> str:
     """CITATION.cff of the data, Citation File Format 1.2.0 (https://doi.org/10.5281/zenodo.5171937).
 
     Parameters
     ----------
     publication : what is to be cited; complete (`icha.configuration.publication.needed`).
-    commit : the state of the program that made the data.
+    revision : the state of the program that made the data.
     """
     licence = known_licence(publication.license)
     content = {
@@ -83,7 +83,7 @@ def citation_cff(publication: Publication, commit: str) -> str:
         # Of licences, the format knows those that SPDX had in 2021; an address can be given of any.
         "license": licence.identifier if licence.text else None,
         "license-url": None if licence.text else licence.address,
-        "commit": commit,
+        "commit": revision,
         "doi": publication.doi,
         "keywords": publication.keywords,
         "references": [

@@ -106,7 +106,7 @@ def write_crate(
     jobs: Iterable[Job],
     *,
     campaign: str,
-    commit: str,
+    revision: str,
     checksums: Mapping[str, str],
 ) -> None:
     """Write the deposit's `ro-crate-metadata.json`.
@@ -117,7 +117,7 @@ def write_crate(
     publication : what the deposit says of itself; complete.
     jobs : those that made the results, in any order.
     campaign : its name.
-    commit : the state of the program, the source of which is in `source/`.
+    revision : the state of the program, the source of which is in `source/`.
     checksums : sha256 of every file, hexadecimal, by its path in the deposit.
 
     Raises
@@ -127,7 +127,7 @@ def write_crate(
         each other.
     """
     sizes = {path: (Path(folder) / path).stat().st_size for path in checksums}
-    metadata = crate_metadata(publication, jobs, campaign=campaign, commit=commit, checksums=checksums, sizes=sizes)
+    metadata = crate_metadata(publication, jobs, campaign=campaign, revision=revision, checksums=checksums, sizes=sizes)
     with whole_file(Path(folder) / METADATA) as part:
         part.write_text(json.dumps(metadata, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
@@ -137,7 +137,7 @@ def crate_metadata(
     jobs: Iterable[Job],
     *,
     campaign: str,
-    commit: str,
+    revision: str,
     checksums: Mapping[str, str],
     sizes: Mapping[str, int],
 ) -> dict[str, Any]:
@@ -152,9 +152,9 @@ def crate_metadata(
     shown = {path for path in checksums if not path.startswith(SOURCE)}
     shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in steps)} & set(checksums)
     files = {path: _add_file(crate, path, sizes[path], checksums[path]) for path in sorted(shown)}
-    _add_source(crate, files, commit)
+    _add_source(crate, files, revision)
     engine = _engine(crate)
-    workflow = _describe_workflow(crate, files, engine, commit, steps)
+    workflow = _describe_workflow(crate, files, engine, revision, steps)
     made = {path for job in jobs for path in job.outputs}
     given = sorted({path for job in jobs for path in job.inputs} - made | {CONFIGURATION})
     run = _add(
@@ -309,13 +309,13 @@ def _add_file(crate: ROCrate, path: str, size: int, sha256: str) -> File:
     return crate.add(File(crate, dest_path=path, properties=properties))
 
 
-def _add_source(crate: ROCrate, files: Mapping[str, File], commit: str) -> None:
+def _add_source(crate: ROCrate, files: Mapping[str, File], revision: str) -> None:
     """The folder with the source, of which only some files are shown."""
     _set(
         crate.add(Dataset(crate, dest_path=SOURCE)),
         name="Source of the workflow and of its program",
-        version=commit,
-        identifier=commit,
+        version=revision,
+        identifier=revision,
         hasPart=[file for path, file in files.items() if path.startswith(SOURCE)],
     )
 
@@ -335,7 +335,7 @@ def _engine(crate: ROCrate) -> Entity:
 
 
 def _describe_workflow(
-    crate: ROCrate, files: Mapping[str, File], engine: Entity, commit: str, steps: Sequence[Job]
+    crate: ROCrate, files: Mapping[str, File], engine: Entity, revision: str, steps: Sequence[Job]
 ) -> Entity:
     """What the workflow's file is besides a file: a program, with tools and steps."""
     configuration = _add_parameter(crate, "#configuration", "File", valueRequired=True)
@@ -347,7 +347,7 @@ def _describe_workflow(
             ["File", "SoftwareSourceCode"],
             name=job.rule,
             description=job.description,
-            version=commit,
+            version=revision,
             programmingLanguage=_add(crate, "#python", "ComputerLanguage", name="Python", url="https://www.python.org"),
         )
     workflow = files[WORKFLOW]
@@ -355,7 +355,7 @@ def _describe_workflow(
         workflow,
         ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"],
         name="ICHA: adhesive rough contact by interacting and coalescing asperities",
-        version=commit,
+        version=revision,
         conformsTo=_add(crate, f"{_BIOSCHEMAS}/ComputationalWorkflow/1.0-RELEASE", "CreativeWork"),
         license=files.get(PROGRAM_LICENCE),
         programmingLanguage=engine,

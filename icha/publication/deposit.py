@@ -1,6 +1,6 @@
 """A deposit: results with all that others need to understand, trust and compute them again, as a folder and a zip.
 
-The same results of the same commit give the same bytes: no times, no names of people, machines or folders but those
+The same results of the same revision give the same bytes: no times, no names of people, machines or folders but those
 that the results, the configuration and the source themselves have.
 """
 
@@ -76,9 +76,9 @@ def make_deposit(
         for file in files:
             _copy(results / file, part / file)
         source.export(part / SOURCE)
-        _describe(part, files, publication, campaign, source.commit, cost)
+        _describe(part, files, publication, campaign, source.revision, cost)
         checksums = {path: sha256_of(part / path) for path in files_of(part)}
-        write_crate(part, publication, jobs, campaign=campaign.name, commit=source.commit, checksums=checksums)
+        write_crate(part, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
         (part / METADATA).chmod(0o644)
         checksums[METADATA] = sha256_of(part / METADATA)
         _write(part / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
@@ -112,12 +112,12 @@ def _refuse_changed(results: Path, files: Iterable[str]) -> None:
         )
 
 
-def _describe(part: Path, files: Sequence[str], publication: Publication, campaign: Campaign, commit, cost) -> None:
+def _describe(part: Path, files: Sequence[str], publication: Publication, campaign: Campaign, revision, cost) -> None:
     """Write all that says what the deposit is."""
     licence = known_licence(publication.license)
     dictionary = data_dictionary(part, files)
     _write(part / "LICENSE.txt", licence_page(licence, source=SOURCE))
-    _write(part / "CITATION.cff", citation_cff(publication, commit))
+    _write(part / "CITATION.cff", citation_cff(publication, revision))
     _write(part / ".zenodo.json", _json(zenodo_metadata(publication)))
     _write(part / "datacite.json", _json(datacite_metadata(publication)))
     _write(part / "data_dictionary.csv", dictionary_csv(dictionary))
@@ -128,7 +128,7 @@ def _describe(part: Path, files: Sequence[str], publication: Publication, campai
             publication,
             campaign=campaign,
             licence=licence,
-            commit=commit,
+            revision=revision,
             dataset=dataset,
             checks=read_checks(part / "checks.json"),
             model_error=read_campaign(error) if error.is_file() else None,

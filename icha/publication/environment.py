@@ -1,10 +1,16 @@
-"""The environment that a deposit promises: the packages of the lock, and no other versions."""
+"""The environment that a deposit promises: the packages of the lock, and no other versions.
+
+`python -m icha.publication.environment` prints these versions for `pip install --constraint`.
+"""
 
 import importlib.metadata
 import importlib.util
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+
+from icha.support.program import is_installed, own_workflow, package_of
 
 _MOST_NAMES = 20
 
@@ -14,7 +20,7 @@ def refuse_other_environment(project: Path) -> None:
 
     Parameters
     ----------
-    project : the folder with uv.lock and the package `icha`.
+    project : the folder of the workflow, with uv.lock.
 
     Raises
     ------
@@ -23,13 +29,19 @@ def refuse_other_environment(project: Path) -> None:
         is not the one of the project.
     """
     wrong = differences(project / "uv.lock")
-    own, imported = project.resolve() / "icha", Path(importlib.util.find_spec("icha").origin).resolve().parent
+    own, imported = package_of(project.resolve()), Path(importlib.util.find_spec("icha").origin).resolve().parent
     if imported != own:
         wrong = [f"  icha: imported from {imported}, and not from {own}", *wrong]
     if wrong:
+        needed = (
+            "`python -m icha.publication.environment > locked.txt`, then `pip install --constraint locked.txt "
+            "'icha[workflow]'`"
+            if is_installed(project)
+            else "`make environment`, and no other one"
+        )
         raise ValueError(
-            "the environment is not that of uv.lock, which the deposit would promise; needed: `make environment`, "
-            "and no other one:\n" + "\n".join(wrong)
+            f"the environment is not that of uv.lock, which the deposit would promise; needed: {needed}:\n"
+            + "\n".join(wrong)
         )
 
 
@@ -40,9 +52,8 @@ def differences(lock: Path) -> list[str]:
     version there: the project itself.
     """
     locked: dict[str, set[str]] = {}
-    for package in tomllib.loads(lock.read_text(encoding="utf-8"))["package"]:
-        if "editable" not in package["source"]:
-            locked.setdefault(_normal(package["name"]), set()).add(package["version"])
+    for package in _locked(lock):
+        locked.setdefault(_normal(package["name"]), set()).add(package["version"])
     installed = {_normal(each.name): each.version for each in importlib.metadata.distributions() if each.name}
     wrong = [
         f"  {name}: {version} is installed, {' or '.join(sorted(locked[name]))} is locked"
@@ -52,6 +63,31 @@ def differences(lock: Path) -> list[str]:
     return [*wrong[:_MOST_NAMES], *([f"  and {len(wrong) - _MOST_NAMES} more"] if len(wrong) > _MOST_NAMES else [])]
 
 
+def constraints(lock: Path) -> list[str]:
+    """The versions of a lock for this Python and system, a line each, as pip takes them."""
+    from packaging.markers import Marker
+
+    def holds(markers):
+        return markers is None or any(Marker(marker).evaluate() for marker in markers)
+
+    return [
+        f"{package['name']}=={package['version']}"
+        for package in _locked(lock)
+        if holds(package.get("resolution-markers"))
+    ]
+
+
+def _locked(lock: Path) -> Iterator[dict]:
+    """The packages of a lock, but for the project itself, which has no version there."""
+    for package in tomllib.loads(lock.read_text(encoding="utf-8"))["package"]:
+        if "editable" not in package["source"]:
+            yield package
+
+
 def _normal(name: str) -> str:
     """The name of a package as indices know it (PEP 503)."""
     return re.sub(r"[-_.]+", "-", name).lower()
+
+
+if __name__ == "__main__":
+    print("\n".join(constraints(own_workflow() / "uv.lock")))

@@ -106,7 +106,7 @@ def readme(
     *,
     campaign: Campaign,
     licence: Licence,
-    commit: str,
+    revision: str,
     dataset: xr.DataTree,
     checks: Sequence[Check],
     model_error: xr.DataTree | None,
@@ -121,7 +121,7 @@ def readme(
     publication : what the deposit says of itself, with version, date, authors, title, summary and licence.
     campaign, dataset, checks, model_error : what was asked for, and what came of it.
     licence : that of the data.
-    commit : that of the source.
+    revision : that of the source.
     dictionary : the variables of all files.
     sizes : bytes of every file, by its path in the deposit.
     cost : what computing the whole campaign is expected to take.
@@ -132,7 +132,7 @@ def readme(
         paper=MODEL_PAPER,
         summary=paragraphs(publication.summary),
         licence=licence,
-        commit=commit,
+        revision=revision,
         variables=_short_dictionary(dictionary, campaign.name),
         cost=cost,
         addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},

@@ -1,4 +1,4 @@
-"""The source of the program as it was committed, and whether it is the one that runs."""
+"""The source of the program as it was committed or installed, and whether it is the one that runs."""
 
 import hashlib
 import os
@@ -6,6 +6,10 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
+
+from icha.publication.installed_source import installed_source
+from icha.support.program import is_installed
 
 # What computes the results: nothing may lie here that is not committed.
 PROGRAM = ("Snakefile", "icha", "workflow", "profiles/default")
@@ -23,11 +27,33 @@ _FILE, _EXECUTABLE, _LINK, _SUBMODULE = "100644", "100755", "120000", "160000"
 _MOST_NAMES = 20
 
 
+class Source(Protocol):
+    """The files of the program in a state that can be told from any other."""
+
+    @property
+    def revision(self) -> str:
+        """What tells the state from others: a commit, or version and checksum of what was installed."""
+
+    def export(self, folder: Path) -> None:
+        """Write all files to a new folder."""
+
+
+def program_source(project: str | os.PathLike) -> Source:
+    """The source of the program that belongs to a Snakefile in the folder `project`: as committed, or as installed.
+
+    Raises
+    ------
+    ValueError
+        If what is there is not what was committed or installed; the message says what to do.
+    """
+    return installed_source(project) if is_installed(Path(project)) else committed_source(project)
+
+
 @dataclass(frozen=True)
-class Source:
+class CommittedSource:
     """The files of a project at a commit: mode and object of git by their paths in the project."""
 
-    commit: str
+    revision: str
     project: Path
     files: dict[str, tuple[str, str]]
 
@@ -50,14 +76,14 @@ class Source:
                 git.stdin.flush()
                 header = git.stdout.readline().split()
                 if len(header) != 3:
-                    raise ValueError(f"{self.project}: git cannot read {name} of commit {self.commit}")
+                    raise ValueError(f"{self.project}: git cannot read {name} of commit {self.revision}")
                 content = git.stdout.read(int(header[2]))
                 git.stdout.read(1)
                 yield content
             git.stdin.close()
 
 
-def committed_source(project: str | os.PathLike) -> Source:
+def committed_source(project: str | os.PathLike) -> CommittedSource:
     """The source of the program, at the commit that is checked out.
 
     A configuration below config/ may be changed or new: it is not part of the program.
@@ -100,7 +126,7 @@ def committed_source(project: str | os.PathLike) -> Source:
             f"{project}: differs from commit {commit[:12]}, so the deposit would not hold the program that made the "
             f"data; needed: `git commit` these changes, or undo them:\n{_listed(listed)}"
         )
-    return Source(commit, project, files)
+    return CommittedSource(commit, project, files)
 
 
 def _tree(project: Path) -> Iterator[tuple[str, tuple[str, str]]]:

@@ -64,7 +64,7 @@ def written(folder, publication, jobs=JOBS):
     for path in {*OTHERS, *(path for job in JOBS for path in (*job.inputs, *job.outputs, job.script))}:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(f"{path}\n" * len(path))
-    write_crate(folder, publication, jobs, campaign="mine", commit=COMMIT, checksums=checksums_of(folder))
+    write_crate(folder, publication, jobs, campaign="mine", revision=COMMIT, checksums=checksums_of(folder))
     return folder
 
 
@@ -240,7 +240,7 @@ def test_jobs_that_make_no_sense_are_refused(deposit):
     }
     for message, jobs in cases.items():
         with pytest.raises(ValueError, match=message):
-            write_crate(deposit, ALL, jobs, campaign="mine", commit=COMMIT, checksums=checksums_of(deposit))
+            write_crate(deposit, ALL, jobs, campaign="mine", revision=COMMIT, checksums=checksums_of(deposit))
 
 
 @pytest.mark.slow

@@ -119,7 +119,7 @@ def small_readme():
             publication,
             campaign=campaign,
             licence=known_licence("CC0-1.0"),
-            commit=COMMIT,
+            revision=COMMIT,
             dataset=tree,
             checks=checks,
             model_error=None,

@@ -45,7 +45,7 @@ def repository(tmp_path):
 
 def test_source_is_what_was_committed_byte_by_byte(repository, tmp_path):
     source = committed_source(repository)
-    assert source.commit == git(repository, "rev-parse", "HEAD").strip()
+    assert source.revision == git(repository, "rev-parse", "HEAD").strip()
     source.export(tmp_path / "export")
     exported = {name: tmp_path / "export" / name for name in files_of(tmp_path / "export")}
     assert set(exported) == set(git(repository, "-c", "core.quotePath=false", "ls-files").splitlines())
@@ -93,13 +93,13 @@ def test_changes_cannot_be_hidden(repository, monkeypatch, tmp_path):
 
 
 def test_configurations_results_and_other_files_are_no_part_of_the_program(repository):
-    commit = committed_source(repository).commit
+    commit = committed_source(repository).revision
     (repository / "config/config.yaml").write_text("name: yours\n")
     for name in ("config/campaigns/new.yaml", "results/x.nc", "icha/__pycache__/physics.pyc", "notes.txt"):
         (repository / name).parent.mkdir(parents=True, exist_ok=True)
         (repository / name).write_text("")
     source = committed_source(repository)
-    assert source.commit == commit and "notes.txt" not in source.files
+    assert source.revision == commit and "notes.txt" not in source.files
 
 
 def test_a_project_may_be_a_part_of_a_repository_and_of_a_shallow_clone(repository, tmp_path, monkeypatch):
@@ -117,7 +117,7 @@ def test_a_project_may_be_a_part_of_a_repository_and_of_a_shallow_clone(reposito
         monkeypatch.setenv("GIT_DIR", str(repository / ".git"))
         source = committed_source(folder / "sub/contact")
         monkeypatch.delenv("GIT_DIR")
-        assert source.commit == git(outer, "rev-parse", "HEAD").strip()
+        assert source.revision == git(outer, "rev-parse", "HEAD").strip()
         target = tmp_path / f"of_{folder.name}"
         source.export(target)
         own = {name: (repository / name).read_bytes() for name in files_of(repository) if not name.startswith(".git/")}

@@ -28,7 +28,7 @@ rule deposit:
         named_files=as_it_is(NAMED_FILES),
         project=as_it_is(workflow.basedir),
         # The source is part of the deposit, comments and all.
-        commit=lambda wildcards: SOURCE().commit,
+        revision=lambda wildcards: SOURCE().revision,
     message:
         "Deposit {PUBLICATION.version}"
     script:

@@ -16,7 +16,7 @@ def publish(archive, *, results, files, named_files, project):
     from icha.planning.plan import whole_cost
     from icha.publication.deposit import make_deposit
     from icha.publication.environment import refuse_other_environment
-    from icha.publication.source import committed_source
+    from icha.publication.source import program_source
 
     refuse_other_environment(Path(project))
     used = "config.used.yaml"
@@ -31,7 +31,7 @@ def publish(archive, *, results, files, named_files, project):
         files=places.values(),
         publication=campaign.published(),
         campaign=campaign,
-        source=committed_source(project),
+        source=program_source(project),
         jobs=_recorded_jobs(Path(project, "workflow"), made, given),
         cost=whole_cost(campaign, Path(results)),
     )
