@@ -14,7 +14,7 @@ export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all lint format schema docs linkcheck benchmarks benchmarks-page short-range faults validators-environment validate clean
+.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all wheel lint format schema docs linkcheck benchmarks benchmarks-page short-range faults validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -24,6 +24,7 @@ help:
 	@echo "make tamaas  install Tamaas as well, for boundary elements at finite ranges (campaign validation, tests)"
 	@echo "make test    run the tests that one waits for (four minutes): physics, every rule, wrong input"
 	@echo "make test-all  run them and all others: thousands of random cases, kills, resumption, Slurm, browser, deposits"
+	@echo "make wheel   build the sdist, and from it the wheel, in dist/"
 	@echo "make lint    check style of Python code and workflow"
 	@echo "make format  put Python code and workflow into that style"
 	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
@@ -81,6 +82,11 @@ test: tamaas
 # Tests of random cases are run again, with more of them.
 test-all: test
 	pytest -n $(CORES) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough
+
+# From the sdist, so that nothing that it lacks is in the wheel.
+wheel: .venv-tools/bin/uv
+	rm -rf dist
+	.venv-tools/bin/uv build --quiet
 
 lint: tamaas
 	ruff check .
