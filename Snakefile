@@ -36,6 +36,7 @@ onstart:
     if DeploymentMethod.CONDA not in workflow.deployment_settings.deployment_method:
         here.refuse_without(missing_software(CAMPAIGN))
     origin.claim()
+    origin.note_versions()
 
 
 # On a cluster these are run where Snakemake runs, and not submitted: targets, and what is soon done.

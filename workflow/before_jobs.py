@@ -13,6 +13,7 @@ from campaign_lock import hold_lock
 from snakemake.logging import logger
 
 from icha.planning.belonging import belongs_to_another, claim
+from icha.publication.environment import note_versions
 from icha.support import checksums
 from icha.support.atomic_files import why_not_writable
 
@@ -64,6 +65,11 @@ class Origin:
         """Record that the results belong to it, where that can be written."""
         with contextlib.suppress(OSError):
             claim(self.results, self.file, self.workflow)
+
+    def note_versions(self) -> None:
+        """Record with which versions of packages results are made from now on."""
+        with contextlib.suppress(OSError):
+            note_versions(self.results)
 
 
 class Campaign:

@@ -4,15 +4,16 @@ from pathlib import Path
 
 from icha.configuration.load import Configuration
 from icha.configuration.publication import needed
-from icha.publication.environment import refuse_other_environment
+from icha.publication.environment import refuse_other_environment, refuse_results_of_another_environment
 from icha.publication.licences import licence_problem
 from icha.publication.source import Source, program_source
 
 
-def publishable_source(configuration: Configuration, project: str) -> Source:
+def publishable_source(configuration: Configuration, project: str, results: str) -> Source:
     """The source that a deposit is to hold.
 
-    Ends the program with a message if metadata are missing, the source is not committed, or the lock not kept to.
+    Ends the program with a message if metadata are missing, the source is not committed, or the lock not kept to,
+    now or when any of the results was made.
     """
     publication = configuration.campaign.published()
     wrong = [f"{configuration.origin}: {line}" for line in needed(publication)]
@@ -24,6 +25,7 @@ def publishable_source(configuration: Configuration, project: str) -> Source:
         wrong.append(str(error))
     try:
         refuse_other_environment(Path(project))
+        refuse_results_of_another_environment(Path(results), Path(project))
     except ValueError as error:
         wrong.append(str(error))
     if wrong:

@@ -19,8 +19,8 @@ def missing_software(campaign: Campaign) -> str | None:
     if not further_software(campaign) or importlib.util.find_spec(TAMAAS):
         return None
     return (
-        f"{', '.join(_sections(campaign))}: solved by Tamaas, which is not installed; `make tamaas` installs it. It is "
-        "the extra `tamaas` of the package, for its licence is AGPL-3.0-or-later."
+        f"{', '.join(_sections(campaign))}: solved by Tamaas, which is not installed; `make tamaas` installs it in a "
+        "clone, `pip install tamaas` elsewhere. It is an extra of the package, for its licence is AGPL-3.0-or-later."
     )
 
 

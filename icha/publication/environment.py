@@ -1,8 +1,9 @@
-"""The environment that a deposit promises: the packages of the lock, and no other versions.
+"""The environment that a deposit promises: the versions of the lock, now and when its results were made.
 
 `python -m icha.publication.environment` prints these versions for `pip install --constraint`.
 """
 
+import contextlib
 import importlib.metadata
 import importlib.util
 import re
@@ -10,9 +11,54 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+from icha.support.atomic_files import whole_file
 from icha.support.program import is_installed, own_workflow, package_of
 
+# In a campaign's folder of results: the versions of packages that any of them may have been made with.
+MADE_WITH = "made_with.txt"
 _MOST_NAMES = 20
+
+
+def note_versions(results: Path) -> None:
+    """Add the versions of the packages that ICHA asks for, as they are installed, to those that were noted before."""
+    asked = {re.match(r"[\w.-]+", line)[0] for line in importlib.metadata.requires("icha") or ()} - {"icha"}
+    noted, now = _noted(results), set()
+    for name in asked:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            now.add(f"{_normal(name)}=={importlib.metadata.version(name)}")
+    if not now <= noted:
+        with whole_file(results / MADE_WITH) as temporary:
+            temporary.write_text("".join(f"{line}\n" for line in sorted(noted | now)), encoding="utf-8")
+
+
+def refuse_results_of_another_environment(results: Path, project: Path) -> None:
+    """Refuse results that may have been made with other versions than a deposit promises.
+
+    Parameters
+    ----------
+    results : the campaign's folder.
+    project : the folder of the workflow, with uv.lock.
+
+    Raises
+    ------
+    ValueError
+        If other versions were noted; the message lists them and says what to do.
+    """
+    locked = {(_normal(package["name"]), package["version"]) for package in _locked(project / "uv.lock")}
+    names = {name for name, _ in locked}
+    made = (tuple(line.split("==")) for line in sorted(_noted(results)))
+    if other := [f"  {name} {version}" for name, version in made if name in names and (name, version) not in locked]:
+        raise ValueError(
+            f"{results}: some of it may have been made with versions that are not those of uv.lock, which the deposit "
+            f"would promise; needed: remove {results}, and run the campaign again:\n" + "\n".join(other)
+        )
+
+
+def _noted(results: Path) -> set[str]:
+    try:
+        return set((results / MADE_WITH).read_text(encoding="utf-8").split())
+    except OSError:
+        return set()  # none, or nothing can be read there
 
 
 def refuse_other_environment(project: Path) -> None:

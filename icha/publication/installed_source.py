@@ -6,7 +6,7 @@ import shutil
 from base64 import urlsafe_b64decode
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import distributions
 from pathlib import Path
 
 from icha.support.checksums import sha256_of
@@ -47,11 +47,8 @@ def installed_source(workflow: str | os.PathLike) -> InstalledSource:
         If a file is not what was installed, or if there are others; the message lists them and says what to do.
     """
     place = Path(workflow).resolve().parent
-    try:
-        installed = distribution("icha")
-    except PackageNotFoundError:
-        installed = None
-    if installed is None or Path(installed.locate_file("")).resolve() != place:
+    installed = next(iter(distributions(name="icha", path=[str(place)])), None)
+    if installed is None:
         raise ValueError(
             f"{place}: no distribution `icha` is installed here, so nobody could tell which program made the data; "
             "needed: pip install 'icha[workflow]'"

@@ -277,10 +277,14 @@ def check_snakemake(arguments):
 @EVERY
 def test_every_command_exists(page):
     known = {"git", "cd", "source", "cp", "export", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
+    installers = {"pip", "python", "python3", "uv", "uvx", "pipx"}
     for line, (program, *arguments) in commands(page):
         where = f"{page.name}, block at line {line}: {program} {shlex.join(arguments)}"
         program = Path(program).name
-        if program == "icha":
+        if program in installers:
+            if "icha" in arguments:  # `uvx --from … icha run smoke`
+                check_icha(arguments[arguments.index("icha") + 1 :])
+        elif program == "icha":
             check_icha(arguments)
         elif program == "make":
             assert {each for each in arguments if "=" not in each} <= make_targets(), where

@@ -5,7 +5,7 @@ from functools import cache
 from publishable import publishable_source
 
 # Looked at once, when the deposit is asked for, and before anything is computed.
-SOURCE = cache(lambda: publishable_source(CONFIGURATION, workflow.basedir))
+SOURCE = cache(lambda: publishable_source(CONFIGURATION, workflow.basedir, RESULTS))
 
 
 rule deposit:

@@ -1,0 +1,57 @@
+"""The wheel has all that campaigns need, and the files that describe the package agree with each other."""
+
+import re
+import subprocess
+import tomllib
+
+import pytest
+import yaml
+from conftest import REPOSITORY
+
+PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
+METADATA = PROJECT["project"]
+WHEEL = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
+# What a wheel of a program has no use for.
+LEFT_OUT = ("tests/", "docs/", "benchmarks/", "recipe/", "results/", ".")
+
+
+def test_all_files_of_the_repository_are_in_the_wheel_or_left_out_on_purpose():
+    listed = [*WHEEL["packages"], *WHEEL["hooks"]["custom"]["files"]]
+    assert {"Snakefile", "workflow", "config", "profiles", "pyproject.toml", "uv.lock", "Makefile"} <= set(listed)
+    assert [name for name in listed if not (REPOSITORY / name).exists()] == []
+    if not (REPOSITORY / ".git").exists():
+        pytest.skip("not a clone")
+    files = subprocess.run(["git", "ls-files"], cwd=REPOSITORY, check=True, capture_output=True, text=True).stdout
+    for file in files.splitlines():
+        shipped = any(file == name or file.startswith(f"{name}/") for name in listed)
+        assert shipped is not file.startswith(LEFT_OUT), file
+
+
+def test_the_version_is_the_same_everywhere():
+    cited = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))
+    recipe = yaml.safe_load((REPOSITORY / "recipe/recipe.yaml").read_text(encoding="utf-8"))
+    assert METADATA["version"] == cited["version"] == recipe["context"]["version"]
+
+
+def test_the_recipe_for_conda_asks_for_what_the_package_asks_for():
+    recipe = yaml.safe_load((REPOSITORY / "recipe/recipe.yaml").read_text(encoding="utf-8"))
+    other_names = {"matplotlib": "matplotlib-base", "snakemake": "snakemake-minimal"}
+    library, workflow = (output["requirements"]["run"] for output in recipe["outputs"])
+    for there, asked in (
+        (library, METADATA["dependencies"]),
+        (workflow, METADATA["optional-dependencies"]["workflow"]),
+    ):
+        split = [re.fullmatch(r"([\w-]+)(.*)", line).groups() for line in asked]
+        expected = {f"{other_names.get(name.lower(), name.lower())} {versions}" for name, versions in split}
+        assert {line for line in there if not line.startswith(("python ", "__unix", "${{"))} == expected
+    assert recipe["context"]["python_min"] == METADATA["requires-python"].removeprefix(">=")
+
+
+def test_a_release_is_what_the_tag_says():
+    release = yaml.safe_load((REPOSITORY / ".github/workflows/release.yml").read_text(encoding="utf-8"))
+    assert release[True] == {"push": {"tags": ["v*"]}}  # YAML takes `on` for a truth value
+    publish = release["jobs"]["publish"]
+    assert set(publish["needs"]) == {"build", "test"} and publish["permissions"] == {"id-token": "write"}
+    assert publish["steps"][-1]["uses"] == "pypa/gh-action-pypi-publish@release/v1"
+    steps = "".join(step.get("run", "") for step in release["jobs"]["build"]["steps"])
+    assert all(part in steps for part in ('"$GITHUB_REF_NAME" = "v$version"', "make wheel", "twine check --strict"))

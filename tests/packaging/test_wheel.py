@@ -1,0 +1,296 @@
+"""The wheel, built from the sdist and installed where nothing else is: the library, a campaign, its deposit."""
+
+import json
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+
+import pytest
+import small_campaign as small
+import yaml
+from conftest import REPOSITORY
+
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.files import write_dataset
+from icha.publication.environment import constraints
+from icha.publication.rerun import surroundings
+
+pytestmark = pytest.mark.slow
+
+UV = REPOSITORY / ".venv-tools/bin/uv"
+# NumPy, SciPy and FINUFFT alone have 195 MB, xarray with pandas 51 MB, h5py 16 MB.
+LARGEST_LIBRARY = 290e6
+
+LIBRARY = """
+import icha
+import xarray as xr
+
+spectrum = icha.SelfAffineSpectrum(
+    period=100e-6, rolloff_wavelength=20e-6, short_wavelength=10e-6, hurst=0.8, rms_slope=1.0
+)
+surface = spectrum.realise(grid=64, seed=1)
+material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2.071e-9)
+path = icha.Path(reduced_pressures=[1e-3, 1e-2])
+for model in ("asperities", "boundary_elements"):
+    run = icha.simulate(surface, material, path, model=model)
+    run.to_netcdf(f"{model}.nc")
+    assert (xr.load_dataset(f"{model}.nc").contact_area_fraction == run.contact_area_fraction).all()
+study = xr.open_datatree("campaign.nc")["slopes"].to_dataset()
+print(float(study.contact_area_fraction.sum()))
+"""
+
+# What editors and type checkers are to see, and what they are to find.
+TYPED = """
+import icha
+
+spectrum = icha.SelfAffineSpectrum(
+    period=100e-6, rolloff_wavelength=20e-6, short_wavelength=10e-6, hurst=0.8, rms_slope=1.0
+)
+surface: icha.Surface = spectrum.realise(grid=64, seed=1)
+material = icha.Material(contact_modulus=25e6, surface_energy=0.05, interaction_range=2.071e-9)
+try:
+    run = icha.simulate(surface, material, icha.Path(reduced_pressures=[1e-3]), model="asperities")
+except icha.ConvergenceError as error:
+    run = error.dataset
+reveal_type(run)
+reveal_type(surface.heights)
+reveal_type(icha.__version__)
+"""
+WRONG = """
+import icha
+
+icha.Surfaces
+icha.Material(contact_modulus="soft", surface_energy=0.05, interaction_range=2e-9)
+icha.simulate("surface", 1, 2)
+icha.Path(reduced_pressure=[1e-3])
+"""
+
+CAMPAIGN = """
+name: tiny
+title: Tiny
+summary: For tests.
+license: CC0-1.0
+publication:
+  version: "1.0.0"
+  date: 2026-01-31
+  authors:
+    - {family_names: Carberry, given_names: Josiah}
+surfaces:
+  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 40 um, short_wavelength: 14.3 um, hurst: 0.8, grid: 32}
+materials:
+  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
+studies:
+  load:
+    surfaces: [rough]
+    seeds: [1]
+    rms_slopes: [1.0]
+    materials: [bare]
+    targets: {reduced_pressures: [1.0e-3, 1.0e-2]}
+"""
+
+
+def call(*command, cwd, status=0):
+    done = subprocess.run(
+        [str(part) for part in command],
+        cwd=cwd,
+        env=surroundings() | {"OMP_NUM_THREADS": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert done.returncode == status, done.stdout
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """Sdist and wheel of what is committed or about to be, and of nothing else that lies there."""
+    source, dist = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("dist")
+    listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    for name in call(*listed, cwd=REPOSITORY).splitlines():
+        if (REPOSITORY / name).is_file():
+            (source / name).parent.mkdir(parents=True, exist_ok=True)
+            (source / name).write_bytes((REPOSITORY / name).read_bytes())
+    call(UV, "build", "--quiet", "--out-dir", dist, source, cwd=source)
+    (sdist,), (wheel,) = dist.glob("*.tar.gz"), dist.glob("*.whl")
+    return source, sdist, wheel
+
+
+@pytest.fixture(scope="module")
+def install(built, tmp_path_factory):
+    """Install the wheel, with an extra, in an empty environment, in the versions of the lock."""
+    locked = tmp_path_factory.mktemp("locked") / "locked.txt"
+    locked.write_text("\n".join(constraints(REPOSITORY / "uv.lock")))
+
+    def installed(name, extra=""):
+        place = tmp_path_factory.mktemp("environments") / name
+        call(UV, "venv", "--quiet", "--python", sys.executable, place, cwd=place.parent)
+        asked = ["--constraint", locked, f"{built[2]}{extra}"]
+        call(UV, "pip", "install", "--quiet", "--python", place / "bin/python", *asked, cwd=place.parent)
+        return place / "bin"
+
+    return installed
+
+
+@pytest.fixture(scope="module")
+def library(install):
+    return install("library")
+
+
+@pytest.fixture(scope="module")
+def workflow(install):
+    return install("workflow", "[workflow]")
+
+
+def test_the_wheel_has_the_package_and_the_workflow_and_nothing_else(built):
+    source, sdist, wheel = built
+    with tarfile.open(sdist) as archive:
+        unpacked = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"tests/packaging/test_wheel.py", "Snakefile", "hatch_build.py", "docs/index.md"} <= unpacked
+    with zipfile.ZipFile(wheel) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    tops = {name.partition("/")[0] for name in content if ".dist-info/" not in name}
+    plugins = {path.name for path in (source / "workflow/plugins").iterdir()}
+    assert tops == {"icha", "icha_workflow", *plugins}
+    # Every file of the repository that is in the wheel is there with its bytes, and so is every one of these folders.
+    for name, data in content.items():
+        if name.startswith("icha_workflow/"):
+            assert (source / name.removeprefix("icha_workflow/")).read_bytes() == data, name
+    for folder, place in (
+        ("icha", "icha"),
+        *((each, f"icha_workflow/{each}") for each in ("workflow", "config", "profiles")),
+    ):
+        for path in (source / folder).rglob("*"):
+            if path.is_file():
+                assert f"{place}/{path.relative_to(source / folder).as_posix()}" in content
+    assert not [name for name in content if "test" in name.lower() and not name.startswith("icha/")]
+
+
+def test_the_library_is_small_and_computes_reads_and_writes(library, tmp_path):
+    size = """
+import importlib.metadata as metadata, os
+found = [each.locate_file(file) for each in metadata.distributions() for file in each.files or ()]
+print(sum(os.path.getsize(file) for file in found if os.path.isfile(file) and file.suffix != ".pyc"))
+"""
+    assert int(call(library / "python", "-c", size, cwd=tmp_path)) < LARGEST_LIBRARY
+    tree = campaign_tree(
+        [(labels._replace(study="slopes"), run) for labels, run in small.runs() if labels.study == "slopes"],
+        attrs={"campaign": "paper"},
+    )
+    write_dataset(tree, tmp_path / "campaign.nc")
+    said = call(library / "python", "-c", LIBRARY, cwd=tmp_path)
+    assert float(said) == pytest.approx(float(tree["slopes"].contact_area_fraction.sum()))
+
+
+@pytest.mark.parametrize("arguments", [["icha", "run"], ["icha", "show", "x.nc"], ["python", "-m", "icha"]])
+def test_a_command_without_the_workflow_says_what_to_install(library, tmp_path, arguments):
+    program, *rest = arguments
+    said = call(library / program, *rest, cwd=tmp_path, status=1)
+    assert len(said.splitlines()) == 1 and said.rstrip().endswith("needed: pip install 'icha[workflow]'")
+
+
+def test_type_checkers_see_the_types_of_public_names(library, tmp_path):
+    (tmp_path / "typed.py").write_text(TYPED)
+    (tmp_path / "wrong.py").write_text(WRONG)
+    mypy = [sys.executable, "-m", "mypy", "--python-executable", library / "python", "--follow-imports=silent"]
+    said = call(*mypy, "--strict", "typed.py", cwd=tmp_path)
+    assert [
+        line.partition('Revealed type is "')[2].rstrip('"') for line in said.splitlines() if "Revealed" in line
+    ] == [
+        "xarray.core.dataset.Dataset",
+        "numpy.ndarray[Any, numpy.dtype[Any]]",
+        "str",
+    ], said
+    said = call(*mypy, "wrong.py", cwd=tmp_path, status=1)
+    assert {int(line.split(":")[1]) for line in said.splitlines() if ": error:" in line} == {4, 5, 6, 7}, said
+
+
+def test_a_campaign_is_written_and_shipped_ones_are_known_in_any_folder(workflow, tmp_path):
+    call(workflow / "icha", "new", "mine", cwd=tmp_path)
+    made = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
+    assert made == {"config/campaigns/mine.yaml", "config/config.schema.json", "config/README.md"}
+    for name in ("mine", "smoke", "paper"):
+        assert call(workflow / "icha", "describe", name, cwd=tmp_path).startswith(f"{name}: ")
+    said = call(workflow / "icha", "run", "smoke", "--dry-run", cwd=tmp_path)
+    assert "jobs would run" in said and not (tmp_path / "results").exists()
+
+
+@pytest.fixture(scope="module")
+def work(workflow, tmp_path_factory):
+    """A folder with a campaign that was run and published."""
+    folder = tmp_path_factory.mktemp("work")
+    (folder / "config/campaigns").mkdir(parents=True)
+    (folder / "config/campaigns/tiny.yaml").write_text(CAMPAIGN)
+    said = call(workflow / "icha", "run", "tiny", "publish", "--cores", "1", cwd=folder)
+    assert "deposit: results/tiny/publish/tiny-1.0.0.zip" in said
+    return folder
+
+
+def test_a_campaign_runs_in_any_folder(work, workflow):
+    assert {path.name for path in work.iterdir()} == {"config", "results", ".snakemake"}
+    assert (work / "results/tiny/report.html").is_file()
+    assert (work / "results/tiny/belongs_to.txt").read_text() == "config/campaigns/tiny.yaml\n"
+    assert "Nothing to do" in call(workflow / "icha", "run", "tiny", cwd=work)
+
+
+def test_its_deposit_holds_what_was_installed_and_computes_the_same_again(built, work, workflow, tmp_path):
+    source = built[0]
+    deposit = work / "results/tiny/publish/tiny-1.0.0"
+    for path in (deposit / "source").rglob("*"):
+        if path.is_file():
+            assert path.read_bytes() == (source / path.relative_to(deposit / "source")).read_bytes()
+    assert {"Snakefile", "icha", "uv.lock", "Makefile"} <= {path.name for path in (deposit / "source").iterdir()}
+    revision = yaml.safe_load((deposit / "CITATION.cff").read_text())["commit"]
+    assert revision.startswith("icha-") and len(revision.rpartition("-")[2]) == 64
+    assert not [
+        path
+        for path in deposit.rglob("*")
+        if path.suffix in (".md", ".json", ".yaml", ".html") and str(work) in path.read_text()
+    ]
+    call(workflow / "icha", "verify", deposit, cwd=tmp_path)
+    again = ["reproduce", f"{deposit}.zip", "--only", "smallest", "--environment", "here", "--json", "found.json"]
+    said = call(workflow / "icha", *again, cwd=tmp_path)
+    assert "identical: 2 files, every value" in said and json.loads((tmp_path / "found.json").read_text())
+
+
+def test_a_changed_program_and_other_versions_are_not_published(work, workflow):
+    (installed,) = workflow.parent.glob("lib/python*/site-packages")
+    deposit = work / "results/tiny/publish/tiny-1.0.0.zip"
+    deposit.unlink()
+    rule, noted = installed / "icha_workflow/workflow/rules/runs.smk", work / "results/tiny/made_with.txt"
+    kept, versions = rule.read_bytes(), noted.read_text()
+    rule.write_bytes(kept + b"# changed\n")
+    noted.write_text(versions + "scipy==0.1\n")
+    try:
+        said = call(workflow / "icha", "run", "tiny", "publish", cwd=work, status=1)
+    finally:
+        rule.write_bytes(kept)
+        noted.write_text(versions)
+    assert "changed: icha_workflow/workflow/rules/runs.smk" in said and "scipy 0.1" in said
+    assert not deposit.exists()
+
+
+def test_the_command_runs_without_being_installed(built, install, tmp_path):
+    wheel = built[2]
+    said = call(
+        UV, "tool", "run", "--isolated", "--from", f"{wheel}[workflow]", "icha", "describe", "smoke", cwd=tmp_path
+    )
+    assert "smoke: " in said
+
+
+RENDER = """
+import sys
+from rattler_build import Stage0Recipe, VariantConfig
+
+for each in Stage0Recipe.from_file(sys.argv[1]).render(VariantConfig()):
+    print(each.recipe.package.name, each.recipe.package.version)
+"""
+
+
+def test_the_recipe_for_conda_is_one(tmp_path):
+    program = [UV, "run", "--quiet", "--no-project", "--with", "py-rattler-build==0.73.0", "python", "-c", RENDER]
+    said = call(*program, REPOSITORY / "recipe/recipe.yaml", cwd=tmp_path)
+    version = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["version"]
+    assert said.split() == ["icha", version, "icha-workflow", version]
