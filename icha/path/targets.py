@@ -1,6 +1,7 @@
 """What a path is asked to meet: given separations, loads or areas, and the turning points between them."""
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from icha.contact.unions import OVERLAP, UNITED_UNTIL
@@ -79,17 +80,17 @@ class Path:
 
     def __init__(
         self,
-        reduced_pressures=None,
-        area_fractions=None,
-        mean_separations=None,
+        reduced_pressures: Iterable[float] | None = None,
+        area_fractions: Iterable[float] | None = None,
+        mean_separations: Iterable[float] | None = None,
         *,
-        snapshots=None,
-        turning_points=(),
-        unload=False,
-        control=SEPARATION_CONTROL,
-        united_until=OVERLAP,
-        max_step=DEFAULT_STEP,
-    ):
+        snapshots: Iterable[tuple[str, float]] | None = None,
+        turning_points: Iterable[tuple[str, float]] = (),
+        unload: bool = False,
+        control: str = SEPARATION_CONTROL,
+        united_until: str = OVERLAP,
+        max_step: float = DEFAULT_STEP,
+    ) -> None:
         """Check the values and build the list of stops."""
         kind, values = _one_list(reduced_pressures, area_fractions, mean_separations)
         if not isinstance(unload, bool):

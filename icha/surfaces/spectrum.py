@@ -71,7 +71,7 @@ class SelfAffineSpectrum:
                 f"short_wavelength: {self.short_wavelength!r} m leaves no wave that fits the period {self.period!r} m"
             )
 
-    def psd(self, q):
+    def psd(self, q: np.ndarray | float) -> np.ndarray:
         """C(q) in m^4 for wave numbers `q` (any shape) in rad/m."""
         q = np.asarray(q, dtype=float)
         return self.plateau * self._shape(q * self.period / (2 * np.pi))

@@ -200,7 +200,7 @@ def test_type_checkers_see_the_types_of_public_names(library, tmp_path):
         line.partition('Revealed type is "')[2].rstrip('"') for line in said.splitlines() if "Revealed" in line
     ] == [
         "xarray.core.dataset.Dataset",
-        "numpy.ndarray[Any, numpy.dtype[Any]]",
+        "numpy.ndarray[tuple[Any, ...], numpy.dtype[Any]]",
         "str",
     ], said
     said = call(*mypy, "wrong.py", cwd=tmp_path, status=1)
