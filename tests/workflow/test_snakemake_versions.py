@@ -38,7 +38,7 @@ studies:
 
 def bounds():
     """The lowest version that is allowed, and the first one that is not."""
-    listed = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["dependencies"]
+    listed = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["optional-dependencies"]["workflow"]
     requirement = next(found for found in map(Requirement, listed) if found.name == "snakemake")
     limits = {limit.operator: Version(limit.version) for limit in requirement.specifier}
     return limits[">="], limits["<"]
@@ -61,7 +61,7 @@ def test_a_campaign_with_the_lowest_version(tmp_path):
     lowest = f"{bounds()[0]}.0"
     for command in (
         ["venv", "--quiet", "--python", sys.executable, str(environment)],
-        ["pip", "install", "--quiet", "--python", str(python), f"snakemake=={lowest}", str(REPOSITORY)],
+        ["pip", "install", "--quiet", "--python", str(python), f"snakemake=={lowest}", f"{REPOSITORY}[workflow]"],
     ):
         try:
             done = subprocess.run([uv, *command], capture_output=True, text=True)
