@@ -69,7 +69,7 @@ function mix() {
 function layoutOf(x, y, more = {}) {
   const axis = { gridcolor: colours.line, linecolor: colours.soft, zeroline: false, showline: true, mirror: true, exponentformat: "power" };
   return {
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    paper_bgcolor: colours.paper, plot_bgcolor: colours.paper,
     font: { color: colours.ink, size: 13, family: "Georgia, serif" },
     margin: { l: 68, r: 14, t: 30, b: 50 }, dragmode: false, showlegend: Object.keys(runs).length > 1, legend: { orientation: "h", y: 1.02, yanchor: "bottom" },
     xaxis: { ...axis, ...x, title: { text: x.title } }, yaxis: { ...axis, ...y, title: { text: y.title } }, ...more,
@@ -228,18 +228,22 @@ function tell(now) {
   });
   byId("values").innerHTML = "<table><thead><tr><th scope='col'>Model</th><th scope='col' class='num'><i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)</th>"
     + "<th scope='col' class='num'><i>A</i>/<i>A</i><sub>0</sub></th><th scope='col' class='num'><i>u</i>/<i>h</i><sub>rms</sub></th>"
-    + `<th scope='col' class='num'>Spots</th><th scope='col'>Snapshot</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
-  byId("notices").replaceChildren(...now.flatMap(noticesOf).map((text) => Object.assign(document.createElement("p"), { className: "notice", textContent: text })));
+    + `<th scope='col' class='num'>Spots or patches</th><th scope='col'>Snapshot</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
+  // What is to be said of both models is said once.
+  const notices = new Map();
+  for (const each of now) for (const text of noticesOf(each)) notices.set(text, [...(notices.get(text) || []), WORDS[each.model]]);
+  byId("notices").replaceChildren(...Array.from(notices, ([text, models]) =>
+    Object.assign(document.createElement("p"), { className: "notice", textContent: `By ${models.join(" and ")}: ${text}` })));
 }
 
-function noticesOf({ model, run, step, snapshot, exact }) {
-  const found = [], who = `By ${WORDS[model]}`;
-  if (run.failure) found.push(`${who}: the run failed; ${run.failure}`);
-  if (step < 0) found.push(`${who}: the run has no such state.`);
-  else if (!run.snapshots.length) found.push(`${who}: the run has no snapshot, so there are neither spots nor distributions to show.`);
-  else if (!snapshot) found.push(`${who}: no snapshot up to here, so spots and distributions are not shown. The first is at p* = ${said(run.pressure[Math.min(...run.snapshots.map((each) => each.step))])}.`);
-  else if (!exact) found.push(`${who}: no snapshot here. Spots and distributions, pale, are those of the last one before: ${legOf(run, snapshot.step)}, p* = ${said(run.pressure[snapshot.step])}.`);
-  if (snapshot && !snapshot.map && !snapshot.circles) found.push(`${who}: the file of the run, which has the maps of contact, was not there.`);
+function noticesOf({ run, step, snapshot, exact }) {
+  const found = [];
+  if (run.failure) found.push(`the run failed; ${run.failure}`);
+  if (step < 0) found.push("the run has no such state.");
+  else if (!run.snapshots.length) found.push("the run has no snapshot, so there are neither spots nor distributions to show.");
+  else if (!snapshot) found.push(`no snapshot up to here, so spots and distributions are not shown. The first is at p* = ${said(run.pressure[Math.min(...run.snapshots.map((each) => each.step))])}.`);
+  else if (!exact) found.push(`no snapshot here. Spots and distributions, pale, are those of the last one before: ${legOf(run, snapshot.step)}, p* = ${said(run.pressure[snapshot.step])}.`);
+  if (snapshot && !snapshot.map && !snapshot.circles) found.push("the file of the run, which has the maps of contact, was not there.");
   return found;
 }
 
