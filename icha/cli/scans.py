@@ -109,7 +109,7 @@ def _spectrum(ax, scan):
     ax.axvline(np.pi / scan.measured.spacing / 4, color=GREY, lw=0.8, ls="-.", label="waves of 8 pixels")
     ax.set_xlabel(r"wave number $q$ (rad/m)")
     ax.set_ylabel(r"power spectrum $C(q)$ (m$^4$)")
-    ax.legend(loc="upper right", frameon=True, framealpha=1, edgecolor="none", fontsize=7)
+    ax.legend(loc="lower left", frameon=True, framealpha=1, edgecolor="none", fontsize=7)
 
 
 def _short(length):
