@@ -103,6 +103,22 @@ def test_identities_of_the_distributions(run):
         )
 
 
+@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
+def test_a_pit_deeper_than_the_bins_ends_no_run(model):
+    """A pit of 40 rms heights, as lost points and holes of measured surfaces are."""
+    heights = np.array(rough(grid=64, ratio=8).heights)
+    heights[10, 20] -= 64 * 1.5 * np.std(heights)
+    surface = Surface(heights, PERIOD)
+    assert -surface.heights.min() > 40 * surface.rms_height
+    run = simulate(surface, BARE, Path([3e-3]), model=model)
+    content = run.gap_density.values[0] * np.diff(run.gap_bin_edges)
+    whole = content.sum() + float(run.contact_area_fraction[-1]) + float(run.overlap_fraction[0])
+    assert whole == pytest.approx(1, abs=1e-12)
+    # One node is in the last bin.
+    assert content[-1] == pytest.approx(1 / 64**2, rel=1e-9)
+    assert not list(flaws(RUN, run))
+
+
 def test_spots_follow_the_jkr_law(run):
     a, R, gamma = run.spot_radius, run.spot_curvature_radius, float(run.surface_energy)
     force = 4 * MODULUS * a**3 / (3 * R) - np.sqrt(8 * np.pi * MODULUS * gamma * a**3)

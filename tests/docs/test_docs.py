@@ -374,3 +374,14 @@ def test_links_of_the_sources_lead_to_files():
             if not parts.scheme and parts.path and not (page.parent / unquote(parts.path)).exists():
                 broken.append(f"{page.relative_to(ROOT)}: {target}")
     assert not broken, "\n".join(broken)
+
+
+def test_the_page_of_formats_lists_every_ending_of_every_reader():
+    """Formats that ICHA reads itself are in the first table, all others of SurfaceTopography in the second."""
+    from SurfaceTopography.IO import readers
+
+    page = (DOCS / "formats.md").read_text(encoding="utf-8")
+    usual = {
+        ending for reader in readers for ending in reader._file_extensions or () if ending not in ("003", "004", "005")
+    }
+    assert not [ending for ending in sorted(usual) if f"`.{ending}`" not in page]
