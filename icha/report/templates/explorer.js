@@ -36,7 +36,7 @@ function choose() {
   }
   contact = left[0];
   const models = Object.keys(contact.runs);
-  fill(byId("model"), models.length > 1 ? ["both", ...models] : models, { ...WORDS, both: "both, side by side" });
+  fill(byId("model"), models.length > 1 ? ["both", ...models] : models, { ...WORDS, both: "both" });
   const shown = byId("model").value === "both" ? models : [byId("model").value];
   runs = Object.fromEntries(shown.map((model) => [model, opened(contact.runs[model])]));
   leading = Object.values(runs)[0];
