@@ -1,4 +1,7 @@
-"""Where the workflow is that came with this package: in the repository, or installed beside the package."""
+"""Where the workflow is that came with this package: in the repository, or installed beside the package.
+
+`python -m icha.support.program` prints it: shipped campaigns and example files lie there, in config/.
+"""
 
 from pathlib import Path
 
@@ -21,3 +24,7 @@ def is_installed(workflow: Path) -> bool:
 def package_of(workflow: Path) -> Path:
     """The package `icha` that belongs to a workflow: in its folder, or beside it where that is installed."""
     return (workflow.parent if is_installed(workflow) else workflow) / "icha"
+
+
+if __name__ == "__main__":
+    print(own_workflow())

@@ -276,7 +276,7 @@ def check_snakemake(arguments):
 
 @EVERY
 def test_every_command_exists(page):
-    known = {"git", "cd", "source", "cp", "export", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
+    known = {"git", "cd", "source", "cp", "mkdir", "export", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
     installers = {"pip", "python", "python3", "uv", "uvx", "pipx"}
     for line, (program, *arguments) in commands(page):
         where = f"{page.name}, block at line {line}: {program} {shlex.join(arguments)}"
