@@ -22,6 +22,7 @@ from icha.figures.style import (
     logarithmic_axes,
     material_label,
     new_figure,
+    number,
     panel_label,
     slope_label,
     styled,
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
 _MOST_LINES = 2
 # Points of one load stand this far apart, as a factor, so that their bars do not hide each other.
 _APART = 1.025
-# Of one load alone the axis shows this much around it, as a factor.
-_ONE_LOAD = 4.0
+# Where loads span less than this factor, it is one load, and the axis shows as much to both sides.
+_ONE_LOAD = 1.3
 # Errors against another quantity of the boundary elements.
 _OTHER = {"ls": ":", "lw": 0.9, "marker": ".", "ms": 3}
 
@@ -137,10 +138,14 @@ def draw_errors(
             ax.axhline(0, color="0.6", lw=0.7, zorder=0)
             ax.set_ylabel(quantity.label)
             panel_label(ax, next(letters))
-    loads = np.concatenate([errors["reduced_pressure"].values for errors in curves.entries.values()])
+    low, high = panels[0, 0].dataLim.intervalx
+    if high < _ONE_LOAD * low:
+        load = float(f"{np.sqrt(low * high):.3g}")
+        panels[0, 0].set_xlim(load / _ONE_LOAD, load * _ONE_LOAD)
+        panels[0, 0].set_xticks([load], [number(load)])
+        for ax in panels.ravel():
+            ax.minorticks_off()
     for ax, quantity in zip(panels[-1], quantities, strict=True):
-        if np.ptp(loads) == 0:
-            ax.set_xlim(loads[0] / _ONE_LOAD, loads[0] * _ONE_LOAD)
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylim(*quantity.limits)
     if any(each.other for each in quantities) and any(map(has_cohesive_zone, curves.entries.values())):

@@ -132,7 +132,7 @@ def figure(error_sources: Sequence[xr.Dataset]) -> Figure:
     separations.set_ylabel(r"$\bar{u}/\bar{u}_{\mathrm{BEM}}$")
     for ax, letter in zip((areas, separations, steps, singles), "abcd", strict=True):
         panel_label(ax, letter)
-    legend_below(fig, named_handles([areas]) | points_handles([len(error_sources)]), columns=2)
+    legend_below(fig, named_handles([areas]) | points_handles([len(error_sources)]))
     return fig
 
 

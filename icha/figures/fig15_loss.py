@@ -154,7 +154,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     if lines.scale:
         handles = lines.handles(ls="none") | handles
         lines.scale.draw(fig, [loss])
-    legend_below(fig, handles, columns=2)
+    legend_below(fig, handles)
     return fig
 
 

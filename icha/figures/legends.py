@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from icha.figures.style import GREY, legend_handle
 
 if TYPE_CHECKING:
@@ -15,18 +17,19 @@ if TYPE_CHECKING:
 # More names than this are written smaller.
 _MANY_NAMES = 12
 # Inches that an entry takes beside its name, and a character of it, in 8 point; and of the height of a row.
-_BESIDE, _CHARACTER, _ROW = 0.62, 0.062, 0.155
+_BESIDE, _CHARACTER, _ROW = 0.7, 0.062, 0.155
 _MOST_COLUMNS = 4
 
 
-def legend_below(figure: Figure, handles: Mapping[str, object], columns: int | None = None) -> None:
+def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
     """Add a legend below the panels, in as many columns as have room; the figure grows by its height."""
     if not handles:
         return
     size = 8 if len(handles) <= _MANY_NAMES else 7
-    if columns is None:
-        room = figure.get_figwidth() / (_BESIDE + _CHARACTER * max(map(_printed_length, handles))) * 8 / size
-        columns = min(max(1, int(room)), _MOST_COLUMNS, len(handles))
+    lengths = [_printed_length(name) * size / 8 for name in handles]
+    columns = next(
+        (count for count in range(_MOST_COLUMNS, 1, -1) if _width(lengths, count) < figure.get_figwidth()), 1
+    )
     rows = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.06 + _ROW * size / 8 * rows)
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)
@@ -44,6 +47,12 @@ def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
 def words_handle(text: str) -> dict[str, object]:
     """An explanation in a legend, without a look of its own."""
     return {text: legend_handle(color=GREY, ls="none")}
+
+
+def _width(lengths, columns):
+    """Inches that so many columns of names take, at most as many as there are names."""
+    parts = np.array_split(lengths, min(columns, len(lengths)))
+    return sum(_BESIDE + _CHARACTER * max(part) for part in parts)
 
 
 def _printed_length(name):
