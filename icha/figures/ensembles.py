@@ -64,6 +64,8 @@ def draw_scatter(
     """
     x = np.broadcast_to(x, members.shape)
     if len(members) < ENOUGH:
+        if members.shape[1] == 1:
+            dashes = _SEED_DOT  # of a single point there is no line
         for own, member in zip(x, members, strict=True):
             axes.plot(
                 own, np.where(member > 0, member, np.nan) if positive else member, color=colour, **_SEED_LINE | dashes
