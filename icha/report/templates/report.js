@@ -1,10 +1,4 @@
 "use strict";
-// Long captions are shown whole by a click.
-document.documentElement.classList.add("script");
-document.querySelectorAll("figcaption p").forEach((words) => {
-  words.addEventListener("click", () => words.classList.toggle("whole"));
-});
-
 // Figures are enlarged by a click; arrow keys and buttons go on to the next, Escape or a click closes.
 const viewer = document.getElementById("viewer");
 const figures = [...document.querySelectorAll("figure")];
