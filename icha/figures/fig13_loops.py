@@ -17,6 +17,7 @@ from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.ensembles import draw_scatter, lines_handles
 from icha.figures.hysteresis import (
     BRANCH_DASHES,
+    ROUNDING,
     Lines,
     pull_off_step,
     unloaded_runs,
@@ -253,7 +254,7 @@ def _enlarge(left, right, loops):
     ways = [way for loop in loops for way in loop.ways]
     pressures = np.concatenate([way.reduced_pressure for way in ways])
     tension = -pressures.min()
-    if not 0 < tension < _SMALL_TENSION * pressures.max():
+    if not ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
         return
     reach = np.array([-1, 1]) * _REACH * tension
     separations, areas = (

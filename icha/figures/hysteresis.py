@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
+# Tension of a smaller part of the largest pressure is rounding.
+ROUNDING = 1e-9
 BRANCH_DASHES = {"loading": "-", "unloading": UNLOADING["ls"]}
 
 
@@ -89,7 +91,8 @@ def pull_off_step(run: xr.Dataset) -> int | None:
     back = ways_back(run)[-1]
     lowest = int(np.argmin(back["nominal_pressure"].values))
     step = np.flatnonzero(run["step"].values == back["step"].values[lowest])[0]
-    return int(step) if run["nominal_pressure"].values[step] < 0 else None
+    pressure = run["nominal_pressure"].values
+    return int(step) if pressure[step] < -ROUNDING * pressure.max() else None
 
 
 class Averages(NamedTuple):

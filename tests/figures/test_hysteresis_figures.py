@@ -123,6 +123,15 @@ def test_fig13_without_adhesion_has_one_way_and_no_pull_off():
     assert "pull-off" not in legend(figure)
 
 
+def test_rounding_is_no_tension():
+    run = separate.run("hertz", 0.5)
+    tiny = {name: run[name].copy(data=run[name].values) for name in ("nominal_pressure", "reduced_pressure")}
+    for values in tiny.values():
+        values.values[-2] = -1e-52
+    figure = fig13_loops.figure(one("hertz", **tiny), study="one")
+    assert not marks(figure.axes[0]) and not figure.axes[0].child_axes and "pull-off" not in legend(figure)
+
+
 def test_fig13_shows_one_surface_and_seed(tree):
     run = separate.run("sticky", 0.5, seed=2, depth=0.5)
     figure = fig13_loops.figure(tree, study="hard", seed=2)

@@ -352,6 +352,7 @@ def test_figures_stand_with_their_study_and_have_the_numbers_of_their_files(writ
     ]
     numbers = re.findall(r"<b>Figure (\d+)\.</b> Caption of fig(\d+)_", text)
     assert numbers == [("2", "2"), ("9", "9"), ("5", "5")]
+    assert "line-clamp" not in text, "captions are whole"
 
 
 @pytest.mark.parametrize("name", ["measured", "dataset", "surfaces", "report"])
