@@ -13,8 +13,9 @@ const stop = byId("stop");
 
 const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 const floats = (text) => new Float32Array(bytes(text).buffer);
-// A number as text, with a true minus sign.
-const said = (value) => Number(value).toPrecision(4).replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1").replaceAll("-", "−");
+// A number as text to four digits, with a true minus sign.
+const digits = (value) => (value && Math.abs(value) < 1e-4 ? value.toExponential(3) : value.toPrecision(4));
+const said = (value) => digits(value).replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1").replaceAll("-", "−");
 
 // What is chosen: the contact, its shown runs by model, and the run along which the slider moves; ranges of axes.
 let contact, runs, leading, ranges;
