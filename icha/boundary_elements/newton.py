@@ -40,7 +40,10 @@ _NET = 0.6
 # A deviation of sqrt(G/dgamma) that keeps the whole front waiting, and of how much of it.
 _RESTLESS, _FEW = 0.03, 0.05
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
-_SMALLEST_STEP = 2.0**-12
+# Damping of the first step of a front of which more than this part is restless: without, it would lead far up.
+_FAR_DAMPING, _MANY = 0.2, 0.5
+# Smallest part of a step that is tried; what still leads up is damped more, which is cheaper than many short steps.
+_SMALLEST_STEP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +135,7 @@ def front_at_rest(
     coarse = _NEAR if near else _GAP_TO_FRONT
     state = contact if isinstance(contact, Held) else given.at(contact, max(enough, coarse))
     damping, most_off, all_moved = 0.0, coarse, True
-    for _ in range(most_steps or _MAX_STEPS):
+    for number in range(most_steps or _MAX_STEPS):
         now = moving(front, state)
         error = now.error
         if error <= tolerance:
@@ -142,7 +145,10 @@ def front_at_rest(
             state = given.at(state, enough)
             continue
         restless = now.free & (np.abs(now.tension - 1) > _RESTLESS)
-        if all_moved and 0 < np.count_nonzero(restless) <= _FEW * np.count_nonzero(now.front):
+        part_restless = np.count_nonzero(restless) / max(np.count_nonzero(now.front), 1)
+        if number == 0 and part_restless > _MANY:
+            damping = _FAR_DAMPING
+        if all_moved and 0 < part_restless <= _FEW:
             all_moved = False
             contact = mended(state, now.cells[restless])
             if contact is not None:
