@@ -69,7 +69,7 @@ def project_with_campaign(folder):
 
 
 # These hold times.
-MEASURED = ("logs", "benchmarks", "checksums", "run_times.tsv")
+MEASURED = ("logs", "benchmarks", "checksums", "run_times.tsv", "made_with.txt")
 
 
 def results_of(project):
