@@ -34,6 +34,7 @@ def test_the_share_of_the_slope_that_is_noise():
     assert quiet < 0.01 and loud > 0.5
 
 
+@pytest.mark.filterwarnings("ignore:grid")
 @pytest.mark.parametrize("hurst", [0.1, 0.5, 1.0])
 def test_a_spectrum_that_falls_to_its_end_has_no_floor(hurst):
     for short in (SIDE / GRID * 2.001, SIDE / GRID * 8):
@@ -78,6 +79,7 @@ def test_summits_are_those_of_the_surface_that_is_used(looked_at):
         assert scan.measured.grid == GRID
 
 
+@pytest.mark.filterwarnings("ignore:grid")
 def test_summits_as_small_as_pixels_are_to_be_filtered_until_they_are_resolved(looked_at):
     fine = SelfAffineSpectrum(SIDE, 50e-6, 2.001 * SIDE / GRID, 0.8, rms_slope=0.1).realise(GRID, 1)
     scan = looked_at(fine)
