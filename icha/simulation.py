@@ -68,7 +68,9 @@ def simulate(
 
     Parameters
     ----------
-    surface, material, path : what is pressed against what, and how far.
+    surface : the topography, at the rms slope at which it is pressed.
+    material : modulus, energy and range of the interface.
+    path : the loads, areas or separations that are reached, in what order, and which of them keep their spots.
     model : "asperities", or "boundary_elements" in the limit of a short range of attraction, which is slower and needs
         a periodic surface.
     seed : recorded in the dataset; -1 for a surface without one.

@@ -25,7 +25,7 @@ VALIDATION = {
     True: {"contact area": (-25.3, -8.1), "mean separation": (-36.1, -0.8)},
     False: {"contact area": (-21.4, -4.9), "mean separation": (-36.4, -0.8)},
 }
-_VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (docs/validation.md)"
+_VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
 # Of single spots so many may lie outside the range of Wu's formula before it is said where: of every surface some do.
 _FEW = 0.05
@@ -42,7 +42,11 @@ class Statement(NamedTuple):
 
 
 def statements(
-    models: Mapping[str, Collection[str]], adhesive: Collection[bool], outside: str | None, others: Collection[str]
+    models: Mapping[str, Collection[str]],
+    adhesive: Collection[bool],
+    outside: str | None,
+    others: Collection[str],
+    sticky: Collection[str] = (),
 ) -> list[Statement]:
     """What is to be known of the models of a campaign, one line of each kind.
 
@@ -52,13 +56,18 @@ def statements(
     adhesive : whether there are runs of asperities with adhesion, and without.
     outside : where jumps into contact lie outside what was verified, `named`; None if nothing jumps.
     others : surfaces that are not of the kind that the model was validated on.
+    sticky : materials on surfaces that stick to each other without load, as `in_words_if_sticky` names them.
     """
     found = [Statement("models", _used(models))]
     if outside is not None:
         verified = f"Wu's distance is verified for Tabor parameters of {WU_HOLDS_FROM:g} and more"
         found.append(Statement("jump-in", f"{verified}; {outside or 'all cases inside'}", not outside))
+    if sticky:
+        text = f"attraction outweighs repulsion: {named(sticky)}; there errors can be many times those below"
+        found.append(Statement("sticky", text, False))
     if adhesive:
-        but = f"; not of this kind: {named(others)}" if others else ""
+        are = "are not self-affine surfaces" if len(others) > 1 else "is not a self-affine surface"
+        but = f"; {named(others)} {are}: errors may be others there" if others else ""
         found.append(Statement("accuracy", f"{_error(adhesive)} {_VALIDATED}{but}", not others))
     return found
 
@@ -78,7 +87,7 @@ def of_dataset(campaign: xr.DataTree, others: Collection[str] = ()) -> list[Stat
     campaign : the campaign dataset; of one that is left in its file only a few variables are read.
     others : as in `statements`.
     """
-    models, adhesive, shares = {}, set(), {}
+    models, adhesive, shares, sticky = {}, set(), {}, {}
     for name, node in campaign.children.items():
         study = node.to_dataset()
         models[name] = [str(model) for model in study["model"].values]
@@ -88,7 +97,17 @@ def of_dataset(campaign: xr.DataTree, others: Collection[str] = ()) -> list[Stat
             adhesive.add(share is not None)
             if share is not None:
                 shares[surface, material] = max(share, shares.get((surface, material), 0.0))
-    return statements(models, adhesive, _shares_in_words(shares) if shares else None, others)
+                found = study["stickiness"].sel(surface=surface, material=material)
+                sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
+    outside = _shares_in_words(shares) if shares else None
+    return statements(models, adhesive, outside, others, in_words_if_sticky(sticky))
+
+
+def in_words_if_sticky(found: Mapping[tuple[str, str], float]) -> list[str]:
+    """Those materials on surfaces whose stickiness (`icha.asperity.stickiness`) is above 1, by surface and material."""
+    return [
+        f"{material} on {surface} (stickiness {value:.2g})" for (surface, material), value in found.items() if value > 1
+    ]
 
 
 def _shares_in_words(shares):

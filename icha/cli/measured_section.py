@@ -19,7 +19,8 @@ _EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"
 _BOUNDARY = """\
     # What lies beyond the edges. One of:
     #   free        nothing: one square on a half-space that extends beyond it, for asperities only
-    #   window      the same square again, after its heights have been made to fall to their mean towards the edges
+    #   window      the same square again, after its heights have been made to fall to their mean towards the edges;
+    #               the rim is flat and smooth, and with adhesion it may stick as a whole
     #   mirror      its mirror images, in a cell of twice the side, with four times the nodes
     #   periodic    the same square again, as it is: only if opposite edges fit, as those of computed ones do
     boundary:        # to fill in

@@ -74,8 +74,12 @@ def configuration_path(asked: str | None) -> Path:
         If there is no such file.
     """
     if asked is None:
-        own = project() / DEFAULT
-        return shown(own if own.is_file() else workflow_folder() / DEFAULT)
+        if not (project() / DEFAULT).is_file():
+            raise Mistake(
+                f"there is no {DEFAULT} here; name a campaign: {', '.join(sorted(campaigns()))}, or a YAML file. "
+                "`icha new NAME` writes a campaign to start from"
+            )
+        return shown(project() / DEFAULT)
     if Path(asked).is_file():
         return Path(asked)
     there = campaigns()

@@ -21,7 +21,7 @@ def about_scan(name: str, scan, *, to_scale: bool = True) -> Iterator[str]:
 
     to_scale : whether the units of its heights and of its size are known.
     """
-    from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT
+    from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, slope_left
 
     used = scan.used
     nodes = f"{used.grid} x {used.grid} nodes"
@@ -43,7 +43,10 @@ def about_scan(name: str, scan, *, to_scale: bool = True) -> Iterator[str]:
             f"{noise.slope_share:.0%} of its mean square slope"
         )
     if scan.advice:
-        yield f"{name}: advisable: {' and '.join(f'`{key}: {value}`' for key, value in in_yaml(scan.advice).items())}"
+        keys = " and ".join(f"`{key}: {value}`" for key, value in in_yaml(scan.advice).items())
+        cutoff = scan.advice.get("cutoff")
+        leaves = f", which leaves {slope_left(scan.measured, cutoff):.0%} of its rms slope" if cutoff else ""
+        yield f"{name}: advisable: {keys}{leaves}"
 
 
 def in_yaml(advice: Mapping[str, float | int]) -> dict[str, str]:

@@ -59,7 +59,7 @@ def simulate(
     hurst: Annotated[float, typer.Option(help="Hurst exponent.")] = 0.8,
     grid: Annotated[int, typer.Option(help="Grid points along a side.")] = 128,
     seed: Annotated[int, typer.Option(help="Seed of the random phases.")] = 1,
-    rms_slope: Annotated[float | None, _unset("Rms slope to scale to. Left out: 1, or that of the file.")] = None,
+    rms_slope: Annotated[float | None, _unset("Rms slope to scale to. Left out: 1; of a file as measured.")] = None,
     modulus: Annotated[str, typer.Option(help="Contact modulus E*.", callback=_modulus)] = "25 MPa",
     energy: Annotated[str, typer.Option(help="Surface energy.", callback=_energy)] = "50 mJ/m^2",
     interaction_range: Annotated[
@@ -130,9 +130,12 @@ def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope, mode
         except ValueError as error:
             raise ValueError(f"{file}: {error}") from None
     else:
-        from icha.datasets.surface_file import read_surface
+        from icha.datasets.files import read_dataset
+        from icha.datasets.surface_file import as_measured, read_surface
 
         found = read_surface(file)
+        if rms_slope is None:  # scans are kept at rms slope 1
+            rms_slope = as_measured(read_dataset(file)) * found.rms_slope
     return found if rms_slope is None else found.scaled_to_rms_slope(rms_slope)
 
 

@@ -109,6 +109,7 @@ def figure(
                 at, density = points(*truths)
                 every = 1 + len(at) // _TRUTH_MARKERS
                 ax.plot(at, density, color=look["color"], marker=MODEL_MARKERS[name], markevery=every, **_TRUTH)
+                top = max(top, density.max(initial=0.0)) if ax is right else top
             named[name] = model_handle(name, **_TRUTH)
     logarithmic_axes(left)
     logarithmic_axes(right, "y")

@@ -15,7 +15,7 @@ from icha.figures.maps import block_means, draw_whole
 from icha.figures.options import RunFigure, SnapshotFigure
 from icha.figures.select import run_on_topography
 from icha.figures.spots import circles_in_cell, draw_spots
-from icha.figures.style import TWO_COLUMNS, new_figure, number, panel_label, styled, unit_for
+from icha.figures.style import TWO_COLUMNS, material_label, new_figure, number, panel_label, styled, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -155,11 +155,12 @@ def figure(
     load = number(float(run["reduced_pressure"].values[step]))
     load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
     area = rf"$A/A_0$ = {float(run['contact_area_fraction'].values[step]):.3f}"
+    contact = f"{labels.surface}, {material_label(campaign[study].to_dataset(), labels.material)}"
+    fig.suptitle(f"{contact}, {load}", fontsize="medium")
     if solved is None:
-        whole.set_title(f"{load}, {area}", loc="right")
+        whole.set_title(area, loc="right")
     else:
         _draw_solution(panels, view, run, at, solved)
-        fig.suptitle(load, fontsize="medium")
         whole.set_title(f"asperities, {area}", loc="right")
     _frame(panels, enlarged, view)
     bar = fig.colorbar(image, ax=panels, shrink=0.92 if solved is None else 0.46, pad=0.015, aspect=28)

@@ -4,13 +4,15 @@ import math
 from functools import cache
 from pathlib import Path
 
-from icha.analysis.validity import Statement, named, of_dataset, statements
+from icha.analysis.validity import Statement, in_words_if_sticky, named, of_dataset, statements
 from icha.asperity.material import WU_HOLDS_FROM, Material
+from icha.asperity.stickiness import stickiness
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import ASPERITIES
 from icha.planning.roughness import rms_curvature
+from icha.surfaces.moments import SpectralMoments
 
 # Radius of the mean curvature of the summits of a Gaussian surface times its rms curvature (McCool 1986, as in
 # icha.references.summit_theories, for which this would have to wait).
@@ -23,7 +25,7 @@ _LEAST = 0.84
 def expected_validity(campaign: Campaign) -> list[Statement]:
     """What is to be expected, with Tabor parameters of summits of the mean curvature that a Gaussian surface has."""
     curvature = cache(lambda surface: rms_curvature(campaign, surface))
-    adhesive, tabor = set(), {}
+    adhesive, tabor, sticky = set(), {}, {}
     for case in run_cases(campaign):
         section = campaign.materials[case.material]
         if case.model != ASPERITIES:
@@ -31,10 +33,15 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         adhesive.add(section.surface_energy > 0)
         if section.surface_energy > 0:
             material = Material(section.contact_modulus, section.surface_energy, section.interaction_range)
-            radius = _SUMMIT_RADIUS / (curvature(case.surface) * case.rms_slope)
-            tabor.setdefault((case.material, case.surface), []).append(float(material.tabor_parameter(radius)))
+            curved = curvature(case.surface) * case.rms_slope
+            tabor_parameter = float(material.tabor_parameter(_SUMMIT_RADIUS / curved))
+            tabor.setdefault((case.material, case.surface), []).append(tabor_parameter)
+            value = stickiness(SpectralMoments(0.0, case.rms_slope**2 / 2, curved**2), material)
+            at = case.surface, case.material
+            sticky[at] = max(value, sticky.get(at, 0.0))
     models = {name: study.models for name, study in campaign.studies.items()}
-    return statements(models, adhesive, _expected_outside(tabor) if tabor else None, unlike_validated(campaign))
+    outside = _expected_outside(tabor) if tabor else None
+    return statements(models, adhesive, outside, unlike_validated(campaign), in_words_if_sticky(sticky))
 
 
 def _expected_outside(tabor):

@@ -7,11 +7,14 @@ Lubr. Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.surfaces.surface import Surface
+if TYPE_CHECKING:
+    # SciPy, for which commands that need no more than moments do not wait.
+    from icha.surfaces.surface import Surface
 
 
 class SpectralMoments(NamedTuple):
@@ -64,7 +67,7 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     edges, shown, scale = _ring_edges(surface), surface, 1.0
     if surface.free:
         hann = np.sin(np.pi * (np.arange(surface.grid) + 0.5) / surface.grid) ** 2
-        shown = Surface(surface.heights * (hann[:, None] * hann), surface.period)
+        shown = replace(surface, heights=surface.heights * (hann[:, None] * hann), boundary="periodic")
         scale = 1 / np.mean(hann**2) ** 2
 
     def rings(k2, count, power):

@@ -33,7 +33,9 @@ def test_each_kind_is_said_in_one_line():
     text, good = found["accuracy"]
     assert good and text.startswith("contact area 8 to 25 % too small with adhesion and 5 to 21 % without, mean sep")
     assert "contact area 5 to 21 % too small, mean" in told({}, {False}, None, ["scan"])["accuracy"][0]
-    assert told({}, {False}, None, ["scan"])["accuracy"][0].endswith("; not of this kind: scan")
+    assert told({}, {False}, None, ["scan"])["accuracy"][0].endswith(
+        "; scan is not a self-affine surface: errors may be others there"
+    )
     assert set(told({"load": ["boundary_elements"]}, set(), None, [])) == {"models"}
     assert named("abcdef") == "a, b, c, d and 2 more" and named("ab") == "a, b"
 
@@ -42,6 +44,9 @@ def test_the_data_say_where_spots_lay_outside():
     found = {each.about: each for each in of_dataset(small.tree())}
     assert found["models"].text == "asperities in slopes, single"
     assert found["jump-in"].good and found["jump-in"].text.endswith("; all cases inside")
+    sticky = [float(run["stickiness"]) for labels, run in small.runs() if labels.material == "soft"]
+    said = f"soft on rough (stickiness {max(sticky):.2g})"
+    assert (said in found["sticky"].text) if max(sticky) > 1 else "sticky" not in found
     runs = [
         (labels, run.assign(outside_wu_fraction=0.4 + 0 * run["residual"]) if labels.material == "soft" else run)
         for labels, run in small.runs()

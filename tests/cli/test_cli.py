@@ -363,7 +363,9 @@ def test_outside_of_a_clone_the_workflow_that_is_installed_is_used(tmp_path, mon
     monkeypatch.chdir(tmp_path)
     shipped = {path.stem for path in (REPOSITORY / "config/campaigns").glob("*.yaml")}
     assert {*campaigns()} == {*shipped, "paper"}
-    assert icha("describe").output.startswith("paper: ")
+    nothing = icha("run")
+    assert nothing.exit_code == 2 and "no config/config.yaml here; name a campaign: cmc_full, " in nothing.output
+    assert icha("describe", "paper").output.startswith("paper: ")
     assert icha("describe", "smoke").output.startswith("smoke: ")
     taken = icha("new", "smoke")
     assert taken.exit_code == 2 and "smoke is the campaign of " in taken.output

@@ -1,14 +1,19 @@
 """What is expected, before a run, of where the jump into contact lies outside what was verified."""
 
+import re
+
 import numpy as np
 import pytest
 import small_campaign as small
 
+from icha.asperity.material import Material
+from icha.asperity.stickiness import stickiness
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file.write import write_campaign
 from icha.planning.roughness import rms_curvature
 from icha.planning.validity import expected_validity, found_validity
 from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.moments import spectral_moments
 
 CAMPAIGN = """
 name: outside
@@ -56,7 +61,20 @@ def test_materials_and_surfaces_outside_are_named_before_the_run(campaign):
     assert not found["jump-in"].good
     assert "expected outside: below on rough (about 0.63)" in found["jump-in"].text
     assert "bare" not in found["jump-in"].text and "inside on" not in found["jump-in"].text
-    assert found["accuracy"].text.endswith("not of this kind: scan")
+    assert found["accuracy"].text.endswith("; scan is not a self-affine surface: errors may be others there")
+    assert "sticky" not in found
+
+
+def test_surfaces_that_stick_are_named_before_the_run(tmp_path):
+    stiff, soft = "{contact_modulus: 25 MPa, surface_energy: 50", "{contact_modulus: 1 MPa, surface_energy: 500"
+    (tmp_path / "sticky.yaml").write_text(CAMPAIGN.replace(f"inside: {stiff}", f"inside: {soft}"))
+    np.save(tmp_path / "scan.npy", np.random.default_rng(1).normal(size=(40, 40)))
+    campaign = load_configuration(tmp_path / "sticky.yaml").campaign
+    (said,) = [each for each in expected_validity(campaign) if each.about == "sticky"]
+    moments = spectral_moments(small.surface().scaled_to_rms_slope(1.0))
+    exact = stickiness(moments, Material(1e6, 0.5, 8e-9))
+    told = re.fullmatch(r"attraction outweighs repulsion: inside on rough \(stickiness (\S+)\); .*", said.text)
+    assert exact > 1 and float(told.group(1)) == pytest.approx(exact, rel=0.1) and not said.good
 
 
 def test_afterwards_the_dataset_says_it(campaign, tmp_path):

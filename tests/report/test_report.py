@@ -232,7 +232,7 @@ def test_passed_checks_and_a_model_that_holds_are_told_apart(write):
     assert "checks of the results: the equations are solved" in top
     assert re.search(r">inside</b>\s*what the models were verified for", top)
     assert "asperities in slopes, single" in top and "; all cases inside" in top
-    assert "not of this kind" not in top and "in this campaign" not in top
+    assert "self-affine surface:" not in top and "in this campaign" not in top
     beside = write(model_error=compared.errors())
     assert 'in this campaign <a href="#error">contact area ' in beside[: beside.index("</header>")]
 

@@ -5,7 +5,7 @@ import pytest
 from scans import preparation
 
 from icha import SelfAffineSpectrum, Surface
-from icha.surfaces.measured.resolution import noise_floor, scan_resolution
+from icha.surfaces.measured.resolution import noise_floor, scan_resolution, slope_left
 from icha.surfaces.summits import find_summits
 
 SIDE, GRID = 100e-6, 200
@@ -27,6 +27,13 @@ def test_noise_of_each_pixel_is_found_with_its_height(boundary, noise):
     assert floor.power == pytest.approx(power, rel=0.2)
     # The surface ends at 4 um; what is shorter is noise, and so is longer what is lower than the noise.
     assert 3e-6 < floor.wavelength < 4.5e-6
+
+
+def test_the_slope_that_a_cut_off_leaves(looked_at):
+    rough = SPECTRUM.realise(GRID, 1)
+    for cutoff in (4e-6, 8e-6):
+        filtered = looked_at(rough, cutoff=cutoff).used
+        assert slope_left(rough, cutoff) == pytest.approx(filtered.rms_slope / rough.rms_slope, rel=0.05)
 
 
 def test_the_share_of_the_slope_that_is_noise():

@@ -89,6 +89,14 @@ class ScanResolution:
         return found if found.get("cutoff", 0.0) < self.measured.period / RESOLVED_CELLS else {}
 
 
+def slope_left(surface: Surface, cutoff: float) -> float:
+    """Part of a surface's rms slope that the Gaussian filter of a nesting index (m) leaves, by the radial spectrum."""
+    q, power = radial_power_spectrum(surface)
+    slopes = power * q**2 * np.diff(ring_edges(surface) ** 2)
+    transmission = 2.0 ** -((cutoff * q / (2 * np.pi)) ** 2)
+    return math.sqrt(float(np.sum(slopes * transmission**2) / np.sum(slopes)))
+
+
 def scan_resolution(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
     """Look at a scan; arguments and errors as `icha.surfaces.measured.topography.prepared_topography`."""
     raw = {key: preparation[key] for key in preparation if key not in ("cutoff", "taper")}
