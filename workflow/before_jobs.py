@@ -5,6 +5,7 @@ import contextlib
 import gc
 import json
 import os
+import sys
 from base64 import urlsafe_b64decode
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,13 +17,15 @@ from icha.planning.belonging import belongs_to_another, claim
 from icha.publication.environment import note_versions
 from icha.support import checksums
 from icha.support.atomic_files import why_not_writable
+from icha.support.processes import beginning_of
 
 RECORDS = Path(".snakemake/metadata")
 
 
 def end_jobs_with_this_process() -> None:
     """Tell jobs which process wants them, for they end with it: see workflow/scripts/job.py."""
-    os.environ["ICHA_SNAKEMAKE"] = str(os.getpid())
+    if sys.platform == "linux":
+        os.environ["ICHA_SNAKEMAKE"] = f"{os.getpid()} {beginning_of(os.getpid())}"
 
 
 def plan_without_collecting() -> None:

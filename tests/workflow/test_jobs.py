@@ -14,6 +14,7 @@ from conftest import REPOSITORY
 
 from icha.support.atomic_files import whole_file, why_not_writable
 from icha.support.checksums import is_whole, lost, write_checksum
+from icha.support.processes import beginning_of
 
 RESULTS = "results/tiny"
 SCRIPT = f"""
@@ -94,7 +95,8 @@ def test_what_a_job_has_to_say_comes_to_the_terminal_if_its_log_cannot_be_writte
 
 def test_a_job_ends_with_the_snakemake_that_wants_it(job):
     snakemake = subprocess.Popen(["sleep", "600"])
-    process = job(f"    import time\n{WORK}    time.sleep(600)\n", ICHA_SNAKEMAKE=str(snakemake.pid))
+    told = f"{snakemake.pid} {beginning_of(snakemake.pid)}"
+    process = job(f"    import time\n{WORK}    time.sleep(600)\n", ICHA_SNAKEMAKE=told)
     until = time.monotonic() + 60
     while not (job.results / "runs/b.nc").exists() and time.monotonic() < until:
         time.sleep(0.02)
@@ -102,6 +104,48 @@ def test_a_job_ends_with_the_snakemake_that_wants_it(job):
     snakemake.send_signal(signal.SIGKILL)
     snakemake.wait()
     assert ended(process) == (1, "")
+
+
+@pytest.mark.parametrize("reused", [False, True])
+def test_a_job_whose_snakemake_is_gone_before_it_begins_writes_nothing(job, reused):
+    snakemake = subprocess.Popen(["true"])
+    told = f"{snakemake.pid} {beginning_of(snakemake.pid)}"
+    snakemake.wait()
+    if reused:
+        told = f"{os.getpid()} 1"
+    assert ended(job(WORK, ICHA_SNAKEMAKE=told)) == (1, "")
+    assert not (job.results / "runs/b.nc").exists() and lost(job.results) == []
+
+
+def test_a_job_is_killed_with_the_snakemake_that_started_it(job, tmp_path):
+    (tmp_path / "busy.py").write_text(SCRIPT + f"{WORK}    int('7' * 4_000_000)  # in the interpreter, for minutes\n")
+    caller = f"""
+import os, subprocess, sys
+sys.path.insert(0, {str(REPOSITORY)!r})
+from icha.support.processes import beginning_of
+os.environ["ICHA_SNAKEMAKE"] = f"{{os.getpid()}} {{beginning_of(os.getpid())}}"
+sys.set_int_max_str_digits(0)
+process = subprocess.Popen([sys.executable, "-X", "int_max_str_digits=0", "busy.py", "{RESULTS}/logs/b.log"])
+print(process.pid, flush=True)
+process.wait()
+"""
+    snakemake = subprocess.Popen([sys.executable, "-c", caller], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    busy = int(snakemake.stdout.readline())
+    while not (job.results / "runs/b.nc").exists():
+        time.sleep(0.02)
+    snakemake.kill()
+    snakemake.wait()
+    until = time.monotonic() + 5
+    while is_alive(busy) and time.monotonic() < until:
+        time.sleep(0.02)
+    assert not is_alive(busy)
+
+
+def is_alive(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_a_library_that_cannot_write_is_told_apart_from_one_that_will_not(tmp_path):

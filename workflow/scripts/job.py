@@ -1,8 +1,10 @@
 """What the scripts of all jobs share: where they say what they have to say, how they fail, checksums of results."""
 
 import contextlib
+import ctypes
 import os
 import select
+import signal
 import sys
 import threading
 import traceback
@@ -10,9 +12,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from icha.support import checksums
+from icha.support.processes import beginning_of
 
-# Set by the Snakefile: the process that wants the job.
+# Set by the Snakefile: number and beginning of the process that wants the job.
 SNAKEMAKE = "ICHA_SNAKEMAKE"
+_PR_SET_PDEATHSIG = 1  # of prctl(2), Linux
 
 
 def _failures_of_solvers():
@@ -111,11 +115,24 @@ def _say(text, terminal):
 
 
 def _end_with_snakemake():
-    """End this process when Snakemake ends: nobody would know of the results, and the next call makes them, too."""
+    """End this process when Snakemake ends, or now if it has: nobody would know of the results of an orphan.
+
+    Worse, it could replace those of the next call, which computes them, too, and maybe of other values.
+    """
+    if SNAKEMAKE not in os.environ or not hasattr(os, "pidfd_open"):
+        return  # no job of Snakemake, or not on Linux
+    number, _, began = os.environ[SNAKEMAKE].partition(" ")
     try:
-        snakemake = os.pidfd_open(int(os.environ[SNAKEMAKE]))
-    except (AttributeError, KeyError, ValueError, OSError):
-        return  # not on Linux, or not where its processes can be seen
+        snakemake = os.pidfd_open(int(number))
+        # Another process may have the number by now.
+        is_gone = beginning_of(int(number)) != began
+    except (ProcessLookupError, FileNotFoundError):
+        is_gone = True
+    if is_gone:
+        os._exit(1)
+    if os.getppid() == int(number):
+        # The system ends this process at once, whatever it is doing.
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
     def wait():
         select.select([snakemake], [], [])
