@@ -22,6 +22,7 @@ include: "workflow/rules/publish.smk"
 before_jobs.end_jobs_with_this_process()
 
 if workflow.is_main_process:
+    before_jobs.end_with_caller()
     origin = before_jobs.Origin(RESULTS, CAMPAIGN.name, CONFIGURATION.origin, workflow.basedir)
     here = before_jobs.Campaign(RESULTS, dry_run=workflow.output_settings.dryrun)
     if Path(RESULTS).is_dir() and not workflow.output_settings.dryrun:

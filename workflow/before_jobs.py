@@ -17,7 +17,7 @@ from icha.planning.belonging import belongs_to_another, claim
 from icha.publication.environment import note_versions
 from icha.support import checksums
 from icha.support.atomic_files import why_not_writable
-from icha.support.processes import beginning_of
+from icha.support.processes import beginning_of, end_with_parent
 
 RECORDS = Path(".snakemake/metadata")
 
@@ -26,6 +26,12 @@ def end_jobs_with_this_process() -> None:
     """Tell jobs which process wants them, for they end with it: see workflow/scripts/job.py."""
     if sys.platform == "linux":
         os.environ["ICHA_SNAKEMAKE"] = f"{os.getpid()} {beginning_of(os.getpid())}"
+
+
+def end_with_caller() -> None:
+    """End with the `icha run` that has called, however that ends: nobody else would know that this goes on."""
+    if caller := os.environ.get("ICHA_CALLER"):
+        end_with_parent(int(caller))
 
 
 def plan_without_collecting() -> None:

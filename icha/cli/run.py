@@ -262,6 +262,8 @@ def _follow(command: list[str], workflow: Path, log: Path, watch, view) -> tuple
     # The project's own, whatever is installed.
     found = [str(workflow / "workflow/plugins"), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = os.environ | {"ICHA_EVENTS": str(writing), "PYTHONPATH": os.pathsep.join(found)}
+    if sys.platform == "linux":
+        environment["ICHA_CALLER"] = str(os.getpid())
     with view, log.open("w", encoding="utf-8") as said:
         # In a process group of its own, so that Ctrl-C comes to it and its jobs once, from here.
         process = subprocess.Popen(

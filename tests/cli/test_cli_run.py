@@ -152,6 +152,25 @@ def test_it_goes_on_after_it_was_stopped(project):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="processes end with another one on Linux only")
+def test_nothing_goes_on_after_it_was_killed(project):
+    program, how = command(project, "runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..60}}")
+    process = subprocess.Popen(program, stderr=subprocess.STDOUT, **how)
+    assert process.stdout.readline().startswith("[")
+    process.kill()
+    process.communicate()
+    for _ in range(50):
+        left = subprocess.run(["pgrep", "-f", f"snakemake.*{project}"], capture_output=True, text=True).stdout
+        if not left:
+            break
+        time.sleep(0.1)
+    assert not left
+    # And nothing is in the way of the next call.
+    done = run(project, "runs")
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.slow
 def test_a_campaign_that_another_process_runs_is_refused_with_the_reason(project):
     lock = project / ".snakemake/tiny.lock"
     lock.parent.mkdir(exist_ok=True)

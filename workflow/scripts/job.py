@@ -1,10 +1,8 @@
 """What the scripts of all jobs share: where they say what they have to say, how they fail, checksums of results."""
 
 import contextlib
-import ctypes
 import os
 import select
-import signal
 import sys
 import threading
 import traceback
@@ -12,11 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from icha.support import checksums
-from icha.support.processes import beginning_of
+from icha.support.processes import beginning_of, end_with_parent
 
 # Set by the Snakefile: number and beginning of the process that wants the job.
 SNAKEMAKE = "ICHA_SNAKEMAKE"
-_PR_SET_PDEATHSIG = 1  # of prctl(2), Linux
 
 
 def _failures_of_solvers():
@@ -131,8 +128,7 @@ def _end_with_snakemake():
     if is_gone:
         os._exit(1)
     if os.getppid() == int(number):
-        # The system ends this process at once, whatever it is doing.
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        end_with_parent(int(number))
 
     def wait():
         select.select([snakemake], [], [])

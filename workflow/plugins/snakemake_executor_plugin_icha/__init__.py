@@ -8,7 +8,6 @@ run by themselves, as with Snakemake's executor `local`.
 However one of these processes ends, those that it started end with it: Snakemake, the fork server, its forks.
 """
 
-import ctypes
 import json
 import multiprocessing
 import os
@@ -29,11 +28,12 @@ from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.executors.local import common_settings
 from snakemake.script import Snakemake
 
+from icha.support.processes import end_with_parent
+
 __all__ = ["Executor", "common_settings"]
 
 # What `multiprocessing` takes for the status of a process of which only the fork server knew how it ended.
 _SERVER_LOST = 255
-_PR_SET_PDEATHSIG = 1
 
 
 class Executor(LocalExecutor):
@@ -95,7 +95,7 @@ def run_script(script: str, told: Snakemake, benchmark: str | None) -> None:
     """Be a job: run its script, which finds what it is told as `snakemake`, and write what it took."""
     from . import preload
 
-    end_with(preload.SERVER)
+    end_with_parent(preload.SERVER)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     started = time.monotonic()
     sys.argv = [script]
@@ -116,10 +116,3 @@ def _shared_megabytes() -> float:
     """What this process has in memory together with others: nearly all that it was forked with."""
     here = psutil.Process().memory_full_info()
     return (here.rss - here.uss) / 2**20
-
-
-def end_with(parent: int) -> None:
-    """Have this process killed when its parent, the process `parent`, ends, however that does."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)

@@ -6,8 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 import icha
-
-from . import end_with
+from icha.support.processes import end_with_parent
 
 SERVER = os.getpid()
 # The command line, and what only a deposit needs.
@@ -22,7 +21,7 @@ def _modules():
     return [".".join(("icha", *file.with_suffix("").parts)) for file in files if file.parts[0] not in _BESIDES]
 
 
-end_with(os.getppid())
+end_with_parent(os.getppid())
 for _name in [*_modules(), *_LATE]:
     # What is missing here, a job will say.
     with contextlib.suppress(Exception):
