@@ -27,6 +27,8 @@ if workflow.is_main_process:
     here = before_jobs.Campaign(RESULTS, dry_run=workflow.output_settings.dryrun)
     if Path(RESULTS).is_dir() and not workflow.output_settings.dryrun:
         origin.claim()  # those of an older version, of which nothing may be left to do
+else:
+    before_jobs.refuse_superseded()
 
 
 onstart:

@@ -16,7 +16,8 @@ from snakemake.logging import logger
 from icha.planning.belonging import belongs_to_another, claim
 from icha.publication.environment import note_versions
 from icha.support import checksums
-from icha.support.atomic_files import why_not_writable
+from icha.support.atomic_files import is_left_over, why_not_writable
+from icha.support.ownership import Superseded, take_over, while_owned
 from icha.support.processes import beginning_of, end_with_parent
 
 RECORDS = Path(".snakemake/metadata")
@@ -32,6 +33,15 @@ def end_with_caller() -> None:
     """End with the `icha run` that has called, however that ends: nobody else would know that this goes on."""
     if caller := os.environ.get("ICHA_CALLER"):
         end_with_parent(int(caller))
+
+
+def refuse_superseded() -> None:
+    """End the program, one that runs jobs of a call on another machine, if a later call owns the results."""
+    try:
+        with while_owned():
+            pass
+    except Superseded as error:
+        raise SystemExit(f"{error}.") from None
 
 
 def plan_without_collecting() -> None:
@@ -92,6 +102,10 @@ class Campaign:
         """Look at the folder `results`; a dry run changes nothing."""
         self.results = results
         self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
+        if not (dry_run or self._other):
+            # Before anything is looked at: what an earlier call has left running must not change it any more.
+            with contextlib.suppress(OSError):  # where nothing can be written nothing will be computed
+                take_over(f".snakemake/{Path(results).name}.owner")
         not_whole = checksums.damaged(results)
         unknown = dict(_of_unknown_origin(results))
         if self._other and (not_whole or unknown):
@@ -151,9 +165,11 @@ class Campaign:
                 reason = error
             if reason is not None:
                 raise SystemExit(_unwritable(folder, reason.strerror))
-        for folder, _, _ in os.walk(self.results):
+        for folder, _, names in os.walk(self.results):
             if not os.access(folder, os.W_OK | os.X_OK):
                 raise SystemExit(_unwritable(folder, "Permission denied"))
+            for name in filter(is_left_over, names):
+                Path(folder, name).unlink(missing_ok=True)
 
 
 def _unwritable(folder, reason):

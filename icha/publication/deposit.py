@@ -25,7 +25,7 @@ from icha.publication.dictionary import data_dictionary, dictionary_csv
 from icha.publication.licences import known_licence, licence_page
 from icha.publication.readme import readme
 from icha.publication.source import Source
-from icha.support.atomic_files import whole_file
+from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, sha256_of
 
 SOURCE = "source"
@@ -84,10 +84,12 @@ def make_deposit(
         _write(part / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
         with whole_file(archive) as temporary:
             _write_zip(temporary, part, folder.name)
-            # What was here before goes at once, and its checksums with it.
-            archive.unlink(missing_ok=True)
-            _remove(folder)
-            part.rename(folder)
+            sync_folder(part)
+            with moving():
+                # What was here before goes at once, and its checksums with it.
+                archive.unlink(missing_ok=True)
+                _remove(folder)
+                part.rename(folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 

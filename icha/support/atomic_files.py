@@ -1,19 +1,22 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and are still there after a power cut."""
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 
 # As much as libraries want to write at once; a disk on which less is free is full.
 _PROBE = 2**20
+_ENDING = ".part"
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike) -> Iterator[Path]:
+def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Path]:
     """Give a temporary path beside `path`; move it there when the block ends well, remove it when it does not.
 
-    The folder is created if need be.
+    The folder is created if need be. The temporary path is nobody else's: two programs that write the same file do not
+    write into each other's. What is moved is on the disk before, and its name after, unless it need not be `lasting`.
 
     Raises
     ------
@@ -23,10 +26,17 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.part")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}{_ENDING}")
     try:
         yield temporary
-        os.replace(temporary, path)
+        if lasting:
+            _sync(temporary)
+        with moving():
+            os.replace(temporary, path)
+        if lasting:
+            # Some file systems do not know how.
+            with suppress(OSError):
+                _sync(path.parent)
     except Exception as error:
         reason = why_not_writable(path.parent)
         if reason is not None:
@@ -34,6 +44,31 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
         raise
     finally:
         _remove(temporary)
+
+
+def move_only_within(permission: Callable[[], AbstractContextManager]) -> None:
+    """From now on, move files into place only within a context of `permission`, which may raise an error instead."""
+    global _permission
+    _permission = permission
+
+
+def moving() -> AbstractContextManager:
+    """The context in which files are moved into place."""
+    return _permission()
+
+
+def is_left_over(name: str) -> bool:
+    """Whether a file of this name, where nobody writes any more, is what a killed program has left of `whole_file`."""
+    return name.startswith(".") and name.endswith(_ENDING)
+
+
+def sync_folder(folder: Path) -> None:
+    """Have all files below a folder, and their names, on the disk."""
+    for top, _, names in os.walk(folder):
+        for name in names:
+            _sync(Path(top, name))
+        with suppress(OSError):
+            _sync(Path(top))
 
 
 def why_not_writable(folder: Path) -> OSError | None:
@@ -46,6 +81,18 @@ def why_not_writable(folder: Path) -> OSError | None:
     finally:
         _remove(probe)
     return None
+
+
+_permission: Callable[[], AbstractContextManager] = nullcontext
+
+
+def _sync(path: Path) -> None:
+    """Have a file's content, or the names in a folder, on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _remove(file: Path) -> None:

@@ -44,7 +44,7 @@ def write_checksum(results: str | os.PathLike, path: str) -> None:
 
 def begin(results: str | os.PathLike, path: str) -> None:
     """Say that a result is about to be written; until its checksum is, whatever is there counts as whole."""
-    _write(results, path, _BEGUN)
+    _write(results, path, _BEGUN, lasting=False)
 
 
 def distrust(results: str | os.PathLike, path: str) -> None:
@@ -143,8 +143,8 @@ def _read(results, path) -> Checksum | None:
         raise ValueError(f"{_sidecar(results, path)}: no checksum: {error}") from None
 
 
-def _write(results, path, checksum: Checksum) -> None:
-    with whole_file(_sidecar(results, path)) as temporary:
+def _write(results, path, checksum: Checksum, *, lasting: bool = True) -> None:
+    with whole_file(_sidecar(results, path), lasting=lasting) as temporary:
         temporary.write_text(json.dumps(checksum._asdict()) + "\n", encoding="ascii")
 
 

@@ -156,7 +156,7 @@ def test_it_goes_on_after_it_was_stopped(project):
 def test_nothing_goes_on_after_it_was_killed(project):
     program, how = command(project, "runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..60}}")
     process = subprocess.Popen(program, stderr=subprocess.STDOUT, **how)
-    assert process.stdout.readline().startswith("[")
+    at_work(process)
     process.kill()
     process.communicate()
     for _ in range(50):

@@ -14,6 +14,7 @@ from conftest import REPOSITORY
 
 from icha.support.atomic_files import whole_file, why_not_writable
 from icha.support.checksums import is_whole, lost, write_checksum
+from icha.support.ownership import take_over
 from icha.support.processes import beginning_of
 
 RESULTS = "results/tiny"
@@ -97,9 +98,7 @@ def test_a_job_ends_with_the_snakemake_that_wants_it(job):
     snakemake = subprocess.Popen(["sleep", "600"])
     told = f"{snakemake.pid} {beginning_of(snakemake.pid)}"
     process = job(f"    import time\n{WORK}    time.sleep(600)\n", ICHA_SNAKEMAKE=told)
-    until = time.monotonic() + 60
-    while not (job.results / "runs/b.nc").exists() and time.monotonic() < until:
-        time.sleep(0.02)
+    wait_for((job.results / "runs/b.nc").exists)
     assert process.poll() is None
     snakemake.send_signal(signal.SIGKILL)
     snakemake.wait()
@@ -122,6 +121,7 @@ def test_a_job_is_killed_with_the_snakemake_that_started_it(job, tmp_path):
     caller = f"""
 import os, subprocess, sys
 sys.path.insert(0, {str(REPOSITORY)!r})
+from icha.support.ownership import take_over
 from icha.support.processes import beginning_of
 os.environ["ICHA_SNAKEMAKE"] = f"{{os.getpid()}} {{beginning_of(os.getpid())}}"
 sys.set_int_max_str_digits(0)
@@ -131,14 +131,60 @@ process.wait()
 """
     snakemake = subprocess.Popen([sys.executable, "-c", caller], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
     busy = int(snakemake.stdout.readline())
-    while not (job.results / "runs/b.nc").exists():
-        time.sleep(0.02)
+    wait_for((job.results / "runs/b.nc").exists)
     snakemake.kill()
     snakemake.wait()
-    until = time.monotonic() + 5
-    while is_alive(busy) and time.monotonic() < until:
+    wait_for(lambda: not is_alive(busy), seconds=30)  # far less than its work would take
+
+
+def test_a_job_of_an_earlier_call_completes_nothing_that_a_later_one_owns(job, tmp_path, monkeypatch):
+    owner = tmp_path / ".snakemake/tiny.owner"
+    monkeypatch.setenv("ICHA_OWNER", "")
+    take_over(owner)
+    # It writes 25 MPa, and is at it when a later call takes over, whose job has written 30 MPa by the time it goes on.
+    write = f"""
+    from icha.support.atomic_files import whole_file
+    with whole_file('{RESULTS}/runs/b.nc') as temporary:
+        temporary.write_text('25 MPa')
+        print('half way', flush=True)
+        import pathlib, time
+        while not pathlib.Path('go on').exists():
+            time.sleep(0.02)
+"""
+    orphan = job(write)
+    wait_for(lambda: "half way" in (job.results / "logs/b.log").read_text(errors="replace"))
+    take_over(owner)
+    later = write.replace("25 MPa", "30 MPa").replace("while not", "while False and not")
+    assert ended(job(later, log="logs/later.log")) == (0, "")
+    (tmp_path / "go on").touch()
+    assert ended(orphan)[0] == 1
+    assert "the campaign was begun again since" in (job.results / "logs/b.log").read_text()
+    assert (job.results / "runs/b.nc").read_text() == "30 MPa" and is_whole(job.results, "runs/b.nc", thorough=True)
+    assert [file.name for file in (job.results / "runs").iterdir()] == ["b.nc"]
+
+
+def test_a_job_of_an_earlier_call_that_begins_late_touches_no_record_of_a_later_one(job, tmp_path, monkeypatch):
+    monkeypatch.setenv("ICHA_OWNER", "")
+    take_over(tmp_path / ".snakemake/tiny.owner")
+    earlier = os.environ["ICHA_OWNER"]
+    take_over(tmp_path / ".snakemake/tiny.owner")
+    assert ended(job(WORK)) == (0, "")
+    record = (job.results / "checksums/runs/b.nc.json").read_bytes()
+    assert ended(job(WORK.replace("a result", "another result"), ICHA_OWNER=earlier))[0] == 1
+    assert (job.results / "checksums/runs/b.nc.json").read_bytes() == record
+    assert (job.results / "runs/b.nc").read_text() == "a result"
+
+
+def wait_for(what, seconds=120):
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        try:
+            if what():
+                return
+        except FileNotFoundError:
+            pass
         time.sleep(0.02)
-    assert not is_alive(busy)
+    raise AssertionError("in vain")
 
 
 def is_alive(process):
@@ -163,6 +209,15 @@ with whole_file({str(tmp_path / "folder/large.nc")!r}) as temporary:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPOSITORY)
     assert f"OSError: [Errno 27] File too large: '{tmp_path}/folder'" in done.stderr.splitlines()[-1]
     assert list((tmp_path / "folder").iterdir()) == []
+
+
+def test_two_programs_that_write_a_file_do_not_write_into_each_others(tmp_path):
+    with whole_file(tmp_path / "a.txt") as first:
+        first.write_text("the first's")
+        with whole_file(tmp_path / "a.txt") as second:
+            second.write_text("the second's")
+        assert first.read_text() == "the first's"
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["the first's"]
 
 
 def test_what_cannot_be_removed_does_not_hide_the_reason(tmp_path, monkeypatch):

@@ -119,7 +119,7 @@ def calls(tmp_path_factory):
     """The campaign with one run that cannot be written, then with what was in its way removed, then with an edit."""
     slurm_is_needed()
     project = project_with_campaign(tmp_path_factory.mktemp("slurm") / "project")
-    obstacle = project / "results/batches" / Path(SPOILT).with_name(".hertz.nc.part")
+    obstacle = project / "results/batches/checksums" / f"{SPOILT}.json"
     obstacle.mkdir(parents=True)
     batches = ("--group-components", "surfaces=10", "references=10", "runs=6")
     with single_node() as node:
@@ -171,7 +171,7 @@ def test_a_run_that_fails_is_reported_and_stops_no_other(calls):
     *_, reported = call.said.split(f"SLURM-job '{failed}' failed")
     assert reported.count("Error in rule") == 1
     assert f"logs/{Path(SPOILT).with_suffix('.log')}" in reported
-    assert "Error: [Errno 13] Permission denied" in reported and ".hertz.nc.part" in reported
+    assert "Error: [Errno 21] Is a directory" in reported and f"{SPOILT}.json" in reported
     assert call.said.count(f"/{failed}.log") >= 1
 
 
