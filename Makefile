@@ -140,8 +140,12 @@ faults: tamaas
 
 validators-environment: .venv-validators/.installed
 
+# Neither make nor the shell reads what is in a name.
+override DEPOSIT := $(value DEPOSIT)
+export DEPOSIT
+
 validate: validators-environment
-	.venv-validators/bin/python tests/validators/validate.py $(DEPOSIT)
+	@.venv-validators/bin/python tests/validators/validate.py $(OPTIONS) -- "$${DEPOSIT:?needed: a folder or zip}"
 
 clean:
 	rm -rf .snakemake docs/_build

@@ -13,6 +13,7 @@ from icha.cli.reproduce import reproduce
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
+from icha.cli.terminal import say
 from icha.cli.upload import upload
 from icha.cli.verify import verify
 
@@ -29,7 +30,7 @@ def _version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        typer.echo(f"icha {version('icha')}")
+        say(f"icha {version('icha')}")
         raise typer.Exit
 
 

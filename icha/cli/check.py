@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import FAILED, WRONG
+from icha.cli.terminal import say
 from icha.publication.deposit_files import CHECKSUMS
 from icha.support.in_words import counted
 
@@ -42,16 +43,16 @@ def check(
     status = 0
     for file in files:
         if told := _without_checks(file):
-            typer.echo(f"{file}: {told}")
+            say(f"{file}: {told}")
             continue
         try:
             kind, data = kind_of(file)
         except UnknownFile as error:
-            typer.secho(f"Error: {error}", err=True, fg="red")
+            say(f"Error: {error}", err=True, fg="red")
             status = WRONG
             continue
         if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
-            typer.echo(f"{file}: {kind}; it can be read, and has no checks of its own")
+            say(f"{file}: {kind}; it can be read, and has no checks of its own")
             continue
         found = flaws(kind, data) if kind != SOLUTION else []
         tested = 0
@@ -60,12 +61,12 @@ def check(
             found += findings
         if found:
             status = max(status, FAILED)
-            typer.secho(f"{file}: {kind}, {counted(len(found), 'flaw')}", fg="red")
+            say(f"{file}: {kind}, {counted(len(found), 'flaw')}", fg="red")
             for flaw in found:
-                typer.echo(f"    {flaw}")
+                say(f"    {flaw}")
         else:
             numbers = f" ({counted(tested, 'check')} of its numbers)" if tested else ""
-            typer.echo(f"{file}: {kind}, all is well{numbers}")
+            say(f"{file}: {kind}, all is well{numbers}")
     if status:
         raise typer.Exit(status)
 

@@ -17,6 +17,7 @@ from icha.cli.project import (
     workflow_folder,
 )
 from icha.cli.scans import about_scan, check_picture, draw_scans
+from icha.cli.terminal import markup, say
 from icha.support import in_words
 from icha.support.in_words import counted
 
@@ -62,13 +63,13 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
     from icha.surfaces.measured.resolution import scan_resolution
 
     scans = {name: scan_resolution(section.path, section.preparation) for name, section in measured.items()}
-    typer.echo("")
+    say("")
     for name, scan in scans.items():
         for line in about_scan(name, scan):
-            typer.echo(line)
+            say(line)
     if plot is not None:
         draw_scans(scans, plot)
-        typer.echo(f"drawn: {shown(plot)}")
+        say(f"drawn: {shown(plot)}")
 
 
 def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: bool = False, profile=None) -> None:
@@ -97,23 +98,25 @@ def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: 
     results = home / "results" / campaign.name
     items, spoilt = plan(campaign, results), damaged(results)
     console = Console(width=None if sys.stdout.isatty() else 120)
-    console.print(f"[bold]{campaign.name}[/]: {campaign.title}", highlight=False)
-    console.print(f"configuration: {shown(path)}\n", highlight=False)
+    console.print(f"[bold]{campaign.name}[/]: {markup(campaign.title)}", highlight=False)
+    console.print(f"configuration: {markup(shown(path))}\n", highlight=False)
     if runs:
         _list(console, items)
     _summary(console, items, spoilt, cores)
     for statement in expected_validity(campaign):
-        console.print(f"[bold]{statement.about}:[/] {statement.text}", highlight=False, soft_wrap=True)
+        console.print(f"[bold]{statement.about}:[/] {markup(statement.text)}", highlight=False, soft_wrap=True)
     if reason := belongs_to_another(shown(results), campaign.name, path, workflow):
-        console.print(f"[red]not to be run:[/] {reason}", highlight=False, soft_wrap=True)
+        console.print(f"[red]not to be run:[/] {markup(reason)}", highlight=False, soft_wrap=True)
     if problem := licence_problem(campaign):
         console.print(
-            f"[red]not to be published:[/] {shown(path)}: {': '.join(problem)}", highlight=False, soft_wrap=True
+            f"[red]not to be published:[/] {markup(shown(path))}: {markup(': '.join(problem))}",
+            highlight=False,
+            soft_wrap=True,
         )
     if missing := missing_software(campaign):
-        console.print(f"[red]missing:[/] {missing}", highlight=False, soft_wrap=True)
+        console.print(f"[red]missing:[/] {markup(missing)}", highlight=False, soft_wrap=True)
     for lack in wanting(items, cores, results, profile_settings(profile or workflow / "profiles/default")):
-        console.print(f"[red]not enough:[/] {lack}", highlight=False, soft_wrap=True)
+        console.print(f"[red]not enough:[/] {markup(lack)}", highlight=False, soft_wrap=True)
 
 
 def _summary(console, items, damaged, cores) -> None:
@@ -171,12 +174,12 @@ def _summary(console, items, damaged, cores) -> None:
             highlight=False,
         )
     for path in damaged:
-        console.print(f"[red]damaged:[/] {path}: to do again.", highlight=False, soft_wrap=True)
+        console.print(f"[red]damaged:[/] {markup(path)}: to do again.", highlight=False, soft_wrap=True)
     if changed:
         console.print(f"{counted(changed, 'run')} there, but with other settings: to do again.", highlight=False)
     for item in runs:
         if item.reason:
-            console.print(f"[red]failed:[/] {item.path}: {item.reason}", highlight=False)
+            console.print(f"[red]failed:[/] {item.path}: {markup(item.reason)}", highlight=False)
 
 
 def _list(console, items) -> None:

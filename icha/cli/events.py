@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from icha.datasets.results import CHECKS, MODEL_ERROR, REPORT
+from icha.support.printable import printable
 
 # Rules that only collect others' files.
 _TARGETS = ("all", "surfaces", "runs", "references", "dataset", "figures", "report", "publish")
@@ -81,7 +82,7 @@ class Watch:
             case "job_info" if event["rule_name"] not in _TARGETS:
                 job = Job(
                     event["rule_name"],
-                    event["rule_msg"] or event["rule_name"],
+                    printable(event["rule_msg"] or event["rule_name"]),
                     tuple(event["output"] or ()),
                     tuple(_path(log) for log in event["log"] or ()),
                     self.clock(),
@@ -195,7 +196,7 @@ def reason_of(job: Job, folder: Path) -> list[str]:
             continue
         starts = [number for number, line in enumerate(lines) if line.startswith("Error:")]
         if starts:
-            first, *others = lines[starts[-1] :]
+            first, *others = map(printable, lines[starts[-1] :])
             return [first.removeprefix("Error:").strip(), *others]
     return []
 
@@ -212,5 +213,5 @@ def last_line(job: Job, folder: Path) -> str:
             continue
         # Whole lines only.
         said = [line for line in lines[:-1] if line.strip()]
-        return said[-1].strip() if said else ""
+        return printable(said[-1].strip()) if said else ""
     return ""

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from icha.cli.events import Job, Watch, last_line, reason_of
 from icha.support import in_words
+from icha.support.printable import printable
 
 # Running jobs that are shown.
 _MOST_JOBS = 8
@@ -43,7 +44,7 @@ class LiveView:
 
     def tell(self, text: str) -> None:
         """Print a line above the table, where it stays."""
-        self._console.print(Text(text, style="yellow"), soft_wrap=True)
+        self._console.print(Text(printable(text), style="yellow"), soft_wrap=True)
 
     def remark(self, text: str) -> None:
         """Say `text` beside the campaign's name from now on."""

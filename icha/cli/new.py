@@ -12,6 +12,7 @@ import typer
 from icha.cli.measured_section import MeasuredSection, measured_section
 from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, shown, workflow_folder
 from icha.cli.scans import about_scan, check_picture, draw_scans
+from icha.cli.terminal import say
 
 TEMPLATES = Path(__file__).parent / "templates"
 # What explains the keys of a configuration to editors and to people.
@@ -102,10 +103,10 @@ def new(
     against = [] if own is None else _against(file, own)
     if against:
         _write(file, values, f"It runs once `icha describe {name}` says nothing against it any more.")
-    typer.echo(f"{shown(file)} written")
+    say(f"{shown(file)} written")
     if own is not None:
         _tell(own, against, plot)
-    typer.echo(f"next:  icha describe {name}    what it will compute\n       icha run {name}         compute it")
+    say(f"next:  icha describe {name}    what it will compute\n       icha run {name}         compute it")
 
 
 def _write(file: Path, values: dict, runs: str) -> None:
@@ -117,16 +118,16 @@ def _tell(section: MeasuredSection, against: list[str], plot: Path | None) -> No
     """Tell of a scan, what is to fill in, and what else is in the way; draw it if asked."""
     to_scale = not against and not section.to_fill_in.keys() - {"boundary"}
     for line in about_scan(section.name, section.scan, to_scale=to_scale):
-        typer.echo(line)
+        say(line)
     if not to_scale:
-        typer.echo(f"{section.name}: `icha describe` looks at its spectrum once units and size are settled")
+        say(f"{section.name}: `icha describe` looks at its spectrum once units and size are settled")
     if plot is not None:
         draw_scans({section.name: section.scan}, plot)
-        typer.echo(f"drawn: {shown(plot)}")
+        say(f"drawn: {shown(plot)}")
     for key, why in section.to_fill_in.items():
-        typer.secho(f"to fill in: surfaces.{section.name}.{key} ({why})", fg="yellow")
+        say(f"to fill in: surfaces.{section.name}.{key} ({why})", fg="yellow")
     for line in against:
-        typer.secho(f"to settle: {line}", fg="yellow")
+        say(f"to settle: {line}", fg="yellow")
 
 
 def _schema(folder: Path) -> Path:

@@ -37,3 +37,9 @@ Folder = Annotated[
         show_default=False,
     ),
 ]
+Large = Annotated[
+    bool,
+    typer.Option(
+        "--large", help="Accept a deposit with more files, or a zip that unpacks to more, than is good from a stranger."
+    ),
+]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import typer
 
+from icha.cli.terminal import say
 from icha.support.program import own_workflow
 
 CAMPAIGNS = Path("config/campaigns")
@@ -28,19 +29,19 @@ def told(command: Callable) -> Callable:
         try:
             return command(*args, **kwargs)
         except Mistake as mistake:
-            typer.secho(f"Error: {mistake}", err=True, fg="red")
+            say(f"Error: {mistake}", err=True, fg="red")
             raise typer.Exit(WRONG) from None
         except BrokenPipeError:
             # Whoever read our output has seen enough (`icha describe --runs | head`).
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(FAILED) from None
         except MemoryError as error:
-            typer.secho(f"Error: not enough memory: {error or 'nothing is left'}", err=True, fg="red")
+            say(f"Error: not enough memory: {error or 'nothing is left'}", err=True, fg="red")
             raise typer.Exit(FAILED) from None
         except OSError as error:
             # What the system refuses: a folder that cannot be written to, a full disk.
             what = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
-            typer.secho(f"Error: {what}", err=True, fg="red")
+            say(f"Error: {what}", err=True, fg="red")
             raise typer.Exit(FAILED) from None
 
     return call
@@ -134,7 +135,7 @@ def read_configuration(path: Path):
     except ConfigurationError as error:
         raise Mistake(f"the configuration cannot be run:\n{error}") from None
     for warning in configuration.warnings:
-        typer.secho(f"Warning: {warning}", err=True, fg="yellow")
+        say(f"Warning: {warning}", err=True, fg="yellow")
     return configuration
 
 

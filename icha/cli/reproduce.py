@@ -14,6 +14,7 @@ import typer
 
 from icha.cli.options import Cores
 from icha.cli.project import FAILED, Mistake, shown
+from icha.cli.terminal import say
 from icha.support.in_words import counted
 
 # In the folder of a rerun: what was said while its environment was installed.
@@ -87,7 +88,7 @@ def reproduce(
     if temporary and good and not keep:
         shutil.rmtree(folder)
     else:
-        typer.echo(f"what was computed again: {shown(made)}")
+        say(f"what was computed again: {shown(made)}")
     if not good:
         raise typer.Exit(FAILED)
 
@@ -111,7 +112,7 @@ def _computed_again(deposit, folder, campaign, runs, sizes, environment, cores):
 
 
 def _fail(message: str):
-    typer.secho(f"Error: {message}", err=True, fg="red")
+    say(f"Error: {message}", err=True, fg="red")
     raise typer.Exit(FAILED) from None
 
 
@@ -150,7 +151,7 @@ def _program(project: Path, folder: Path, environment: str) -> tuple[list[str], 
         called = [sys.executable, "-c", "from icha.cli import main; main()"]
         return called, {**surroundings(), "PATH": os.environ.get("PATH", ""), "PYTHONPATH": str(project)}
     log = folder / _LOG
-    typer.echo(f"installing the environment of the deposit ({shown(log)})")
+    say(f"installing the environment of the deposit ({shown(log)})")
     python = os.path.realpath(sys.executable)  # that of no environment
     with log.open("w", encoding="utf-8") as said:
         try:
@@ -179,7 +180,7 @@ def _run(program, project: Path, targets: list[str], cores: str | None) -> int:
     from icha.datasets.results import CONFIGURATION
 
     command, variables = program
-    typer.echo(f"computing in {shown(project)}; paths are relative to it")
+    say(f"computing in {shown(project)}; paths are relative to it")
     asked = ["run", CONFIGURATION, *targets, *(["--cores", cores] if cores else [])]
     sys.stdout.flush()
     return _call([*command, *asked], cwd=project, env=variables, stdin=subprocess.DEVNULL)
@@ -213,14 +214,14 @@ def _tell(comparison, status: int) -> bool:
     """Print the comparison; return whether all is reproduced."""
     from icha.publication.rerun_comparison import DIFFERENT, IDENTICAL, TOLERANCE, table
 
-    typer.echo(f"\nthe deposit, and what was computed again:\n\n{table(comparison)}\n")
+    say(f"\nthe deposit, and what was computed again:\n\n{table(comparison)}\n")
     files = counted(len(comparison.files), "file")
     if comparison.verdict == DIFFERENT:
-        typer.secho("different: not everything is reproduced", fg="red")
+        say("different: not everything is reproduced", fg="red")
     elif comparison.verdict == IDENTICAL:
-        typer.secho(f"identical: {files}, every value", fg="green")
+        say(f"identical: {files}, every value", fg="green")
     else:
-        typer.secho(f"within tolerance: {files}, every value to {TOLERANCE:g}", fg="green")
+        say(f"within tolerance: {files}, every value to {TOLERANCE:g}", fg="green")
     if status:
-        typer.secho("Not everything could be computed: see above.", fg="yellow")
+        say("Not everything could be computed: see above.", fg="yellow")
     return comparison.verdict != DIFFERENT

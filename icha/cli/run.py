@@ -27,6 +27,7 @@ from icha.cli.project import (
     shown,
     workflow_folder,
 )
+from icha.cli.terminal import say
 from icha.support.in_words import counted
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
@@ -102,7 +103,7 @@ def run(
             core_count(cores),
             profile=_profile(profile, workflow) if profile else None,
         )
-        typer.echo(planned)
+        say(planned)
         return
     from rich.console import Console
 
@@ -121,7 +122,7 @@ def run(
         _say_what_holds(expected_validity(campaign))
     watch = Watch(expected_seconds(items, f"results/{campaign.name}"), environment=FITTED.workflow.environment)
     if plain or not console.is_terminal:
-        view = PlainView(watch, campaign.name, folder, lambda line: print(line, flush=True))
+        view = PlainView(watch, campaign.name, folder, say)
     else:
         view = LiveView(watch, campaign.name, folder, console)
     log = _log_file(folder, campaign.name)
@@ -139,7 +140,7 @@ def run(
         _tell_what_it_is_worth(campaign, folder / "results" / campaign.name)
     if not status and "publish" in asked:
         deposit = f"{campaign.name}-{campaign.published().version}.zip"
-        print(f"deposit: {shown(folder / 'results' / campaign.name / 'publish' / deposit)}")
+        say(f"deposit: {shown(folder / 'results' / campaign.name / 'publish' / deposit)}")
     if status:
         raise typer.Exit(FAILED)
 
@@ -181,7 +182,7 @@ def _ask_if_wanting(items, asked: list[str], cores: int, results: Path, profile:
     said = "\n".join(["not enough for what is to be done:", *(f"  {lack}" for lack in lacks)])
     if not _at_a_terminal():
         raise Mistake(f"{said}\nNothing was begun; --anyway begins it all the same")
-    typer.secho(said, fg="red")
+    say(said, fg="red")
     if not typer.confirm("Begin all the same?"):
         raise Mistake("nothing was begun")
 
@@ -327,11 +328,11 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
     if status == 0:
         log.unlink(missing_ok=True)  # Snakemake's own has all of it
     if status == 0 and watch.started is None:
-        print("Nothing to do: everything that was asked for is there and up to date.")
+        say("Nothing to do: everything that was asked for is there and up to date.")
     elif ended:
         took = in_words.duration(watch.clock() - watch.called)
         beside = f"; about {in_words.duration(promised)} were expected" if promised and ended == watch.job_count else ""
-        print(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}{beside}")
+        say(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}{beside}")
     incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
     if incomplete:
         _heading(f"{counted(len(incomplete), 'run')} could not be computed to the end:")
@@ -349,7 +350,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
                 reason or [f"it ended without a message, perhaps killed (out of memory?); see {logs or log}"],
             )
             if logs:
-                typer.echo(f"    log: {logs}")
+                say(f"    log: {logs}")
     if status and results.is_dir() and (reason := why_not_writable(results)):
         # Logs are there as well, so jobs may not have been able to say it.
         _heading(f"{shown(results)} cannot be written to: {reason.strerror}. The same command goes on once it can.")
@@ -360,7 +361,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
         _heading("Snakemake could not go on:" if ended else "Snakemake could not start:")
         _reason(None, _last_words(log.read_text(encoding="utf-8", errors="replace")))
     elif status and kept_back:
-        typer.echo(f"{counted(kept_back, 'job')} not done, since they need what failed")
+        say(f"{counted(kept_back, 'job')} not done, since they need what failed")
     # Where nothing was made, what is there is of another day.
     made = (
         ("figures", results / "figures"),
@@ -369,9 +370,9 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
     )
     for what, path in made if ended or not status else ():
         if path.exists():
-            print(f"{what + ':':<9}{shown(path)}")
+            say(f"{what + ':':<9}{shown(path)}")
     if status:
-        typer.echo(f"log:     {shown(log)}")
+        say(f"log:     {shown(log)}")
 
 
 def _tell_what_it_is_worth(campaign, results: Path) -> None:
@@ -383,24 +384,24 @@ def _tell_what_it_is_worth(campaign, results: Path) -> None:
     files = campaign_files(campaign)
     found = read_checks(results / files.checks)
     passed = sum(check.passed for check in found)
-    print(f"checks:  {passed if passed < len(found) else 'all'} of {len(found)} passed: the equations are solved")
-    print("Whether the models hold here is another question:")
+    say(f"checks:  {passed if passed < len(found) else 'all'} of {len(found)} passed: the equations are solved")
+    say("Whether the models hold here is another question:")
     _say_what_holds(found_validity(campaign, results / files.dataset))
 
 
 def _say_what_holds(statements) -> None:
     for statement in statements:
-        typer.secho(f"{statement.about + ':':<10}{statement.text}", fg=None if statement.good else "yellow")
+        say(f"{statement.about + ':':<10}{statement.text}", fg=None if statement.good else "yellow")
 
 
 def _heading(text: str) -> None:
-    typer.secho(text, fg="red")
+    say(text, fg="red")
 
 
 def _reason(name: str | None, lines: list[str]) -> None:
     if name is not None:
-        typer.secho(f"  {name}", bold=True)
+        say(f"  {name}", bold=True)
     for line in lines[:_MOST_LINES]:
-        typer.echo(f"    {line}")
+        say(f"    {line}")
     if len(lines) > _MOST_LINES:
-        typer.echo(f"    … and {len(lines) - _MOST_LINES} more lines in its log")
+        say(f"    … and {len(lines) - _MOST_LINES} more lines in its log")

@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import Mistake
+from icha.cli.terminal import say
+from icha.support.printable import printable
 
 _BARS = " ▁▂▃▄▅▆▇█"
 _WIDTH = 60
@@ -47,7 +49,7 @@ def show(
         from icha.cli.quick_plot import draw
 
         draw(kind, data, plot)
-        typer.echo(f"drawn:   {plot}")
+        say(f"drawn:   {plot}")
 
 
 def show_run(run, name: str) -> None:
@@ -57,12 +59,11 @@ def show_run(run, name: str) -> None:
     def value(variable):
         return float(run[variable])
 
-    say = typer.echo
-    say(f"{name}: {run.attrs.get('title', 'run')}")
-    place = [run.attrs[key] for key in ("campaign", "study") if run.attrs.get(key)]
+    say(f"{name}: {printable(run.attrs.get('title', 'run'))}")
+    place = [printable(run.attrs[key]) for key in ("campaign", "study") if run.attrs.get(key)]
     if place:
         say(f"campaign {' and study '.join(place)}")
-    say(f"model:    {run.attrs.get('contact_model', 'unknown').replace('_', ' ')}")
+    say(f"model:    {printable(run.attrs.get('contact_model', 'unknown')).replace('_', ' ')}")
     say(
         f"material: E* {quantity(value('contact_modulus'), 'Pa')}, surface energy "
         f"{quantity(value('surface_energy'), 'J/m²')}, range {quantity(value('interaction_range'), 'm')}, "
@@ -73,7 +74,7 @@ def show_run(run, name: str) -> None:
         f"{quantity(value('rms_height'), 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
     )
     if "incomplete" in run.attrs:
-        typer.secho(f"failed:   {run.attrs['incomplete']}", fg="red")
+        say(f"failed:   {printable(run.attrs['incomplete'])}", fg="red")
     steps = run.sizes["step"]
     if not steps:
         say("no step was reached")
@@ -113,11 +114,10 @@ def _show_surface(surface, file) -> None:
     from icha.datasets.surface_file import as_measured
     from icha.figures.style import quantity
 
-    say = typer.echo
-    say(f"{file}: {surface.attrs.get('title', 'surface')}")
+    say(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
     for key in ("summary", "boundary", "source_file", "preparation"):
         if key in surface.attrs:
-            say(f"{key.replace('_', ' ')}: {surface.attrs[key]}")
+            say(f"{key.replace('_', ' ')}: {printable(surface.attrs[key])}")
     say("")
     scale = as_measured(surface)
     if scale != 1:
@@ -139,8 +139,7 @@ def _show_surface(surface, file) -> None:
 def _show_campaign(tree, file) -> None:
     from icha.datasets.labels import LABELS
 
-    say = typer.echo
-    say(f"{file}: {tree.attrs.get('title', 'campaign')}")
+    say(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
     say(tree.attrs.get("summary", ""))
     for name, node in tree.children.items():
         study = node.to_dataset()
@@ -149,7 +148,7 @@ def _show_campaign(tree, file) -> None:
         meanings = study["status"].attrs.get("flag_meanings", "").split()
         numbers = {word: int((status == k).sum()) for k, word in enumerate(meanings)}
         counts = ", ".join(f"{number} {word}" for word, number in numbers.items() if number)
-        say(f"\n{name}: {sizes}; {counts}")
+        say(f"\n{printable(name)}: {sizes}; {counts}")
         say(f"  models {', '.join(study['model'].values)}")
         for label, variable in (("A/A0", "contact_area_fraction"), ("p*", "reduced_pressure")):
             values = study[variable].values
@@ -158,7 +157,8 @@ def _show_campaign(tree, file) -> None:
         if "failure" in study:
             for where in zip(*(study["failure"] != "").values.nonzero(), strict=True):
                 labels = [str(study[d].values[k]) for d, k in zip(study["failure"].dims, where, strict=True)]
-                typer.secho(f"  failed: {', '.join(labels)}: {study['failure'].values[where]}", fg="red")
+                reason = printable(study["failure"].values[where])
+                say(f"  failed: {printable(', '.join(labels))}: {reason}", fg="red")
 
 
 def sparkline(values) -> str:

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import FAILED, Mistake, shown
+from icha.cli.terminal import say
 from icha.support import in_words
 
 TOKEN = "ZENODO_TOKEN"
@@ -74,7 +75,7 @@ def upload(
         files, metadata = _contents(archive, Path(folder))
         _refuse_foreign_doi(metadata, draft)
         place = f"draft {draft}" if draft else f"a new version of {new_version_of}" if new_version_of else "a new draft"
-        typer.echo(_summary(metadata, files, f"{address}, {place}"))
+        say(_summary(metadata, files, f"{address}, {place}"))
         _ask(yes)
         _send(archive, files, metadata, address, token, draft, new_version_of, publish, yes)
 
@@ -165,7 +166,7 @@ def _ask(yes: bool) -> None:
     if not sys.stdin.isatty():
         raise Mistake("there is no terminal to ask at, so nothing is sent; needed: --yes, or a terminal")
     if not _confirmed("Send it?"):
-        typer.echo("Nothing was sent.")
+        say("Nothing was sent.")
         raise typer.Exit(FAILED)
 
 
@@ -178,7 +179,7 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
             draft = server.draft(number)
         else:
             draft = server.new_version(new_version_of) if new_version_of else server.create()
-        typer.echo(f"draft:     {draft.page}")
+        say(f"draft:     {draft.page}")
         sums = {path.name: md5_of(path) for path in files}
         there = {file.name for file in draft.files if file.md5 == sums.get(file.name)}
         others = []
@@ -193,26 +194,26 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
         server.describe(draft, metadata)
         for path in files:
             if path.name in there:
-                typer.echo(f"{path.name}: is there already")
+                say(f"{path.name}: is there already")
                 continue
             confirmed = server.upload(draft, path, sums[path.name])
             checked = "its checksum is right" if confirmed else "the server gives no checksum"
-            typer.echo(f"{path.name}: sent, {checked}")
+            say(f"{path.name}: sent, {checked}")
         if others:
-            typer.echo(f"The draft also has other files, which stay there: {', '.join(others)}")
+            say(f"The draft also has other files, which stay there: {', '.join(others)}")
         if draft.doi:
-            typer.echo(f"DOI:       {draft.doi} (reserved)")
+            say(f"DOI:       {draft.doi} (reserved)")
         if publish and (yes or _confirmed("Publish it? What is published cannot be deleted.")):
             published = server.publish(draft)
-            typer.echo(f"published: {published.page}\nDOI:       {published.doi}")
+            say(f"published: {published.page}\nDOI:       {published.doi}")
         else:
-            typer.echo("It is a draft. Look at it, and publish it, on its page.")
+            say("It is a draft. Look at it, and publish it, on its page.")
     except (ZenodoError, OSError, KeyboardInterrupt) as error:
         with contextlib.suppress(OSError):
-            typer.secho(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")
+            say(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")
         if draft is not None:
             server_option = "" if address == ZENODO else f" --url {address}"
-            typer.echo(
+            say(
                 f"A draft is left: {draft.page}\nTo continue with it:   icha upload {shown(archive)}"
                 f"{server_option} --draft {draft.number}",
                 err=True,
@@ -225,5 +226,5 @@ def _confirmed(question: str) -> bool:
     try:
         return sys.stdin.isatty() and typer.confirm(question)
     except typer.Abort:
-        typer.echo()
+        say()
         return False

@@ -25,6 +25,7 @@ from icha.publication.dictionary import data_dictionary, dictionary_csv
 from icha.publication.licences import known_licence, licence_page
 from icha.publication.readme import readme
 from icha.publication.source import Source
+from icha.publication.strangers_files import flaw_of_name
 from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, sha256_of
 
@@ -63,11 +64,12 @@ def make_deposit(
     Raises
     ------
     ValueError
-        If a file is not what its job wrote, if a check failed that is not among the known failures, or if one of these
-        is none.
+        If a file is not what its job wrote or has a name that not every system can have, if a check failed that is not
+        among the known failures, or if one of these is none.
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files = sorted(files)
+    _refuse_names(files)
     _refuse_unknown_failures(results, publication)
     _refuse_changed(results, files)
     part = folder.with_name(f".{folder.name}.part")
@@ -92,6 +94,12 @@ def make_deposit(
                 part.rename(folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+def _refuse_names(files: Iterable[str]) -> None:
+    """Refuse names that `verify` would: of what the configuration names, for all others are ours."""
+    if wrong := [f"  {file!r} {flaw}" for file in files if (flaw := flaw_of_name(file))]:
+        raise ValueError("not published, for these names; needed: others, for the same files:\n" + "\n".join(wrong))
 
 
 def _refuse_unknown_failures(results: Path, publication: Publication) -> None:

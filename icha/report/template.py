@@ -9,6 +9,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from icha.support import in_words
+from icha.support.printable import printable_lines
 
 # A table has so many rows at most.
 MOST_ROWS = 300
@@ -24,7 +25,7 @@ _SYMBOLS = (
 
 def _symbols(text: str) -> Markup:
     """Set the symbols of plain text: E*, A0, h'rms."""
-    result = str(escape(text))
+    result = str(escape(printable_lines(text)))
     for pattern, replacement in _SYMBOLS:
         result = pattern.sub(replacement, result)
     return Markup(result)
@@ -57,6 +58,8 @@ def template(name: str) -> jinja2.Template:
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
+        # Titles, names and messages of failed runs: what a browser would turn round is written out.
+        finalize=lambda value: printable_lines(value) if type(value) is str else value,
     )
     environment.filters |= {
         "symbols": _symbols,

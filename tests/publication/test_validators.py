@@ -6,7 +6,7 @@ import zipfile
 
 import netCDF4
 import pytest
-from outside_validators import validated
+from outside_validators import REPOSITORY, python_of_validators, validated
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +27,13 @@ def deposit(folder, unit="Pa", where="study"):
         load.setncatts({"long_name": "load", "units": unit, "coordinates": where})
         load[:] = [1.0, 2.0, 3.0]
         data["study"].createVariable("study", "f8", ()).setncatts({"long_name": "number of the study", "units": "1"})
-    sums = subprocess.run(["sha256sum", "data.nc"], cwd=folder, capture_output=True, check=True).stdout
+    return sealed(folder)
+
+
+def sealed(folder):
+    """The folder with the checksums of its files."""
+    names = sorted(file.name for file in folder.iterdir() if file.name != "SHA256SUMS")
+    sums = subprocess.run(["sha256sum", *names], cwd=folder, capture_output=True, check=True).stdout
     (folder / "SHA256SUMS").write_bytes(sums)
     return folder
 
@@ -50,18 +56,53 @@ def test_a_good_file_passes_in_a_folder_and_in_an_archive(kind, tmp_path):
     assert re.search(r"compliance-checker: passed; (\d+) of \1 points, 2 groups of 1 files", done.stdout), done.stdout
 
 
-def test_a_unit_that_is_none_and_a_file_that_was_changed_are_seen(tmp_path):
-    folder = deposit(tmp_path / "mine", unit="pascalish")
-    (folder / "SHA256SUMS").write_text(f"{'0' * 64}  data.nc\n")
-    done = validated(folder, *NAMES)
+def test_a_unit_that_is_none_is_seen(tmp_path):
+    done = validated(deposit(tmp_path / "mine", unit="pascalish"), *NAMES)
     assert done.returncode == 1
-    assert failed(done) == list(NAMES), done.stdout
+    assert failed(done) == ["compliance-checker", "cf-units"], done.stdout
     assert "data.nc:/study/load" in done.stdout
+
+
+@pytest.mark.parametrize("listed", ["/etc/passwd", "/dev/zero", "data.nc"])
+def test_what_is_not_whole_is_not_looked_at(listed, tmp_path):
+    """Neither what the list of checksums names elsewhere, nor anything else."""
+    folder = deposit(tmp_path / "mine")
+    with (folder / "SHA256SUMS").open("a") as sums:
+        sums.write(f"{'0' * 64}  {listed}\n")
+    done = validated(folder, *NAMES)
+    assert done.returncode == 1 and "is not whole" in done.stderr
+    assert "SHA256SUMS, line 3" in done.stdout and "passed" not in done.stdout
+
+
+def test_a_small_zip_is_not_unpacked_to_a_large_folder(tmp_path):
+    with zipfile.ZipFile(tmp_path / "mine.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        with archive.open("mine/zeros", "w") as file:
+            for _ in range(200):
+                file.write(bytes(1_000_000))
+        archive.writestr("mine/ro-crate-metadata.json", "{}")
+        archive.writestr("mine/SHA256SUMS", "")
+    done = validated(tmp_path / "mine.zip", *NAMES)
+    assert done.returncode == 1 and "to 200 MB; allowed: 50 times its size" in done.stdout
+
+
+def test_make_hands_any_name_over_as_it_is(tmp_path):
+    """No shell and no make reads it."""
+    names = ["a b.zip", "$(touch made).zip", "$$(touch made).zip", "$(shell touch made).zip", "'; touch made; '.zip"]
+    names += ["`touch made`.zip", '"; touch made; ".zip']
+    python_of_validators()
+    for name in names:
+        command = ["make", "validate", "-o", "validators-environment", f"DEPOSIT={tmp_path}/{name}"]
+        done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
+        assert done.returncode and f"{tmp_path}/{name}: is not whole" in done.stderr, done.stderr
+        assert not (REPOSITORY / "made").exists()
 
 
 def test_what_is_no_deposit_is_refused(tmp_path):
     done = validated(tmp_path)
+    assert done.returncode == 1 and "SHA256SUMS: is missing" in done.stdout
+    (tmp_path / "SHA256SUMS").touch()
+    done = validated(tmp_path)
     assert done.returncode == 1 and "is no deposit" in done.stderr
     (tmp_path / "ro-crate-metadata.json").write_text("{}")
-    done = validated(tmp_path, "cffconvert", "sha256sum")
+    done = validated(sealed(tmp_path), "cffconvert", "sha256sum")
     assert done.returncode == 1 and "CITATION.cff is missing" in done.stdout

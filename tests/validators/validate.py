@@ -2,7 +2,8 @@
 
     .venv-validators/bin/python tests/validators/validate.py DEPOSIT
 
-DEPOSIT is its folder or its zip archive. One line for each validator; the status is 1 if one of them fails.
+DEPOSIT is its folder or its zip archive. It is verified first, and only one that is whole is put to them. One line for
+each validator; the status is 1 if one of them fails.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ import sys
 import tempfile
 import traceback
 import warnings
-import zipfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
-sys.path.insert(0, str(Path(__file__).parent))
+# Neither the package nor these modules are installed beside the validators.
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
 
 CRATE = "ro-crate-metadata.json"
 PROFILE = "provenance-run-crate-0.5"
@@ -240,6 +241,8 @@ VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
 
 def validate(folder: Path, names: list[str], most: int) -> bool:
     """Run validators and print what they say; whether all are content."""
+    from icha.support.printable import printable
+
     good = True
     for name in names:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
@@ -254,38 +257,39 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
         print(f"{name}: {verdict}; {outcome.counted}, {len(outcome.problems)} problems, {len(outcome.remarks)} remarks")
         for kind, messages in (("problem", outcome.problems), ("remark", outcome.remarks)):
             for message in messages[:most]:
-                print(f"  {kind}: {message}")
+                print(f"  {kind}: {printable(message)}")
             if len(messages) > most:
                 print(f"  … and {len(messages) - most} more (--all)")
     return good
 
 
-def root_of(folder: Path) -> Path:
-    """The folder of the crate: the one given, or the only one in it that is a crate, as in archives."""
-    found = [path.parent for path in (folder / CRATE, *folder.glob(f"*/{CRATE}")) if path.exists()]
-    if not found:
-        sys.exit(f"{folder}: is no deposit: there is no {CRATE} in it")
-    return found[0]
-
-
 def main() -> int:
     """Validate what the command line names."""
+    from icha.publication.deposit_files import verify_deposit
+    from icha.publication.strangers_files import LARGE, LIMITS, NO_LIMITS, looked_through, unpack
+    from icha.support.printable import printable
+
     parser = argparse.ArgumentParser(description="Put a deposit to the validators of others, without any network.")
     parser.add_argument("deposit", type=Path, help="a folder or a zip archive")
     parser.add_argument("--only", nargs="+", choices=VALIDATORS, default=list(VALIDATORS), metavar="NAME")
     parser.add_argument("--all", action="store_true", help="all messages, and not the first five of a kind")
+    parser.add_argument(LARGE, action="store_true", help="accept more files, and zips that unpack to more")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
-    most = sys.maxsize if arguments.all else 5
-    if arguments.deposit.is_dir():
-        return 0 if validate(root_of(arguments.deposit.resolve()), arguments.only, most) else 1
-    if not zipfile.is_zipfile(arguments.deposit):
-        parser.error(f"{arguments.deposit} is neither a folder nor a zip archive")
-    with tempfile.TemporaryDirectory() as scratch:
-        with zipfile.ZipFile(arguments.deposit) as archive:
-            archive.extractall(scratch)
-        return 0 if validate(root_of(Path(scratch)), arguments.only, most) else 1
+    deposit, name = arguments.deposit.absolute(), printable(arguments.deposit)
+    limits = NO_LIMITS if arguments.large else LIMITS
+    if problems := verify_deposit(deposit, limits):
+        print(*problems, sep="\n")
+        sys.exit(f"{name}: is not whole, so no validator has seen it")
+    with looked_through(deposit, limits) as found, tempfile.TemporaryDirectory() as scratch:
+        if CRATE not in found.sizes:
+            sys.exit(f"{name}: is no deposit: there is no {CRATE} in it")
+        folder = deposit
+        if not deposit.is_dir():
+            folder = Path(scratch)
+            unpack(found, folder)
+        return 0 if validate(folder, arguments.only, sys.maxsize if arguments.all else 5) else 1
 
 
 if __name__ == "__main__":

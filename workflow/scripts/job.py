@@ -12,6 +12,7 @@ from pathlib import Path
 from icha.support import checksums
 from icha.support.atomic_files import move_only_within
 from icha.support.ownership import while_owned
+from icha.support.printable import printable_lines
 from icha.support.processes import beginning_of, end_with_parent
 
 # Set by the Snakefile: number and beginning of the process that wants the job.
@@ -100,7 +101,7 @@ def _refuse_damaged(results, inputs):
 
 def _say(text, terminal):
     """Print to the log; to the terminal if that cannot be written, on a full disk for one."""
-    line = f"{text}\n".encode()
+    line = f"{printable_lines(text)}\n".encode()
     try:
         sys.stdout.flush()
         if os.write(1, line) == len(line):

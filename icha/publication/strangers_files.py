@@ -1,0 +1,210 @@
+"""Folders and zips that strangers made: looked through before anything in them is read, and read within limits.
+
+Whatever a name, a kind of file or a size may do to us ends here. `looked_through` gives the files and all that is wrong
+with them; who goes on only where nothing is wrong, reads files that lie in the deposit, no links or devices, no more
+bytes than are declared, and no more than `LIMITS` allow for the size of the zip.
+"""
+
+import contextlib
+import os
+import re
+import shutil
+import stat
+import unicodedata
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from icha.support import in_words
+from icha.support.printable import is_printable, printable
+
+_BLOCK = 1 << 20
+# What of a name most systems can have: of a part, of a path.
+_LONGEST_PART, _LONGEST = 255, 1000
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_ENCRYPTED = 0x1
+
+
+class Limits(NamedTuple):
+    """How many files there may be, and by how much a zip may unpack: so many times its size, and `allowance` bytes."""
+
+    files: float
+    ratio: float
+    allowance: int
+
+
+# Deposits of ICHA are stored, not compressed; who packs them again gains a factor of three or so.
+LIMITS = Limits(files=200_000, ratio=50, allowance=100_000_000)
+# What is asked for by `LARGE`, as options of commands are.
+LARGE, NO_LIMITS = "--large", Limits(float("inf"), float("inf"), 0)
+
+
+class Found(NamedTuple):
+    """The files of a folder or a zip: their sizes by their paths, what is wrong with them, how one is opened."""
+
+    sizes: dict[str, int]
+    flaws: list[str]
+    open: Callable[[str], AbstractContextManager[BinaryIO]]
+
+
+@contextlib.contextmanager
+def looked_through(path: Path, limits: Limits = LIMITS) -> Iterator[Found]:
+    """The files of a folder, or of a zip with a single folder in it, whose name is no part of their paths.
+
+    Raises
+    ------
+    OSError, ValueError, zipfile.BadZipFile
+        If it cannot be read at all.
+    """
+    if path.is_dir():
+        yield _in_folder(path, limits)
+        return
+    if not path.is_file():
+        raise ValueError("is neither a folder nor a file")
+    with zipfile.ZipFile(path) as archive:
+        yield _in_zip(archive, path.stat().st_size, limits)
+
+
+def flaw_of_name(name: str) -> str:
+    """Why a path is not one in a deposit on every system; empty if it is."""
+    parts = name.split("/")
+    if name.startswith("/") or re.match("[A-Za-z]:", name):
+        return "is an absolute path"
+    if any(part in ("", ".", "..") for part in parts):
+        return "leads elsewhere, or nowhere"
+    if "\\" in name:
+        return "has a backslash, which separates folders elsewhere"
+    if not is_printable(name):
+        return "has characters that cannot be seen"
+    if len(name.encode()) > _LONGEST or max(len(part.encode()) for part in parts) > _LONGEST_PART:
+        return "is too long"
+    return ""
+
+
+def _in_folder(folder: Path, limits: Limits) -> Found:
+    sizes: dict[str, int] = {}
+    flaws: list[str] = []
+    for name, status in _walk(folder):
+        if stat.S_ISREG(status.st_mode):
+            sizes[name] = status.st_size
+        else:
+            flaws.append(f"{printable(name)}: is no file of its own")
+        if len(sizes) + len(flaws) > limits.files:
+            return Found({}, [_too_many(f"more than {limits.files:,}", limits)], _nothing)
+    flaws += [f"{printable(name)}: the name {flaw}" for name in sizes if (flaw := flaw_of_name(name))]
+    sizes = dict(sorted(sizes.items()))
+    return Found(sizes, [*sorted(flaws), *_clashes(sizes)], lambda name: (folder / name).open("rb"))
+
+
+def _walk(folder: Path) -> Iterator[tuple[str, os.stat_result]]:
+    """Paths below a folder of all that is no folder; links are not followed."""
+    pending = [""]
+    while pending:
+        inside = pending.pop()
+        for entry in os.scandir(folder / inside):
+            if entry.is_dir(follow_symlinks=False):
+                pending.append(f"{inside}{entry.name}/")
+            else:
+                yield f"{inside}{entry.name}", entry.stat(follow_symlinks=False)
+
+
+def _in_zip(archive: zipfile.ZipFile, size: int, limits: Limits) -> Found:
+    entries = archive.infolist()
+    if len(entries) > limits.files:
+        return Found({}, [_too_many(f"{len(entries):,}", limits)], _nothing)
+    flaws = [f"{printable(entry.orig_filename)}: {flaw}" for entry in entries if (flaw := _flaw_of_entry(entry))]
+    tops = {entry.filename.partition("/")[0] for entry in entries}
+    files = [entry for entry in entries if not entry.is_dir()]
+    if not flaws and (len(tops) != 1 or any("/" not in entry.filename for entry in files)):
+        held = [printable(top) for top in sorted(tops)[:5]] + ["…"] * (len(tops) > 5)
+        flaws = [f"holds {', '.join(held) or 'nothing'}; allowed: a single folder, the deposit"]
+    if flaws:
+        return Found({}, flaws, _nothing)
+    there: dict[str, zipfile.ZipInfo] = {}
+    for entry in files:
+        name = entry.filename.partition("/")[2]
+        if name in there:
+            flaws.append(f"{name}: is there more than once")
+        there[name] = entry
+    if flaw := _flaw_of_sizes(files, size, limits):
+        return Found({}, [*flaws, flaw], _nothing)
+    sizes = {name: entry.file_size for name, entry in there.items()}
+    return Found(sizes, [*flaws, *_clashes(sizes)], lambda name: archive.open(there[name]))
+
+
+def _flaw_of_entry(entry: zipfile.ZipInfo) -> str:
+    mode = entry.external_attr >> 16 if entry.create_system == 3 else 0
+    kind = stat.S_IFDIR if entry.is_dir() else stat.S_IFREG
+    for name in (entry.orig_filename, entry.filename):
+        if flaw := flaw_of_name(name.removesuffix("/")):
+            return f"the name {flaw}"
+    if stat.S_IFMT(mode) not in (0, kind):
+        return "is a link, a device or another thing that is no file"
+    if mode & (stat.S_ISUID | stat.S_ISGID | stat.S_ISVTX):
+        return f"has the mode {stat.S_IMODE(mode):04o}; allowed: no special bits"
+    if entry.flag_bits & _ENCRYPTED or entry.compress_type not in _METHODS:
+        return "is encrypted, or compressed by another method than deflate"
+    return ""
+
+
+def _flaw_of_sizes(files: list[zipfile.ZipInfo], size: int, limits: Limits) -> str:
+    unpacked, packed = sum(entry.file_size for entry in files), sum(entry.compress_size for entry in files)
+    most = limits.ratio * size + limits.allowance
+    if packed > size:
+        return f"its files overlap: they take {in_words.size(packed)}, and the zip has {in_words.size(size)}"
+    if unpacked > most:
+        return (
+            f"unpacks from {in_words.size(size)} to {in_words.size(unpacked)}; allowed: {limits.ratio} times its size "
+            f"and {in_words.size(limits.allowance)}, or more with {LARGE}"
+        )
+    return ""
+
+
+def _clashes(names) -> list[str]:
+    """Paths that are the same on systems that know no upper and lower case, and files that are folders of others."""
+    found, seen = [], {}
+    for name in names:
+        folded = unicodedata.normalize("NFC", name).casefold()
+        if folded in seen:
+            found.append(f"{printable(name)}: is {printable(seen[folded])} on some systems")
+        seen[folded] = name
+    for folded, name in seen.items():
+        above = (folded[:k] for k, character in enumerate(folded) if character == "/")
+        found += [
+            f"{printable(seen[each])}: is a file, and the folder of {printable(name)}" for each in above if each in seen
+        ]
+    return found
+
+
+def _too_many(count: str, limits: Limits) -> str:
+    return f"holds {count} files; allowed: {limits.files:,}, or more with {LARGE}"
+
+
+def _nothing(name: str):
+    raise KeyError(name)
+
+
+def blocks(found: Found, name: str) -> Iterator[bytes]:
+    """The content of a file; ValueError if it is not as long as was declared."""
+    left = found.sizes[name]
+    with found.open(name) as file:
+        while block := file.read(min(_BLOCK, left + 1)):
+            left -= len(block)
+            if left < 0:
+                break
+            yield block
+    if left:
+        raise ValueError(f"has not the {found.sizes[name]:,} bytes that are declared")
+
+
+def unpack(found: Found, folder: Path) -> None:
+    """Write the files into a new or empty folder; OSError if they do not fit there."""
+    needed, free = sum(found.sizes.values()), shutil.disk_usage(folder).free
+    if needed > free:
+        raise OSError(f"{folder}: {in_words.size(needed)} are needed, and {in_words.size(free)} are free")
+    for name in found.sizes:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        with (folder / name).open("xb") as file:
+            file.writelines(blocks(found, name))

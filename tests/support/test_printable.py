@@ -1,0 +1,58 @@
+"""What comes from files and jobs acts on no terminal, log or page."""
+
+import sys
+import unicodedata
+
+import pytest
+
+from icha.cli.events import Job, last_line, reason_of
+from icha.cli.project import Mistake, told
+from icha.cli.terminal import markup, say
+from icha.report.template import template
+from icha.support.printable import is_printable, printable, printable_lines
+
+EVIL = "a\x1b[2J\x9b1m\r\b\x07\x7f\u202eb\u2028c\u200b"
+
+
+def test_nothing_acts_on_a_terminal():
+    assert printable(EVIL) == r"a\x1b[2J\x9b1m\r\x08\x07\x7f\u202eb\u2028c\u200b"
+    assert printable("a\nb\tc") == r"a\nb\tc" and printable_lines("a\nb\tc") == "a\nb\tc"
+    # The kinds of characters by the standard, not by the list of the module: whatever is left is none of them, but for
+    # joiners, and signs of Arabic, Syriac, Egyptian and music, which are seen.
+    left = printable("".join(map(chr, range(sys.maxunicode + 1))))
+    kinds = {unicodedata.category(each) for each in left} - {"Cf"}
+    assert not kinds & {"Cc", "Cs", "Zl", "Zp"}
+    assert not [each for each in left if unicodedata.bidirectional(each) in ("LRE", "RLE", "LRO", "RLO", "PDF")]
+    assert not [each for each in left if unicodedata.bidirectional(each) in ("LRI", "RLI", "FSI", "PDI")]
+
+
+@pytest.mark.parametrize("text", ["", "plain", "Höhe 25 µm", "می‌خواهم", "日本語", "👩‍🔬", "a  b", "A/A0 ≤ 0.1 – yes"])
+def test_what_people_write_stays(text):
+    assert printable(text) == printable_lines(text) == text and is_printable(text)
+
+
+def test_commands_say_nothing_else(capsys):
+    say(EVIL, fg="red")
+    say(f"two\n{EVIL}", err=True)
+    with pytest.raises(Exception, match="2"):
+        told(lambda: (_ for _ in ()).throw(Mistake(EVIL)))()
+    out, err = capsys.readouterr()
+    assert r"\x1b[2J" in out and r"\x1b[2J" in err and err.startswith("two\n")
+    assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(out + err)
+    assert markup("[red]x[/] \x1b") == r"\[red]x\[/] \x1b"
+
+
+def test_messages_of_jobs_are_printable(tmp_path):
+    (tmp_path / "log").write_text(f"working\nError: {EVIL}\nmore \x1b[1A\n", encoding="utf-8")
+    job = Job("run", "title", ("out",), ("log",), 0.0)
+    assert all(map(is_printable, [*reason_of(job, tmp_path), last_line(job, tmp_path)]))
+    assert any(r"\x1b[2J" in line for line in reason_of(job, tmp_path))
+
+
+def test_pages_hold_no_overrides_and_no_control_characters():
+    page = template("explorer.html").environment.from_string(
+        "{{ title }} {{ title | symbols }} {{ n }} {{ safe | safe }}"
+    )
+    text = page.render(title=EVIL + "<b>", n=3, safe="<i>\u200d</i>")
+    assert not set("\x1b\x9b\r\b\u202e\u2028") & set(text)
+    assert text.count(r"\u202e") == 2 and "<b>" not in text and text.endswith("3 <i>\u200d</i>")
