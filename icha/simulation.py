@@ -28,6 +28,7 @@ from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD
 from icha.path.waypoints import Waypoint
 from icha.support.rules import Integer
 from icha.surfaces.moments import spectral_moments
+from icha.surfaces.summits import count_summits
 from icha.surfaces.surface import Surface
 
 # Snapshots farther up, in h_rms, are far above any contact.
@@ -92,30 +93,46 @@ def simulate(
     """
     _check_arguments(surface, material, path)
     chosen = _model(model)
-    table = RUN | FURTHER[model]
     seed = Integer(-1).checked("seed", seed)
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
         observables = chosen.observables(surface, material, path)
-        pressure_unit = material.contact_modulus * surface.rms_slope
-        met = _followed(observables, path, pressure_unit, progress)
-        values = {
-            **_of_path(table, path, met, surface.grid),
-            "united_until": path.united_until if chosen.united_by_rule else "",
-            **_of_surface(surface, material, seed),
-            **observables.of_contact(),
-            **bin_values("gap", gap_bins(surface)),
-            **bin_values("pressure", PRESSURE_BINS * pressure_unit),
-        }
-        described_here = table | CYCLE | _targets(table, path)
-        dataset = build(described_here, values, _attributes(surface, material, path, model, chosen))
+        met = _followed(observables, path, material.contact_modulus * surface.rms_slope, progress)
+        dataset = _dataset(surface, material, path, model, seed, met, observables.of_contact())
     if met.failure:
-        raise ConvergenceError(met.failure, dataset.assign_attrs(incomplete=met.failure)) from None
+        raise ConvergenceError(met.failure, dataset) from None
     if path.unload:
         pull_off = met.snapshots[-1]["snapshot_step"]
         loop = hysteresis(met.steps, pull_off, material, observables.largest_tension)
         dataset = dataset.assign(described(LOOP, loop))
     return dataset
+
+
+def unfollowed(
+    surface: Surface, material: Material, path: Path, reason: str, *, model: str = ASPERITIES, seed: int = -1
+) -> xr.Dataset:
+    """The dataset of a run of which nothing can be computed: no step, and the reason in the attribute `incomplete`.
+
+    Arguments are those of `simulate`.
+    """
+    met = _Met([], [], [], reason)
+    return _dataset(surface, material, path, model, seed, met, {"asperity_count": count_summits(surface)})
+
+
+def _dataset(surface, material, path, name, seed, met, of_contact):
+    """All of a run but the loop as a whole; with the reason why it ends early, if it does."""
+    chosen, table = _model(name), RUN | FURTHER[name]
+    values = {
+        **_of_path(table, path, met, surface.grid),
+        "united_until": path.united_until if chosen.united_by_rule else "",
+        **_of_surface(surface, material, seed),
+        **of_contact,
+        **bin_values("gap", gap_bins(surface)),
+        **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.rms_slope)),
+    }
+    described_here = table | CYCLE | _targets(table, path)
+    dataset = build(described_here, values, _attributes(surface, material, path, name, chosen))
+    return dataset.assign_attrs(incomplete=met.failure) if met.failure else dataset
 
 
 def _model(name: str) -> Model:
@@ -162,12 +179,12 @@ def _followed(observables, path, pressure_unit, progress) -> _Met:
 
     def keep_snapshot(target, state, step):
         asked = {"snapshot_step": step, "snapshot_kind": target.kind, "snapshot_target": target.value}
-        snapshots.append(asked | observables.of_snapshot(state))
+        snapshots.append(_finite(asked | observables.of_snapshot(state)))
 
     try:
         for waypoint in follow(contact, path, pressure_unit, progress):
             state = waypoint.state
-            steps.append(_step(contact, waypoint, pressure_unit) | observables.of_step(state))
+            steps.append(_finite(_step(contact, waypoint, pressure_unit) | observables.of_step(state)))
             if waypoint.target.snapshot:
                 keep_snapshot(waypoint.target, state, len(steps) - 1)
             events.append(Events.joined(()) if before is None else contact.events_between(before, state))
@@ -181,6 +198,15 @@ def _followed(observables, path, pressure_unit, progress) -> _Met:
     except NotConverged as error:
         failure = f"the path ends {error}"
     return _Met(steps, snapshots, events, failure)
+
+
+def _finite(values: dict) -> dict:
+    """The values of an equilibrium, all of which are finite: one that has others is none."""
+    for name, value in values.items():
+        numbers = np.asarray(value)
+        if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
+            raise NotConverged(f"with values of {name} that are not finite")
+    return values
 
 
 def _step(contact: ContactModel, waypoint: Waypoint, pressure_unit: float) -> dict:
@@ -222,7 +248,7 @@ def _of_path(table: Table, path: Path, met: _Met, grid: int) -> dict:
     values |= joined(table, met.snapshots, "spot", "snapshot")
     if not path.cyclic:
         return values
-    counts, events = [len(each) for each in met.events], Events.joined(met.events)
+    counts, events = np.array([len(each) for each in met.events], int), Events.joined(met.events)
     return values | {
         **stacked(CYCLE, met.steps, "step"),
         "event_kind": events.kind,

@@ -43,11 +43,7 @@ def _read(section):
 def measured_roughness(surface) -> Roughness:
     """Of an `icha.Surface` that is there."""
     from icha.surfaces.moments import spectral_moments
-    from icha.surfaces.summits import find_summits
+    from icha.surfaces.summits import count_summits
 
     moments = spectral_moments(surface)
-    try:
-        summits = len(find_summits(surface))
-    except ValueError:  # there is none, as its runs will say
-        summits = 0
-    return roughness_of(surface.grid, surface.period, moments.m0, moments.m2, moments.m4, summits)
+    return roughness_of(surface.grid, surface.period, moments.m0, moments.m2, moments.m4, count_summits(surface))

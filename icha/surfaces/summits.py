@@ -128,6 +128,14 @@ def find_summits(surface: Surface) -> Asperities:
     )
 
 
+def count_summits(surface: Surface) -> int:
+    """Number of summits of a surface; 0 if it has none."""
+    try:
+        return len(find_summits(surface))
+    except ValueError:
+        return 0
+
+
 def _spline_coefficients(heights):
     """Coefficients (n, n) of the periodic quintic spline through the heights."""
     coefficients = np.empty_like(heights)

@@ -7,12 +7,14 @@ import small_campaign as small
 
 from icha.analysis.checks import check_campaign, read_checks
 from icha.datasets.campaign import campaign_tree, select_run
-from icha.datasets.files import read_campaign, read_run, write_dataset
+from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
+from icha.datasets.format import RUN, flaws
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 from icha.figures.drawing import draw_figure
 from icha.figures.fig2_area_and_gap import figure
 from icha.figures.select import NothingToDraw
+from icha.surfaces.surface import Surface
 
 ATTRIBUTES = {"campaign": "small", "study": "sticky", "config_sha256": "0", "license": "CC0-1.0"}
 PATH = {"reduced_pressures": [1e-3], "snapshots": [("reduced_pressure", 1e-3)]}
@@ -26,17 +28,29 @@ def scripts(request, monkeypatch):
     monkeypatch.syspath_prepend(str(request.config.rootpath / "workflow/scripts"))
 
 
+def ridges():
+    """A surface without summits."""
+    heights = np.cos(2 * np.pi * np.arange(32) / 32)[:, None] * np.ones(32)
+    return Surface(1e-6 * heights, 100e-6).scaled_to_rms_slope(1.0)
+
+
+def pitted():
+    """A rough surface with a pit of some sixty rms heights."""
+    heights = np.array(small.SPECTRUM.realise(grid=64, seed=1).heights)
+    heights[5, 7] -= 160 * np.std(heights)
+    return Surface(heights, 100e-6).scaled_to_rms_slope(1.0)
+
+
 @pytest.fixture
 def sweep(tmp_path):
-    """Press the same surface against a material by the job's own script; give the file."""
+    """Press a surface, always the same one unless another is given, by the job's own script; give the file."""
     from run_sweep import run_sweep
 
-    write_surface(tmp_path / "surface.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
-
-    def run(name, material, path=PATH):
-        said = []
+    def run(name, material, path=PATH, surface=None, model="asperities"):
+        said, topography = [], tmp_path / f"{name}-surface.nc"
+        write_surface(topography, small.surface() if surface is None else surface, name="rough", seed=1)
         run_sweep(
-            tmp_path / "surface.nc",
+            topography,
             tmp_path / f"{name}.nc",
             rms_slope=1.0,
             seed=1,
@@ -44,6 +58,7 @@ def sweep(tmp_path):
             path=path,
             attributes=ATTRIBUTES,
             progress=said.append,
+            model=model,
         )
         return tmp_path / f"{name}.nc", said
 
@@ -52,11 +67,12 @@ def sweep(tmp_path):
 
 @pytest.fixture
 def dataset(tmp_path):
-    """Put files of runs into a campaign dataset by the job's own script; give its file."""
+    """Put files of runs, by material, or by surface/material, into a campaign dataset by the job's own script."""
     from make_dataset import make_dataset
 
-    def make(files):
-        labels = [tuple(RunLabels("sticky", "asperities", "rough", 1, 1.0, name)) for name in files]
+    def make(files, model="asperities"):
+        names = [name.rpartition("/") for name in files]
+        labels = [tuple(RunLabels("sticky", model, surface or "rough", 1, 1.0, name)) for surface, _, name in names]
         make_dataset(
             files.values(), tmp_path / "c.nc", labels=labels, attributes={"title": "Sticky", "config_sha256": "1"}
         )
@@ -125,9 +141,78 @@ def test_a_campaign_of_failed_runs_only_is_a_dataset_and_an_empty_page(sweep, da
     assert all(file.stat().st_size > 1000 for file in files)
 
 
-def test_other_errors_still_fail_the_job(sweep, tmp_path):
-    with pytest.raises(ValueError, match="beyond what the model covers"):
-        sweep("wrong", BARE, PATH | {"snapshots": [("relative_load", 1e3)]})
+BOTH_WAYS = PATH | {"unload": True}
+
+
+@pytest.mark.parametrize("path", [PATH, BOTH_WAYS], ids=["loading", "both ways"])
+@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
+def test_a_surface_that_a_model_cannot_compute_costs_no_other_run(sweep, dataset, model, path):
+    odd, said = sweep("ridges", BARE, path, ridges(), model)
+    # A pit is the surface's own matter.
+    pit, _ = sweep("pit", BARE, path, pitted(), model)
+    run = read_run(odd)
+    assert run.attrs["incomplete"] == (
+        "nothing was computed: heights: the surface has no summit with negative-definite curvature"
+    )
+    assert said == [f"Failed: {run.attrs['incomplete']}"]
+    assert run.sizes["step"] == 0 and int(run["asperity_count"]) == 0
+    assert not flaws(RUN, run.assign_attrs(config_sha256=64 * "0"))
+    again, _ = sweep("again", BARE, path, ridges(), model)
+    assert again.read_bytes() == odd.read_bytes()
+    file, labels = dataset({"ridges/bare": odd, "pitted/bare": pit}, model)
+    tree = read_campaign(file)
+    assert tree["sticky"]["status"].values.ravel().tolist() == [1, 0]
+    failed = [check for check in check_campaign(tree, labels) if not check.passed]
+    assert [(check.name, check.description) for check in failed] == [("completed", run.attrs["incomplete"])]
+    np.testing.assert_array_equal(
+        select_run(tree, labels[1])["nominal_pressure"].values, read_run(pit)["nominal_pressure"].values
+    )
+
+
+@pytest.mark.parametrize("path", [{"snapshots": [("relative_load", 1e3)]}, {"snapshots": [("mean_separation", 1.0)]}])
+def test_a_state_that_there_is_not_on_this_surface_is_a_failed_run(sweep, path):
+    run = read_run(sweep("far", BARE, PATH | path)[0])
+    assert run.sizes["step"] == 0 and run.attrs["incomplete"].startswith("nothing was computed: path: ")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [ZeroDivisionError("division by zero"), IndexError("out of bounds"), np.linalg.LinAlgError("singular matrix")],
+)
+def test_whatever_the_data_raise_is_a_failed_run(sweep, monkeypatch, error):
+    def raising(*arguments):
+        raise error
+
+    monkeypatch.setattr("icha.simulation.follow", raising)
+    file, said = sweep("odd", BARE)
+    run = read_run(file)
+    assert str(error) in run.attrs["incomplete"] and run.sizes["step"] == 0
+    # What nobody expected is for the developers: its traceback is in the log.
+    assert any("Traceback" in line for line in said) == (not isinstance(error, ValueError))
+
+
+def test_values_that_are_not_finite_end_a_run_and_leave_what_came_before(sweep, dataset, monkeypatch):
+    from icha.equilibrium.observables import AsperityObservables
+
+    of_step, count = AsperityObservables.of_step, iter(range(9))
+    monkeypatch.setattr(
+        AsperityObservables, "of_step", lambda *own: of_step(*own) | {"residual": np.nan if next(count) else 0.0}
+    )
+    file, _ = sweep("odd", BARE, {"reduced_pressures": [1e-3, 3e-3, 1e-2]})
+    run = read_run(file)
+    assert run.sizes["step"] == 1
+    assert run.attrs["incomplete"] == "the path ends with values of residual that are not finite"
+    assert dataset({"odd": file})[0].exists()
+
+
+@pytest.mark.parametrize("error", [MemoryError("no room"), OSError(28, "No space left on device"), ImportError("none")])
+def test_what_the_machine_lacks_is_no_result(sweep, tmp_path, monkeypatch, error):
+    def raising(*arguments):
+        raise error
+
+    monkeypatch.setattr("icha.simulation.follow", raising)
+    with pytest.raises(type(error)):
+        sweep("wrong", BARE)
     assert not (tmp_path / "wrong.nc").exists()
 
 
@@ -136,3 +221,18 @@ def test_a_way_back_that_breaks_off_keeps_its_reason_through_its_file(tmp_path):
     write_dataset(run.isel(step=slice(0, 6)).assign_attrs(incomplete="the path ends there"), tmp_path / "run.nc")
     taken = select_run(campaign_tree([(labels, read_run(tmp_path / "run.nc"))]), labels)
     assert taken.attrs["incomplete"] == "the path ends there" and taken.sizes["step"] == 6
+
+
+def test_theories_that_hold_for_no_such_surface_are_left_out(tmp_path, capsys):
+    from make_references import make_references
+
+    # A single cap on a free square: its moments are those of no isotropic Gaussian surface.
+    x = np.linspace(-1, 1, 32)
+    cap = Surface(-1e-6 * (x[:, None] ** 2 + x**2), 100e-6, "free").scaled_to_rms_slope(1.0)
+    write_surface(tmp_path / "cap.nc", cap, name="cap", seed=1)
+    make_references(
+        tmp_path / "cap.nc", tmp_path / "theories.nc", settings={"kind": "measured"}, adhesive=[], attributes={}
+    )
+    found = read_dataset(tmp_path / "theories.nc")
+    assert "persson_area_fraction" in found and not [name for name in found if name.startswith("greenwood")]
+    assert "No theories of separate summits" in capsys.readouterr().out

@@ -1,5 +1,7 @@
 """Press one surface against one material along a loading path."""
 
+import traceback
+
 from job import attributes, guarded
 
 from icha.asperity.material import Material
@@ -7,20 +9,33 @@ from icha.contact.models import ASPERITIES
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
-from icha.simulation import ConvergenceError, simulate
+from icha.simulation import ConvergenceError, simulate, unfollowed
+
+# What this machine lacks says nothing of the run: its job fails, and the next call tries again.
+OF_THE_MACHINE = (OSError, MemoryError, ImportError)
 
 
 def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, progress, model=ASPERITIES):
     """Load the surface of the file `surface`, scaled to `rms_slope`, and write the run dataset to `output`.
 
     Of a run that fails the file holds the stops that were reached, and says why there are no more: the campaign goes
-    on, and its verdict lists the run.
+    on, and its verdict lists the run. So do errors of any other kind, for surface, material and path are all that they
+    can come from.
     """
-    scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
+    pressed = read_surface(surface).scaled_to_rms_slope(rms_slope), Material(**material), Path(**path)
     try:
-        dataset = simulate(scaled, Material(**material), Path(**path), model=model, seed=seed, progress=progress)
+        dataset = simulate(*pressed, model=model, seed=seed, progress=progress)
     except ConvergenceError as error:
         dataset = error.dataset
+    except OF_THE_MACHINE:
+        raise
+    except Exception as error:
+        reason = f"nothing was computed: {error}"
+        if not isinstance(error, ValueError):
+            reason = f"{type(error).__name__}, which was not expected: {error}"
+            progress(traceback.format_exc())
+        dataset = unfollowed(*pressed, reason, model=model, seed=seed)
+    if "incomplete" in dataset.attrs:
         progress(f"Failed: {dataset.attrs['incomplete']}")
     write_dataset(dataset.assign_attrs(attributes), output)
 

@@ -12,7 +12,7 @@ import scipy.fft
 from icha.surfaces.measured.cutoff import LEAST_PIXELS
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import radial_power_spectrum, ring_edges
-from icha.surfaces.summits import find_summits
+from icha.surfaces.summits import count_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 # The spectrum of a self-affine surface falls at least as q^-2 (its Hurst exponent is not negative), that of
@@ -57,10 +57,7 @@ class ScanResolution:
     @cached_property
     def summits(self) -> int:
         """Number of summits of the prepared surface."""
-        try:
-            return len(find_summits(self.used))
-        except ValueError:  # there is none, as its runs will say
-            return 0
+        return count_summits(self.used)
 
     @property
     def cells_per_summit(self) -> float:
