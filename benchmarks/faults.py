@@ -2,17 +2,19 @@
 
     python benchmarks/faults.py [--parts PART ...] [--trials N] [--seed N] [--scratch FOLDER]
 
-Processes are killed, the disk is full, results are read-only, files are cut off and bits flipped, and two calls are
-made at once. Whatever happens, no result may be there that is not, byte for byte, that of an undisturbed campaign; and
-the next call goes on to the end by itself, or says what to do. The counts go to benchmarks/results/faults.json, and
-from there to docs/faults.md (benchmarks/faults_page.py). Needs Linux, and for disks that are full or read-only the
-right to mount (root, or user namespaces).
+Processes are killed, the power is cut, the disk is full, results are read-only, files are cut off and bits flipped,
+results are those of other settings, folders have odd names, and two calls are made at once. Whatever happens, no
+result may be there that is not, byte for byte, that of an undisturbed campaign; and the next call goes on to the end
+by itself, or says what to do. The counts go to benchmarks/results/faults.json, and from there to docs/faults.md
+(benchmarks/faults_page.py). Needs Linux, and for disks the right to mount: power cuts need root, disks that are full
+or read-only do with user namespaces.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import fcntl
 import hashlib
 import itertools
 import json
@@ -20,6 +22,7 @@ import os
 import random
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -75,11 +78,13 @@ class Place:
         place = ["--snakefile", str(self.project / "Snakefile"), "--directory", str(self.folder)]
         return [*program, *place, *arguments, "--configfile", str(self.configuration)]
 
-    def start(self, way: str = "snakemake", *arguments: str, before: Iterable[str] = ()) -> subprocess.Popen:
+    def start(
+        self, way: str = "snakemake", *arguments: str, before: Iterable[str] = (), **variables: str
+    ) -> subprocess.Popen:
         """Start a call in a session of its own; what it says goes to a file outside of the place."""
         name, _, value = self.mark.partition("=")
         found = os.pathsep.join([str(self.project), str(self.project / "workflow/plugins")])
-        environment = os.environ | {"PYTHONPATH": found, "OMP_NUM_THREADS": "1", name: value}
+        environment = os.environ | {"PYTHONPATH": found, "OMP_NUM_THREADS": "1", name: value} | variables
         said = tempfile.TemporaryFile("w+", encoding="utf-8")
         process = subprocess.Popen(
             [*before, *self.command(way, *arguments)],
@@ -93,9 +98,11 @@ class Place:
         process.said = said
         return process
 
-    def run(self, way: str = "snakemake", *arguments: str, before: Iterable[str] = ()) -> tuple[int, str]:
+    def run(
+        self, way: str = "snakemake", *arguments: str, before: Iterable[str] = (), **variables: str
+    ) -> tuple[int, str]:
         """A call to its end: its status, and all that it said."""
-        return self.end(self.start(way, *arguments, before=before))
+        return self.end(self.start(way, *arguments, before=before, **variables))
 
     def end(self, process: subprocess.Popen) -> tuple[int, str]:
         """Wait for a call; its status, and all that it said."""
@@ -196,7 +203,7 @@ class Reference:
 
     def __init__(self, project: Path, scratch: Path, **options):
         self.project, self.scratch, self.options = project, scratch, options
-        self._numbers = itertools.count()
+        self.numbers = itertools.count()
         self.place = Place(project, scratch / "reference", **options)
         started = time.monotonic()
         status, said = self.place.run()
@@ -207,7 +214,7 @@ class Reference:
 
     def empty(self, inside: Path | None = None) -> Place:
         """A place where nothing was computed yet."""
-        return Place(self.project, inside or self.scratch / f"trial{next(self._numbers)}", **self.options)
+        return Place(self.project, inside or self.scratch / f"trial{next(self.numbers)}", **self.options)
 
     def copy(self, inside: Path | None = None) -> Place:
         """A place where everything was computed."""
@@ -247,7 +254,7 @@ def sentence(said: str, *words: str) -> str:
 
 # --- kills --------------------------------------------------------------------------------------------------------
 
-VICTIMS = ("Snakemake", "the whole session", "a job", "the process that the jobs are forked from")
+VICTIMS = ("Snakemake", "the whole session", "a job", "the process that the jobs are forked from", "icha run")
 
 
 def kill(place: Place, reference: Reference, victim: str, moment: float, chance: random.Random) -> list[str] | None:
@@ -256,7 +263,7 @@ def kill(place: Place, reference: Reference, victim: str, moment: float, chance:
     None if the call ended before.
     """
     before = place.times()
-    process = place.start()
+    process = place.start("icha run" if victim == VICTIMS[4] else "snakemake")
     time.sleep(moment)
     found: list[int] = []
     while not found and process.poll() is None:
@@ -372,6 +379,131 @@ def full_disks(reference: Reference, chance: random.Random) -> Iterator[Trial]:
         rooms = [0.0, *(chance.uniform(0.05, 1.0) for _ in range(4)), chance.uniform(1.0, 1.5), None, None]
         for number, room in enumerate(rooms):
             yield full_disk(reference, what, room, chance.uniform(0.1, 0.6), WAYS[number % 2])
+
+
+# --- power cuts -----------------------------------------------------------------------------------------------------
+
+# ext4 as it is hardest for programs: names may be on the disk before the data that they stand for.
+HARDEST = "loop,noauto_da_alloc,data=writeback"
+# EXT4_IOC_SHUTDOWN with EXT4_GOING_FLAGS_NOLOGFLUSH (Linux, fs/ext4/ext4.h): from now on nothing gets to the disk.
+_SHUTDOWN, _WITHOUT_FLUSH = 0x8004587D, struct.pack("I", 2)
+
+
+@contextlib.contextmanager
+def power(folder: Path, image: Path) -> Iterator[tuple[Callable[[], None], Callable[[], None]]]:
+    """A disk of its own at `folder`; gives functions that cut its power, and mount it again."""
+
+    def mount():
+        subprocess.run(["mount", "-o", HARDEST, str(image), str(folder)], check=True)
+
+    def cut():
+        top = os.open(folder, os.O_RDONLY)
+        fcntl.ioctl(top, _SHUTDOWN, _WITHOUT_FLUSH)
+        os.close(top)
+
+    with image.open("wb") as file:
+        file.truncate(2**28)
+    subprocess.run(["mkfs.ext4", "-q", "-F", str(image)], check=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    mount()
+    try:
+        yield cut, mount
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+        image.unlink()
+
+
+def power_cut(reference: Reference, moment: float, way: str) -> Trial:
+    """Run on a disk whose power is cut after `moment` seconds: what was not forced to it by then is lost."""
+    place = reference.empty()
+    with power(place.folder, place.folder.with_suffix(".disk")) as (cut, mount):
+        process = place.start(way)
+        time.sleep(moment)
+        cut()
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        place.end(process)
+        wrong = [f"{line} is left running" for line in place.left_behind()]
+        subprocess.run(["umount", str(place.folder)], check=True)
+        mount()
+        wrong += reference.half_written(place)
+        wrong += reference.goes_on(place, way)
+    return _end(place, Trial("power cut", "the disk of the working folder", WENT_ON, violations=tuple(wrong)))
+
+
+def power_cuts(reference: Reference, trials: int, chance: random.Random) -> Iterator[Trial]:
+    """Power cuts at random moments."""
+    for number in range(trials):
+        yield power_cut(reference, chance.uniform(0.1, 0.95) * reference.seconds, WAYS[number % 2])
+
+
+# --- odd places -----------------------------------------------------------------------------------------------------
+
+
+def odd_name(reference: Reference, name: str, way: str) -> Trial:
+    """Run in a folder, and from a clone, with a name that a shell would take for something else."""
+    folder = reference.scratch / f"{name}{next(reference.numbers)}"
+    place = reference.empty(folder)
+    place.project = shutil.copytree(reference.project, folder.with_name(f"{folder.name} clone"), symlinks=True)
+    wrong = tuple(reference.goes_on(place, way))
+    shutil.rmtree(place.project)
+    return _end(place, Trial("odd place", "names of folders", WENT_ON, violations=wrong))
+
+
+def odd_modules(reference: Reference, way: str) -> Trial:
+    """Run in a folder whose files have the names of modules."""
+    place = reference.empty()
+    for name in ("icha", "json", "numpy", "socket", "snakemake"):
+        (place.folder / f"{name}.py").write_text("raise SystemExit('imported from the working folder')\n")
+    return _end(place, Trial("odd place", "modules in it", WENT_ON, violations=tuple(reference.goes_on(place, way))))
+
+
+def long_temporary(reference: Reference, way: str) -> Trial:
+    """Run with a folder for temporary files whose path is too long for a socket."""
+    place = reference.empty()
+    folder = reference.scratch / ("temporary" * 12)
+    folder.mkdir(exist_ok=True)
+    status, said = place.run(way, TMPDIR=str(folder))
+    wrong = [f"the call failed: {last_words(said)}"] if status else []
+    wrong += reference.unequal(place)
+    return _end(place, Trial("odd place", "long path of temporary files", WENT_ON, violations=tuple(wrong)))
+
+
+OBSTACLES = {
+    "results are a file": RESULTS,
+    "results are a link to nothing": RESULTS,
+    "all results are a link to nothing": "results",
+    "Snakemake's records are a file": ".snakemake",
+}
+
+
+def obstacle(reference: Reference, what: str) -> Trial:
+    """Run where something else is in the place of a folder."""
+    place = reference.empty()
+    file = place.folder / OBSTACLES[what]
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if "link" in what:
+        file.symlink_to("nowhere")
+    else:
+        file.write_text("something else")
+    status, said = place.run("icha run")
+    words = sentence(said, "which is not there", "and no folder")
+    wrong = [] if status and words and "Traceback" not in said else [f"not told: {last_words(said)}"]
+    file.unlink()
+    wrong += reference.goes_on(place, "icha run")
+    return _end(place, Trial("odd place", what, REFUSED, words[:200], tuple(wrong)))
+
+
+def odd_places(reference: Reference) -> Iterator[Trial]:
+    """Names that shells and Python take for something else, paths that are too long, obstacles."""
+    names = ("a space", "it's", 'a "quote"', "R&D", "a;b", "(copy", "$HOME", "a*b", "both' of \"them & ($*;")
+    for number, name in enumerate(names):
+        yield odd_name(reference, name, WAYS[number % 2])
+    for way in WAYS:
+        yield odd_modules(reference, way)
+        yield long_temporary(reference, way)
+    for what in OBSTACLES:
+        yield obstacle(reference, what)
 
 
 # --- read-only ----------------------------------------------------------------------------------------------------
@@ -529,6 +661,58 @@ def damages(reference: Reference, chance: random.Random) -> Iterator[Trial]:
         yield silent_damage(reference, kind, lost, WAYS[number % 2])
 
 
+# --- other settings -------------------------------------------------------------------------------------------------
+
+# For what the reference has 25 MPa.
+OTHER = "materials={bare: {contact_modulus: 20 MPa}, soft: {contact_modulus: 20 MPa}}"
+
+
+def orphan(reference: Reference, moment: float) -> Trial:
+    """Kill Snakemake while it computes with other settings, and run with the reference's at once."""
+    place = reference.empty()
+    process = place.start("snakemake", "--config", OTHER)
+    time.sleep(moment)
+    _kill(process.pid)
+    wrong = reference.goes_on(place)
+    place.end(process)
+    wrong += [f"{line} is left running" for line in place.left_behind()]
+    wrong += reference.unequal(place)
+    return _end(place, Trial("other settings", "killed at them", WENT_ON, violations=tuple(wrong)))
+
+
+def restored(reference: Reference, others: Place, what: str, way: str) -> Trial:
+    """Put results of other settings in the place of the reference's, whole or one run, with or without records."""
+    place = reference.copy()
+    if what == "all restored":
+        shutil.rmtree(place.results)
+        shutil.copytree(others.results, place.results)
+    elif what == "all restored, no records":
+        shutil.rmtree(place.folder)
+        shutil.copytree(others.folder, place.folder)
+        shutil.rmtree(place.folder / ".snakemake")
+    else:
+        run = KINDS["run"]
+        record = KINDS["checksum record"]
+        for path in (run, record, *([KINDS["Snakemake's record"]] if "all its records" in what else [])):
+            shutil.copy2(others.folder / path, place.folder / path)
+    wrong = reference.goes_on(place, way)
+    return _end(place, Trial("other settings", what, WENT_ON, violations=tuple(wrong)))
+
+
+RESTORED = ("all restored", "all restored, no records", "one run restored", "one run restored with all its records")
+
+
+def other_settings(reference: Reference, chance: random.Random) -> Iterator[Trial]:
+    """Results of other settings, by jobs that outlive their Snakemake, and restored from a backup."""
+    for number in range(8):
+        yield orphan(reference, chance.uniform(0.2, 0.7) * reference.seconds * (number > 0) + 0.1)
+    others = reference.empty()
+    others.run("snakemake", "--config", OTHER)
+    for what, way in itertools.product(RESTORED, WAYS):
+        yield restored(reference, others, what, way)
+    _end(others, None)
+
+
 # --- two at once --------------------------------------------------------------------------------------------------
 
 
@@ -582,7 +766,7 @@ def _end(place, trial):
 
 # --- all of it ----------------------------------------------------------------------------------------------------
 
-PARTS = ("kill", "full disk", "read-only", "damage", "two at once")
+PARTS = ("kill", "power cut", "full disk", "read-only", "odd place", "damage", "other settings", "two at once")
 
 
 def trials_of(part: str, reference: Reference, trials: int, seed: int) -> Iterator[Trial]:
@@ -591,6 +775,12 @@ def trials_of(part: str, reference: Reference, trials: int, seed: int) -> Iterat
     match part:
         case "kill":
             return kills(reference, trials, chance)
+        case "power cut":
+            return power_cuts(reference, trials, chance)
+        case "odd place":
+            return odd_places(reference)
+        case "other settings":
+            return other_settings(reference, chance)
         case "full disk":
             return full_disks(reference, chance)
         case "read-only":
@@ -659,7 +849,7 @@ def main() -> None:
     """Make all trials and keep their counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS)
-    parser.add_argument("--trials", type=int, default=52, help="kills")
+    parser.add_argument("--trials", type=int, default=52, help="kills, and power cuts")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scratch", type=Path, default=None, help="an empty folder")
     parser.add_argument("--in-namespace", action="store_true", help=argparse.SUPPRESS)

@@ -18,7 +18,7 @@ test this, a campaign of {results} files with every kind of result, including it
 {trials} times. After each disturbance these statements must hold:
 
 - every result that is there is, byte for byte, that of an undisturbed campaign: no half-written file passes for whole;
-- after kills and on full disks, no process of the disturbed call is left running after {moment:.0f} s;
+- after kills, power cuts and on full disks, no process of the disturbed call is left running after {moment:.0f} s;
 - after kills, what was complete is not computed again;
 - the same command, given again with nothing else done, goes on to the end, and all results have the bytes of the
   undisturbed campaign; or, where this is impossible, it says what you have to do.
@@ -36,8 +36,16 @@ PARTS = {
     "kill": """## Kills
 
 `kill -9`, to which no program can react, at random moments: of Snakemake alone, of Snakemake with its whole session, of
-a job, and of the process from which jobs are forked. Calls that go on after a kill are killed again, up to three times
-in a row. A job ends when its Snakemake ends, so the next call never meets jobs of the last one.""",
+a job, of the process from which jobs are forked, and of `icha run`. Calls that go on after a kill are killed again, up
+to three times in a row. A job ends when its Snakemake ends, and Snakemake when its `icha run` ends, so the next call
+never meets jobs of the last one. Should one go on all the same, on another machine for one, it can complete nothing:
+the call that began last owns the results.""",
+    "power cut": """## Power cuts
+
+The working folder is on a disk of its own, whose power is cut at a random moment: whatever was not forced to the disk
+by then is lost (ext4 is told to shut down without writing its journal, and is mounted again). The file system is set to
+what is hardest for programs: after a cut, a file may have its new name and none of its content
+(`data=writeback,noauto_da_alloc`). Results are forced to the disk before they get their names.""",
     "full disk": """## Full disks
 
 The results, or the whole working folder, are on a disk that is full from the start, too small for what is computed, or
@@ -48,12 +56,23 @@ The results, or the whole working folder, are on a disk that is mounted read-onl
 A finished campaign is recognised as finished. If something is missing or damaged, there is a message and nothing is
 computed. Where Snakemake's own records are read-only, there is always a message, since Snakemake cannot start without
 writing there.""",
+    "odd place": """## Odd places
+
+Folders with spaces, quotes and other characters in their names that mean something to a shell; a folder for temporary
+files whose path is too long for a socket; files by the names of modules of Python in the working folder; and files and
+links where folders are to be.""",
     "damage": """## Damaged files
 
 A file of a finished campaign is emptied, cut in half, loses its last byte, or has one bit flipped at its start, in its
 middle or at its end. This is done to each kind of file alone, in some of these ways, and to all kinds at once. A
 damaged file is set aside under another name. *By the disk* means that the size and the time of the file do not show the
 damage; the job that reads the file finds it.""",
+    "other settings": """## Results of other settings
+
+Snakemake is killed while it computes with another modulus, and the next call is given at once. Or results of another
+modulus are put in the place of those that were asked for, as from a backup: all of them or one run, with and without
+the records that Snakemake and ICHA keep. Every result knows what was asked of its job, and from which content of which
+other results it was made; both are compared with what is asked for and with what is there.""",
     "two at once": """## Two calls at once
 
 Two calls of one campaign in one folder, the second after a random pause; and calls of two campaigns in one folder.""",
@@ -64,8 +83,8 @@ TAIL = """## How
 `make faults` makes all trials, from the committed state of the program, and writes this page. It takes most of an hour
 on two cores and needs Linux and the right to mount disks (root, or user namespaces). The parts can be run one by one,
 as was done here: `make faults OPTIONS='--parts kill'`. Moments and bits are drawn at random with seed {seed}. Power
-cuts are not among the trials. Files are not forced to the disk one by one, and it was not tried whether the checksums
-find everything that a power cut damages.
+cuts are those of a file system that is told to stop, not of a machine: what a disk loses that has said that it has
+written is not among the trials.
 """
 
 
@@ -81,6 +100,8 @@ def page(kept: dict) -> str:
     )
     for part, words in PARTS.items():
         own = [row for row in rows if row["part"] == part]
+        if not own:
+            continue
         text += f"\n{words}\n\n{_table(own)}\n"
         messages = dict.fromkeys(_whole(message) for row in own for message in row["messages"])
         if messages:
@@ -103,6 +124,8 @@ def _totals(rows):
     lines = []
     for part in PARTS:
         own = [row for row in rows if row["part"] == part]
+        if not own:
+            continue
         sums = [sum(count(row) for row in own) for count in _COUNTS]
         lines.append([part, *map(str, sums)])
     return _lines([["disturbance", "trials", WENT_ON, REFUSED, "wrong"], *lines])

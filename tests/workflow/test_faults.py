@@ -2,12 +2,17 @@
 
 import importlib.util
 import json
+import os
 import random
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from conftest import REPOSITORY, copy_project
+
+from icha.support.atomic_files import whole_file
+from icha.support.checksums import damaged, lost, write_checksum
 
 BENCHMARKS = REPOSITORY / "benchmarks"
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
@@ -58,6 +63,44 @@ def test_flipped_bits_are_found_by_the_one_of_two_calls_that_may_run(reference):
     assert "is running this campaign in this directory" in refusal and "Traceback" not in refusal
     assert reference.unequal(place) == []
     assert {file: file.read_bytes() for file in spoilt} == spoilt
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", faults.WAYS)
+def test_folders_may_have_any_name_and_hold_any_file(reference, way):
+    odd = faults.odd_name(reference, "both' of \"them & ($HOME*;", way)
+    modules = faults.odd_modules(reference, way)
+    long = faults.long_temporary(reference, way)
+    assert [trial.violations for trial in (odd, modules, long)] == [(), (), ()]
+
+
+@pytest.mark.slow
+def test_an_orphan_leaves_nothing_of_its_own_settings(reference):
+    assert faults.orphan(reference, 0.4 * reference.seconds).violations == ()
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root may mount")
+def test_what_is_complete_is_still_there_after_a_power_cut(tmp_path):
+    contents = {f"runs/{number}.nc": random.Random(number).randbytes(100_000) for number in range(5)}
+    disk = tmp_path / "disk"
+    try:
+        with faults.power(disk, tmp_path / "image") as (cut, mount):
+            for path, content in contents.items():
+                with whole_file(disk / path) as temporary:
+                    temporary.write_bytes(content)
+                write_checksum(disk, path, asked="a")
+            # As programs write files as a rule: its name is there before its content.
+            (disk / "runs/.other").write_bytes(contents["runs/0.nc"])
+            os.replace(disk / "runs/.other", disk / "runs/other")
+            cut()
+            subprocess.run(["umount", str(disk)], check=True)
+            mount()
+            assert {path: (disk / path).read_bytes() for path in contents} == contents
+            assert damaged(disk, thorough=True) == lost(disk) == []
+            other = disk / "runs/other"
+            assert not other.exists() or other.read_bytes() == b""
+    except subprocess.CalledProcessError as error:
+        pytest.skip(f"no disk can be mounted: {error}")
 
 
 def test_the_page_is_that_of_the_counts():
