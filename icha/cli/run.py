@@ -28,6 +28,7 @@ from icha.cli.project import (
     workflow_folder,
 )
 from icha.cli.terminal import say
+from icha.support.atomic_files import in_the_way
 from icha.support.in_words import counted
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
@@ -85,8 +86,11 @@ def run(
     campaign = read_configuration(path).campaign
     folder = (folder or project()).resolve()
     _refuse_results_of_another(folder / "results" / campaign.name, campaign.name, path, workflow)
+    if obstacle := in_the_way(shown(folder / ".snakemake")):
+        raise Mistake(f"{obstacle}: Snakemake keeps its records there; remove it, or put it right. Nothing was begun")
     command = [
-        *(sys.executable, "-m", "snakemake", *asked),
+        # Not what lies in the folder by the name of a module.
+        *(sys.executable, "-P", "-m", "snakemake", *asked),
         *("--snakefile", str(workflow / "Snakefile"), "--directory", str(folder)),
         *(["--configfile", str(path.resolve())] if path.resolve() != (workflow / DEFAULT).resolve() else []),
         *(["--cores", cores] if cores else []),

@@ -9,13 +9,15 @@ import os
 from pathlib import Path
 
 from icha.datasets.results import CONFIGURATION
-from icha.support.atomic_files import whole_file
+from icha.support.atomic_files import in_the_way, whole_file
 
 RECORD = "belongs_to.txt"
 
 
 def belongs_to_another(results: Path, name: str, file: Path, workflow: Path) -> str | None:
-    """That results belong to another configuration file, and what can be done about it; None if they do not.
+    """That results belong to another configuration file, or cannot be where they are to be, and what can be done.
+
+    None if they can be computed.
 
     Parameters
     ----------
@@ -24,6 +26,8 @@ def belongs_to_another(results: Path, name: str, file: Path, workflow: Path) -> 
     file : its configuration file.
     workflow : the folder of the workflow.
     """
+    if obstacle := in_the_way(results):
+        return f"{obstacle}: results cannot be there. Remove it, or put it right."
     owner, own = _recorded(results), _named(results, file, workflow)
     if owner in (None, own) or _is_kept(results, file):
         return None

@@ -71,6 +71,16 @@ def sync_folder(folder: Path) -> None:
             _sync(Path(top))
 
 
+def in_the_way(folder: Path) -> str | None:
+    """What is where a folder is to be, if anything but a folder is: a file, or a link to what is not there."""
+    for path in (folder, *folder.parents):
+        if path.is_symlink() and not path.exists():
+            return f"{path} is a link to {os.readlink(path)}, which is not there"
+        if path.exists():
+            return None if path.is_dir() else f"{path} is a file, and no folder"
+    return None
+
+
 def why_not_writable(folder: Path) -> OSError | None:
     """What the system says against data in a folder, if anything; they are removed again."""
     probe = folder / f".{os.getpid()}.probe"

@@ -397,6 +397,22 @@ def test_a_shipped_campaign_and_a_copy_of_it_are_two_files(tmp_path, monkeypatch
     assert (results / "belongs_to.txt").read_text() == "config/campaigns/smoke.yaml of ICHA\n"
 
 
+@pytest.mark.parametrize("place", ["results", "results/smoke", ".snakemake"])
+@pytest.mark.parametrize("link", [True, False])
+def test_what_is_in_the_place_of_a_folder_is_named(tmp_path, monkeypatch, place, link):
+    monkeypatch.chdir(tmp_path)
+    obstacle = tmp_path / place
+    obstacle.parent.mkdir(exist_ok=True)
+    if link:
+        obstacle.symlink_to("nowhere")
+    else:
+        obstacle.write_text("something else")
+    refused = icha("run", "smoke")
+    assert refused.exit_code == 2
+    what = f"{place} is a link to nowhere, which is not there" if link else f"{place} is a file, and no folder"
+    assert f"Error: {what}: " in refused.output and "File exists" not in refused.output
+
+
 TINY = """
 name: tiny
 title: Tiny

@@ -93,11 +93,11 @@ def workflow(tmp_path_factory):
     command = [sys.executable, "-m", "snakemake", "--executor", "icha", "--cores", "2", "--keep-going", "--nolock"]
     found = os.pathsep.join([str(folder), str(REPOSITORY / "workflow/plugins")])
 
-    def start(*targets):
+    def start(*targets, before=(), **environment):
         return subprocess.Popen(
             [*command, *targets],
             cwd=folder,
-            env=os.environ | {"PYTHONPATH": found},
+            env=os.environ | {"PYTHONPATH": os.pathsep.join([*before, found])} | environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -132,6 +132,25 @@ def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow):
     # A job of two threads runs by itself.
     assert alone[:1] == ["False"] and alone[3] == "2" and alone[7] != told[7]
     assert float((workflow.folder / "told.jsonl").read_text().split('"max_rss": ')[1].split(",")[0]) > 1
+
+
+def test_a_long_path_of_temporary_files_is_in_nobodys_way(workflow, tmp_path):
+    folder = tmp_path / ("long" * 30)
+    folder.mkdir()
+    (workflow.folder / "told.txt").unlink(missing_ok=True)
+    said = workflow("told.txt", TMPDIR=str(folder)).communicate(timeout=120)[0]
+    assert (workflow.folder / "told.txt").read_text().startswith("True"), said
+    assert "AF_UNIX" not in said
+
+
+def test_jobs_run_by_themselves_where_nothing_can_be_forked(workflow, tmp_path):
+    patch = "from multiprocessing import forkserver\ndef refuse():\n    raise OSError('no sockets here')\n"
+    (tmp_path / "sitecustomize.py").write_text(f"{patch}forkserver.ensure_running = refuse\n")
+    (workflow.folder / "told.txt").unlink(missing_ok=True)
+    process = workflow("told.txt", before=[str(tmp_path)])
+    said = process.communicate(timeout=120)[0]
+    assert process.returncode == 0 and "no process can be prepared: no sockets here." in said
+    assert (workflow.folder / "told.txt").read_text().startswith("False"), said
 
 
 def test_the_memory_of_a_job_is_its_own_at_its_peak(workflow):

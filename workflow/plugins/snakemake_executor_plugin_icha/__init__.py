@@ -2,21 +2,25 @@
 
 A job's script needs some seconds to import NumPy, SciPy, xarray and the package, often longer than its work. So the
 first job starts a process that has done so, the fork server of `multiprocessing`, and every job of one thread is a fork
-of it that runs the script. Other jobs, and all jobs where libraries do not survive a fork (elsewhere than on Linux),
-run by themselves, as with Snakemake's executor `local`.
+of it that runs the script. Other jobs, and all jobs where libraries do not survive a fork (elsewhere than on Linux) or
+that process cannot be started, run by themselves, as with Snakemake's executor `local`.
 
 However one of these processes ends, those that it started end with it: Snakemake, the fork server, its forks.
 """
 
+import contextlib
 import json
 import multiprocessing
+import multiprocessing.util
 import os
 import resource
 import runpy
 import signal
 import sys
+import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from importlib.util import find_spec
 from multiprocessing import forkserver
 from multiprocessing.connection import wait
@@ -32,6 +36,8 @@ from icha.support.processes import end_with_parent
 
 __all__ = ["Executor", "common_settings"]
 
+# Bytes of the path of a folder that still has room for the path of a socket, of which there are 107.
+_LONGEST = 70
 # What `multiprocessing` takes for the status of a process of which only the fork server knew how it ended.
 _SERVER_LOST = 255
 
@@ -50,21 +56,32 @@ class Executor(LocalExecutor):
         program = sys.modules["__main__"]
         program.__spec__ = program.__spec__ or find_spec("snakemake.__main__")
         self._turn = threading.Lock()
+        self._without_server = sys.platform != "linux"
 
     def run_single_job(self, job):
         """Start a job; the future ends with it."""
         script = job.rule.script
         deployed = self.workflow.deployment_settings.deployment_method
-        if sys.platform != "linux" or not script or job.threads != 1 or deployed:
+        if not script or job.threads != 1 or deployed or not self._server_runs():
             return super().run_single_job(job)
-        # From the thread that lasts as long as the process: the fork server ends with it.
-        forkserver.ensure_running()
         rule, input_, output, params, wildcards, threads, resources, log, benchmark, *_ = self.job_args_and_prepare(job)
         file = Path(self.workflow.main_snakefile).parent / "workflow/scripts" / PurePath(script).name
         told = Snakemake(
             input_, output, params, wildcards, threads, resources, log, {}, rule.name, None, str(file.parent)
         )
         return self.pool.submit(self._run_forked, str(file), told, benchmark)
+
+    def _server_runs(self) -> bool:
+        """Start the fork server if it does not run; False where that cannot be."""
+        if not self._without_server:
+            try:
+                with _short_temporary_folder():
+                    # From the thread that lasts as long as the process: the fork server ends with it.
+                    forkserver.ensure_running()
+            except OSError as error:
+                self._without_server = True
+                self.logger.warning(f"Every job takes some seconds more, for no process can be prepared: {error}.")
+        return not self._without_server
 
     def _run_forked(self, *job):
         status = self._status(*job)
@@ -89,6 +106,19 @@ class Executor(LocalExecutor):
         except (EOFError, ConnectionError):
             return _SERVER_LOST
         return process.exitcode
+
+
+@contextlib.contextmanager
+def _short_temporary_folder() -> Iterator[None]:
+    """Have `multiprocessing` put its socket where the path is short, whatever the folder for temporary files."""
+    folders = [tempfile.gettempdir(), os.environ.get("XDG_RUNTIME_DIR", ""), "/tmp", "/dev/shm"]
+    short = [each for each in folders if len(os.fsencode(each)) <= _LONGEST and os.access(each, os.W_OK | os.X_OK)]
+    former, tempfile.tempdir = tempfile.tempdir, short[0] if short else folders[0]
+    try:
+        multiprocessing.util.get_temp_dir()  # which keeps to its first answer
+        yield
+    finally:
+        tempfile.tempdir = former
 
 
 def run_script(script: str, told: Snakemake, benchmark: str | None) -> None:
