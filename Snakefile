@@ -1,6 +1,13 @@
 # ICHA: adhesive rough contact by interacting and coalescing asperities.
 # One configuration file is one campaign: config/config.yaml, or that of --configfile. See config/README.md.
 
+import sys
+import sysconfig
+
+# What is installed goes before files of the same name that lie here or in the working directory.
+INSTALLED = tuple(map(sysconfig.get_path, ("stdlib", "purelib", "platlib")))
+sys.path.sort(key=lambda folder: not folder.startswith(INSTALLED))
+
 from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import min_version
 
@@ -20,6 +27,8 @@ include: "workflow/rules/publish.smk"
 
 
 before_jobs.end_jobs_with_this_process()
+before_jobs.import_nothing_from_here()
+before_jobs.quote_python()
 
 if workflow.is_main_process:
     before_jobs.end_with_caller()
@@ -27,6 +36,7 @@ if workflow.is_main_process:
     here = before_jobs.Campaign(RESULTS, dry_run=workflow.output_settings.dryrun)
     if Path(RESULTS).is_dir() and not workflow.output_settings.dryrun:
         origin.claim()  # those of an older version, of which nothing may be left to do
+    here.have_stale_made_again([FILES.configuration, *COPIED, *FILES.computed, FILES.run_times], workflow.rules)
 else:
     before_jobs.refuse_superseded()
 

@@ -4,14 +4,16 @@ import atexit
 import contextlib
 import gc
 import json
+import multiprocessing
 import os
+import shlex
 import sys
-from base64 import urlsafe_b64decode
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from campaign_lock import hold_lock
 from snakemake.logging import logger
+from snakemake_records import METADATA, file_of, mark_incomplete, record_of
 
 from icha.planning.belonging import belongs_to_another, claim
 from icha.publication.environment import note_versions
@@ -20,13 +22,22 @@ from icha.support.atomic_files import is_left_over, why_not_writable
 from icha.support.ownership import Superseded, take_over, while_owned
 from icha.support.processes import beginning_of, end_with_parent
 
-RECORDS = Path(".snakemake/metadata")
-
 
 def end_jobs_with_this_process() -> None:
     """Tell jobs which process wants them, for they end with it: see workflow/scripts/job.py."""
     if sys.platform == "linux":
         os.environ["ICHA_SNAKEMAKE"] = f"{os.getpid()} {beginning_of(os.getpid())}"
+
+
+def import_nothing_from_here() -> None:
+    """Have no Python that is started from here take a file of the working directory for the module of its name."""
+    os.environ["PYTHONSAFEPATH"] = "1"
+
+
+def quote_python() -> None:
+    """Have Snakemake call Python by its path as a shell reads it, for it puts that into commands as it stands."""
+    multiprocessing.set_executable(sys.executable)
+    sys.executable = shlex.quote(sys.executable)
 
 
 def end_with_caller() -> None:
@@ -100,7 +111,7 @@ class Campaign:
 
     def __init__(self, results: str, *, dry_run: bool):
         """Look at the folder `results`; a dry run changes nothing."""
-        self.results = results
+        self.results, self.dry_run = results, dry_run
         self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
         if not (dry_run or self._other):
             # Before anything is looked at: what an earlier call has left running must not change it any more.
@@ -119,12 +130,52 @@ class Campaign:
                 record.unlink()  # Snakemake breaks off at some of them
         if dry_run:
             return
-        if not RECORDS.is_dir() or not os.access(".snakemake", os.W_OK):
+        if not METADATA.is_dir() or not os.access(".snakemake", os.W_OK):
             self.refuse_unwritable()  # nothing was computed yet, or Snakemake could not keep its records
         elif os.path.isdir(results) and not os.access(results, os.W_OK):
             # Of what is missing there Snakemake says only that it is protected.
             text = f"{results} cannot be written to: what is not there cannot be computed"
             logger.warning(text, extra={"remark": text})
+
+    def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
+        """Have results made again that are not those of what is asked for, where Snakemake does not see it.
+
+        It compares with its own records, which may be gone, or be those of another file than is there: of one that was
+        restored from a backup. Whatever else it makes again, it sees for itself.
+
+        Parameters
+        ----------
+        paths : results, from the working directory.
+        rules : the rules of the workflow.
+        """
+        rules = [rule for rule in rules if rule.script]
+        found = checksums.stale(
+            self.results,
+            (os.path.relpath(path, self.results) for path in paths),
+            lambda path: _asked_now(rules, f"{self.results}/{path}"),
+        )
+        unseen = [(path, why) for path, why in found if not self._is_seen(path)]
+        if not unseen:
+            return
+        if self._other:
+            self.refuse_second()
+        for path, _ in [] if self.dry_run else unseen:
+            try:
+                mark_incomplete(f"{self.results}/{path}")
+            except OSError as error:
+                raise SystemExit(_unwritable(".snakemake", error.strerror)) from None
+        first, why = unseen[0]
+        others = f"; and {len(unseen) - 1} more results, for such reasons" if len(unseen) > 1 else ""
+        text = f"to be made again: {self.results}/{first}, for {why}{others}"
+        logger.warning(text, extra={"remark": text})
+
+    def _is_seen(self, path):
+        """Whether Snakemake's record of a result belongs to what is there, so that it sees for itself what differs."""
+        try:
+            record = json.loads(record_of(f"{self.results}/{path}", METADATA).read_bytes())
+            return checksums.asked_of(record["params"]) == checksums.made_as(self.results, path)
+        except (OSError, ValueError, KeyError, TypeError):
+            return False
 
     def _set_aside(self, path: str, why: str, dry_run: bool) -> None:
         """Rename a result that cannot be trusted, so that it is made again, and say so."""
@@ -172,6 +223,20 @@ class Campaign:
                 Path(folder, name).unlink(missing_ok=True)
 
 
+class _Wildcards(dict):
+    """Wildcards as the functions of rules take them."""
+
+    __getattr__ = dict.__getitem__
+
+
+def _asked_now(rules, path):
+    """Checksum of what the rule that makes a result asks of its job now."""
+    rule = next(rule for rule in rules if any(output.match(path) for output in rule.output))
+    wildcards = _Wildcards(rule.get_wildcards(path))
+    values = (value(wildcards) if callable(value) else value for value in rule.params)
+    return checksums.asked_of(map(repr, values))
+
+
 def _unwritable(folder, reason):
     return (
         f"{folder} cannot be written to: {reason}. Nothing was computed. Make room there or make it writable, or work "
@@ -184,16 +249,10 @@ def _of_unknown_origin(results: str) -> Iterator[tuple[str, Path]]:
 
     Snakemake takes such a result for up to date, or breaks off; it has no public reader that would say which those are.
     """
-    for folder, _, names in os.walk(RECORDS):
-        for name in names:
-            record = Path(folder, name)
-            try:
-                # Long names go on in folders, each part with @ before it.
-                parts = record.relative_to(RECORDS).parts
-                file = urlsafe_b64decode("".join(part.removeprefix("@") for part in parts)).decode()
-            except ValueError:
-                continue  # not of ours
-            if file.startswith(f"{results}/") and not _is_record(record):
+    for folder, _, names in os.walk(METADATA):
+        for record in (Path(folder, name) for name in names):
+            file = file_of(record, METADATA)
+            if file is not None and file.startswith(f"{results}/") and not _is_record(record):
                 yield os.path.relpath(file, results), record
 
 

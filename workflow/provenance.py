@@ -1,17 +1,13 @@
-"""Which job made which result, from Snakemake's own records of the jobs that it ran.
-
-Snakemake keeps a record of every file that it made, `.snakemake/metadata/<name of the file in base64>`, and has no
-public interface for reading them.
-"""
+"""Which job made which result, from Snakemake's own records of the jobs that it ran."""
 
 import ast
 import json
-import os
-from base64 import urlsafe_b64encode
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import Any
+
+from snakemake_records import record_of
 
 from icha.publication.crate import SOURCE, Job
 
@@ -66,11 +62,16 @@ def recorded_jobs(
     return sorted(jobs, key=lambda job: job.outputs)
 
 
+def recorded_parameters(records: Path, name: str) -> list[str]:
+    """The parameters of the job that made the file `name`, as Python represents them; errors as `recorded_jobs`."""
+    return _record(records, name)["params"]
+
+
 def _record(records: Path, name: str) -> dict[str, Any]:
     """What Snakemake recorded when it made the file `name`."""
     what = "there is no record"
     try:
-        record = json.loads(_place(records, name).read_text(encoding="utf-8"))
+        record = json.loads(record_of(name, records).read_text(encoding="utf-8"))
         if all(record.get(key) for key in ("rule", "log", "code")) and not record.get("incomplete"):
             return record
         what = "there is no complete record"
@@ -82,14 +83,6 @@ def _record(records: Path, name: str) -> dict[str, Any]:
         f"{name}: {what} of how it was made in {records}, so its origin cannot be published; remove this file and run "
         "the campaign again, which makes it anew"
     )
-
-
-def _place(records: Path, name: str) -> Path:
-    """Where the record of a file lies: a name that is too long for the file system is cut, its first parts folders."""
-    code = urlsafe_b64encode(name.encode()).decode()
-    longest = os.pathconf(records, "PC_NAME_MAX") - 1
-    parts = [code[start : start + longest] for start in range(0, len(code), longest)]
-    return records.joinpath(*(f"@{part}" for part in parts[:-1]), parts[-1])
 
 
 def _settings(params: list[str]) -> tuple[tuple[str, str], ...]:

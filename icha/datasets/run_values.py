@@ -26,11 +26,12 @@ Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 _DIMS = {name: description.dims for name, description in (RUN | PATCHES | CYCLE | LOOP).items()}
 # Dimensions stand among the variables in HDF5.
 _DIMENSIONS = {dim for dims in _DIMS.values() for dim in dims}
+_ATTRIBUTES = ("contact_model", "config_sha256", "incomplete")
 _WIDTH_OF_TEXT = re.compile(r"string\d+")
 
 
 def read_run_values(path: str | os.PathLike, without: Collection[str] = ()) -> tuple[Values, dict[str, str]]:
-    """Read the values of a run dataset and its texts `contact_model` and `incomplete`, if it has them.
+    """Read the values of a run dataset and those of its attributes that tell what it is, if it has them.
 
     Variables along the dimensions `without` are left out.
 
@@ -48,7 +49,7 @@ def read_run_values(path: str | os.PathLike, without: Collection[str] = ()) -> t
             raise ValueError(f"{path}: not a run dataset, it has a variable {min(odd)!r}")
         wanted = [name for name in names if not set(without) & set(_DIMS[name])]
         values = {name: (_DIMS[name], _read(file, name)) for name in wanted}
-        attrs = {name: text(file.attrs[name]) for name in ("contact_model", "incomplete") if name in file.attrs}
+        attrs = {name: text(file.attrs[name]) for name in _ATTRIBUTES if name in file.attrs}
     _check_sizes(values, path)
     return values, attrs
 

@@ -1,18 +1,21 @@
-"""Checksum sidecars of results: begun, written, verified; and results set aside that are not what was written.
+"""Checksum sidecars of results: begun, written, verified, and what a result was made from; results that are set aside.
 
 The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`, with the file's SHA-256, size
 and time of change. A file of the same size and time is trusted, any other one is hashed; what the storage itself has
 spoilt changes neither, and is found where a file is hashed in any case (`thorough`). A result may be a folder, too.
 
-A sidecar without its result says that the result was there, or was about to be, and is to be made again. Results
-without a sidecar, those of older versions for one, are taken as they are.
+A sidecar without its result says that the result was there, or was about to be, and is to be made again.
+
+It also says what was asked of the job that made the result, and from which content of which other results: a result
+that is whole may still be one of other settings, of another program, or of data that are not those beside it.
 """
 
 import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,15 +25,30 @@ FOLDER = "checksums"
 
 
 class Checksum(NamedTuple):
-    """A result as it was written; of a folder the sum of sizes and the latest time of its files."""
+    """A result as it was written; of a folder the sum of sizes and the latest time of its files.
+
+    `asked` is the checksum of what was asked of its job (`asked_of`); `inputs` are those of the results that it read.
+    """
 
     sha256: str
     size: int
     mtime_ns: int
+    asked: str = ""
+    inputs: Mapping[str, str] = {}
 
 
-def write_checksum(results: str | os.PathLike, path: str) -> None:
+def asked_of(parameters: Iterable[str]) -> str:
+    """Checksum of what is asked of a job: of its parameters as Python represents them, in any order."""
+    return hashlib.sha256("\n".join(sorted(parameters)).encode()).hexdigest()
+
+
+def write_checksum(results: str | os.PathLike, path: str, *, asked: str = "", inputs: Mapping[str, str] = {}) -> None:
     """Write the sidecar of the result `path`, given from the campaign's folder `results`.
+
+    Parameters
+    ----------
+    results, path : the result.
+    asked, inputs : what it was made from, see `Checksum`; left out if nobody knows.
 
     Raises
     ------
@@ -39,7 +57,7 @@ def write_checksum(results: str | os.PathLike, path: str) -> None:
     """
     file = Path(results, path)
     size, mtime_ns = _size_and_time(file)
-    _write(results, path, Checksum(sha256_of(file), size, mtime_ns))
+    _write(results, path, Checksum(sha256_of(file), size, mtime_ns, asked, inputs))
 
 
 def begin(results: str | os.PathLike, path: str) -> None:
@@ -93,6 +111,47 @@ def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
 def lost(results: str | os.PathLike) -> list[str]:
     """Paths of all results of a campaign that have a sidecar but are not there, sorted."""
     return [path for path in with_sidecar(results) if not os.path.exists(os.path.join(results, path))]
+
+
+def stale(
+    results: str | os.PathLike, paths: Iterable[str], asked: Callable[[str], str] | None = None
+) -> Iterator[tuple[str, str]]:
+    """Those of some results that are there but are not what is asked for now, with the reason of each.
+
+    Parameters
+    ----------
+    results, paths : the results.
+    asked : what is asked of each now (`asked_of`); left out, only what they were made from is looked at.
+    """
+    known = cache(lambda path: _known(results, path))
+    for path in paths:
+        if not os.path.exists(os.path.join(results, path)):
+            continue
+        written = known(path)
+        if not written.asked:
+            yield path, "nothing says what it was made from"
+        elif asked is not None and asked(path) != written.asked:
+            yield path, "it was made with other settings, or by another version of the program"
+        else:
+            others = [each for each, sha256 in written.inputs.items() if known(each).sha256 != sha256]
+            if others:
+                yield path, f"it was made from another {others[0]} than is there"
+
+
+def made_as(results: str | os.PathLike, path: str) -> str:
+    """What was asked of the job that made a result (`asked_of`), by its sidecar; an empty text if nobody knows."""
+    return _known(results, path).asked
+
+
+def sha256_as_written(results: str | os.PathLike, path: str) -> str:
+    """SHA-256 of a result by its sidecar, or else of what is there."""
+    return _known(results, path).sha256 or sha256_of(Path(results, path))
+
+
+def _known(results, path) -> Checksum:
+    with contextlib.suppress(ValueError):
+        return _read(results, path) or _BEGUN
+    return _BEGUN
 
 
 def with_sidecar(results: str | os.PathLike) -> Iterator[str]:

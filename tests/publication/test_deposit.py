@@ -5,13 +5,13 @@ import csv
 import getpass
 import hashlib
 import importlib.metadata
-import importlib.util
 import json
 import os
 import random
 import re
 import shutil
 import subprocess
+import sys
 import time
 import zipfile
 import zlib
@@ -122,9 +122,11 @@ def own(published, tmp_path):
 
 def recorded_jobs(project, results, files):
     """What Snakemake recorded of the files of some results, wherever these are now."""
-    spec = importlib.util.spec_from_file_location("provenance", project / "workflow/provenance.py")
-    provenance = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(provenance)
+    sys.path.insert(0, str(project / "workflow"))
+    try:
+        provenance = importlib.import_module("provenance")
+    finally:
+        sys.path.pop(0)
     home = project.parent
     given = {
         str(home / "measured/heights of a plate.npy"): "inputs/surfaces/plate/heights of a plate.npy",

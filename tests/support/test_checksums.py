@@ -8,7 +8,20 @@ import shutil
 
 import pytest
 
-from icha.support.checksums import begin, damaged, distrust, is_whole, lost, set_aside, with_sidecar, write_checksum
+from icha.support.checksums import (
+    asked_of,
+    begin,
+    damaged,
+    distrust,
+    is_whole,
+    lost,
+    made_as,
+    set_aside,
+    sha256_as_written,
+    stale,
+    with_sidecar,
+    write_checksum,
+)
 
 PATH = "runs/load/seed1.nc"
 CONTENT = random.Random(7).randbytes(5000)
@@ -133,6 +146,33 @@ def test_a_folder_is_one_result(results):
     assert damaged(results) == ["publish/tiny-1.0"]
     assert set_aside(results, "publish/tiny-1.0").name == "tiny-1.0.damaged"
     assert not folder.exists()
+
+
+def test_results_that_are_not_of_what_is_asked_for_or_of_what_is_there_are_stale(results):
+    asked = {path: asked_of([repr({"modulus": 25e6}), repr(path)]) for path in (PATH, "checks.json")}
+
+    def found(now=asked.get):
+        return dict(stale(results, asked, now))
+
+    assert set(found()) == {PATH, "checks.json"}  # nobody knows what they were made from
+    write_checksum(results, PATH, asked=asked[PATH])
+    inputs = {PATH: sha256_as_written(results, PATH)}
+    write_checksum(results, "checks.json", asked=asked["checks.json"], inputs=inputs)
+    assert found() == found(None) == {} and made_as(results, PATH) == asked[PATH]
+    assert "other settings" in found(lambda path: asked_of(["30e6"]) if path == PATH else asked[path])[PATH]
+    # Another run in its place, asked for in the same way: what was made from the former one is not what is there.
+    (results / PATH).write_bytes(CONTENT[::-1])
+    write_checksum(results, PATH, asked=asked[PATH])
+    assert damaged(results) == [] and found() == {"checks.json": f"it was made from another {PATH} than is there"}
+    # What was begun and not ended, and what is not there at all.
+    begin(results, PATH)
+    assert PATH in found()
+    (results / PATH).unlink()
+    assert set(found()) == {"checks.json"}
+
+
+def test_the_order_of_parameters_does_not_matter():
+    assert asked_of(["a", "b"]) == asked_of(["b", "a"]) != asked_of(["ab"])
 
 
 def test_sidecars_of_results_that_are_read_only_need_not_be_written(results, monkeypatch):

@@ -74,7 +74,11 @@ def dataset(tmp_path):
         names = [name.rpartition("/") for name in files]
         labels = [tuple(RunLabels("sticky", model, surface or "rough", 1, 1.0, name)) for surface, _, name in names]
         make_dataset(
-            files.values(), tmp_path / "c.nc", labels=labels, attributes={"title": "Sticky", "config_sha256": "1"}
+            files.values(),
+            tmp_path / "c.nc",
+            labels=labels,
+            settings=["0"] * len(labels),
+            attributes={"title": "Sticky", "config_sha256": "1"},
         )
         return tmp_path / "c.nc", labels
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from base64 import urlsafe_b64encode
+from multiprocessing import spawn
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,8 @@ from types import SimpleNamespace
 sys.path.insert(0, {str(REPOSITORY / "workflow/scripts")!r})
 from job import guarded
 snakemake = SimpleNamespace(
-    input=["{RESULTS}/surfaces/a.nc", "elsewhere.txt"], output=["{RESULTS}/runs/b.nc"], log=[sys.argv[1]]
+    input=["{RESULTS}/surfaces/a.nc", "elsewhere.txt"], output=["{RESULTS}/runs/b.nc"], log=[sys.argv[1]],
+    params=[{{"seed": 1}}, "code"],
 )
 with guarded(snakemake):
     print("at work", flush=True)
@@ -121,7 +123,6 @@ def test_a_job_is_killed_with_the_snakemake_that_started_it(job, tmp_path):
     caller = f"""
 import os, subprocess, sys
 sys.path.insert(0, {str(REPOSITORY)!r})
-from icha.support.ownership import take_over
 from icha.support.processes import beginning_of
 os.environ["ICHA_SNAKEMAKE"] = f"{{os.getpid()}} {{beginning_of(os.getpid())}}"
 sys.set_int_max_str_digits(0)
@@ -194,6 +195,20 @@ def is_alive(process):
         return False
 
 
+def test_a_shell_gets_pythons_path_in_quotes_and_nobody_else_does(monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import before_jobs
+
+    own = sys.executable
+    try:
+        monkeypatch.setattr(sys, "executable", "/it's a folder/python")
+        before_jobs.quote_python()
+        said = subprocess.run(f"printf %s {sys.executable}", shell=True, capture_output=True, text=True).stdout
+        assert said == "/it's a folder/python" == os.fsdecode(spawn.get_executable())
+    finally:
+        spawn.set_executable(own)
+
+
 def test_a_library_that_cannot_write_is_told_apart_from_one_that_will_not(tmp_path):
     # A largest size of files stands for the full disk: netCDF says of both that there was an HDF error.
     code = f"""
@@ -218,6 +233,27 @@ def test_two_programs_that_write_a_file_do_not_write_into_each_others(tmp_path):
             second.write_text("the second's")
         assert first.read_text() == "the first's"
     assert [file.read_text() for file in tmp_path.iterdir()] == ["the first's"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks /proc which file is meant")
+def test_a_result_is_on_the_disk_before_it_has_its_name_and_its_name_before_its_record(job, monkeypatch):
+    done = []
+    sync, replace = os.fsync, os.replace
+    named = {"runs": "folder", "b.nc": "result", "b.nc.json": "record"}
+
+    def what(path):
+        name = Path(path).name
+        return named.get(name, named.get(name[1:-14]))  # of a temporary file its own
+
+    monkeypatch.setattr(
+        os, "fsync", lambda file: done.append(("sync", what(os.readlink(f"/proc/self/fd/{file}")))) or sync(file)
+    )
+    monkeypatch.setattr(os, "replace", lambda a, b: done.append(("name", what(b))) or replace(a, b))
+    with whole_file(job.results / "runs/b.nc") as temporary:
+        temporary.write_text("a result")
+    write_checksum(job.results, "runs/b.nc")
+    result = [("sync", "result"), ("name", "result"), ("sync", "folder")]
+    assert done == [*result, ("sync", "record"), ("name", "record"), ("sync", "folder")]
 
 
 def test_what_cannot_be_removed_does_not_hide_the_reason(tmp_path, monkeypatch):

@@ -20,6 +20,7 @@ from traces import traces
 
 from icha.configuration.load import load_configuration
 from icha.configuration.settings import campaign_sha256
+from icha.support.checksums import made_as, write_checksum
 
 CAMPAIGNS = ["config/config.yaml", *(f"config/campaigns/{p.name}" for p in (REPOSITORY / "config/campaigns").iterdir())]
 
@@ -321,7 +322,9 @@ def test_a_surface_that_is_too_coarse_is_a_warning(smoke, tmp_path):
 def test_a_failing_job_says_why(project):
     surface = project / "results/smoke/surfaces/mcghee/seed1.nc"
     surface.write_bytes(b"damaged")
-    (project / "results/smoke/checksums/surfaces/mcghee/seed1.nc.json").unlink()  # or it would be made again
+    # Or it would be made again.
+    asked = made_as(project / "results/smoke", "surfaces/mcghee/seed1.nc")
+    write_checksum(project / "results/smoke", "surfaces/mcghee/seed1.nc", asked=asked)
     run = "results/smoke/runs/multi_slope/mcghee/seed1/slope1/pdms_soft.nc"
     failed = snakemake(project, run)
     assert failed.returncode == 1

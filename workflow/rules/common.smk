@@ -2,6 +2,7 @@
 
 import os
 import sys
+from functools import cache
 from pathlib import Path
 
 sys.path.insert(0, str(Path(workflow.basedir, "workflow")))
@@ -11,6 +12,7 @@ from command_line import campaign_configuration
 from fingerprint import code_fingerprint
 
 from icha.configuration.named_files import with_files_beside_it
+from icha.configuration.settings import run_sha256
 from icha.datasets import results
 from icha.planning.results import campaign_files
 
@@ -27,6 +29,9 @@ FILES = campaign_files(CAMPAIGN, RESULTS)
 CONFIG_TEXT, NAMED_FILES = with_files_beside_it(CONFIGURATION)
 INPUTS = {f"{RESULTS}/{place}": file for place, file in NAMED_FILES.items()}
 COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() != Path(file).resolve()}
+
+# Checksum of what determines a run, by its labels.
+SHA256_OF_RUN = cache(lambda case: run_sha256(CAMPAIGN, case))
 
 # Attributes of every dataset of the campaign, but for its `id`, which is its path (see workflow/scripts/job.py).
 ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
@@ -77,6 +82,7 @@ def as_it_is(value):
     return lambda wildcards: value
 
 
+@cache
 def code_of(script, *modules):
     """Fingerprint of a script of workflow/scripts and of what it imports, as a parameter of its rule."""
     return code_fingerprint(Path(workflow.basedir, "workflow/scripts", script), *modules)

@@ -45,6 +45,7 @@ rule campaign_dataset:
         runtime=30,
     params:
         labels=[tuple(labels) for labels in FILES.runs.values()],
+        settings=[SHA256_OF_RUN(labels) for labels in FILES.runs.values()],
         size=len(FILES.runs),
         attributes=as_it_is(
             ATTRIBUTES

@@ -1,7 +1,5 @@
 # publish/<campaign>-<version>/ and its .zip: everything that a reader needs, with checksums. See docs/howto/publish.md.
 
-from functools import cache
-
 from publishable import publishable_source
 
 # Looked at once, when the deposit is asked for, and before anything is computed.

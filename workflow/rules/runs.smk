@@ -1,6 +1,6 @@
 # One sweep each, by asperities or by another model of contact, whose runs are in a folder of its name.
 
-from icha.configuration.settings import run_settings, run_sha256
+from icha.configuration.settings import run_settings
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.labels import model_folder
 from icha.planning.resources import run_memory, run_minutes, run_threads
@@ -9,6 +9,9 @@ from icha.planning.resources import run_memory, run_minutes, run_threads
 wildcard_constraints:
     model_folder="|".join(map(model_folder, MODELS)),
 
+
+# Asked for more than once of each of what may be ten thousand runs.
+SETTINGS_OF_RUN = cache(lambda case: run_settings(CAMPAIGN, case))
 
 # By model, which the script imports by its name.
 CODE_OF_RUN = {model: code_of("run_sweep.py", f"icha.models.{model}") for model in MODELS}
@@ -32,11 +35,11 @@ rule run:
         mem_mb=by_case(lambda case: run_memory(CAMPAIGN, case)),
         runtime=by_case(lambda case: run_minutes(CAMPAIGN, case)),
     params:
-        settings=lambda wildcards: run_settings(CAMPAIGN, case_of(wildcards)),
+        settings=lambda wildcards: SETTINGS_OF_RUN(case_of(wildcards)),
         attributes=lambda wildcards: ATTRIBUTES
         | {
             "study": wildcards.study,
-            "config_sha256": run_sha256(CAMPAIGN, case_of(wildcards)),
+            "config_sha256": SHA256_OF_RUN(case_of(wildcards)),
         },
         code=by_case(lambda case: CODE_OF_RUN[case.model]),
     message:

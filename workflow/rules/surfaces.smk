@@ -25,6 +25,8 @@ rule surface:
         runtime=30,
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
+        # Of a file its content, whatever its time.
+        sha256=lambda wildcards: getattr(CAMPAIGN.topography(wildcards.surface), "sha256", None),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("make_surface.py"),
     message:

@@ -49,10 +49,11 @@ def guarded(snakemake):
             os.dup2(file.fileno(), 2)
         for path in outputs:
             checksums.begin(results, path)
-        _refuse_damaged(results, snakemake.input)
+        inputs = _checksums_of(results, snakemake.input)
         yield
+        asked = checksums.asked_of(map(repr, snakemake.params))
         for path in outputs:
-            checksums.write_checksum(results, path)
+            checksums.write_checksum(results, path, asked=asked, inputs=inputs)
         sys.stdout.flush()
     except Exception as error:
         expected = (ValueError, OSError, *_failures_of_solvers())
@@ -84,8 +85,11 @@ def _result(results, path):
     return str(file.parent if file.name == "SHA256SUMS" else file)
 
 
-def _refuse_damaged(results, inputs):
-    """Raise an error that names all inputs that are not what was written; the next call will find them, too."""
+def _checksums_of(results, inputs):
+    """Checksums of those inputs that are results; an error names all that are not what was written.
+
+    The next call will find these, too.
+    """
     paths = [os.path.relpath(path, results) for path in inputs if path.startswith(f"{results}/")]
     wrong = [path for path in paths if not checksums.is_whole(results, path, thorough=True)]
     for path in wrong:
@@ -97,6 +101,7 @@ def _refuse_damaged(results, inputs):
             f"{names}: not what was written, by its checksum; give the same command again, which sets it aside as "
             f"*.damaged and makes it again"
         )
+    return {path: checksums.sha256_as_written(results, path) for path in paths}
 
 
 def _say(text, terminal):

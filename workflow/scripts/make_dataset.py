@@ -5,9 +5,10 @@ from job import attributes, guarded
 from icha.datasets.campaign_file.write import write_campaign
 
 
-def make_dataset(runs, output, *, labels, attributes):
-    """Write the campaign dataset of the files `runs`, which have the given labels, to `output`."""
-    write_campaign(zip(labels, runs, strict=True), output, design=labels, attrs=attributes)
+def make_dataset(runs, output, *, labels, settings, attributes):
+    """Write the campaign dataset of the files `runs`, with their labels and checksums of settings, to `output`."""
+    settings = dict(zip(labels, settings, strict=True))
+    write_campaign(zip(labels, runs, strict=True), output, design=labels, settings=settings, attrs=attributes)
 
 
 if "snakemake" in globals():
@@ -16,5 +17,6 @@ if "snakemake" in globals():
             snakemake.input,
             snakemake.output[0],
             labels=snakemake.params.labels,
+            settings=snakemake.params.settings,
             attributes=attributes(snakemake),
         )

@@ -14,9 +14,15 @@ def publish(archive, *, results, files, named_files, project):
     # What is imported at the top is imported for every job of a campaign.
     from icha.configuration.load import load_configuration
     from icha.planning.plan import whole_cost
+    from icha.publication.consistency import refuse_mixed
     from icha.publication.deposit import make_deposit
     from icha.publication.environment import refuse_other_environment
     from icha.publication.source import program_source
+    from icha.support.checksums import asked_of
+
+    # Beside the rules, which they belong to, and not beside the scripts.
+    sys.path.insert(0, str(Path(project, "workflow")))
+    from provenance import recorded_jobs, recorded_parameters
 
     refuse_other_environment(Path(project))
     used = "config.used.yaml"
@@ -24,6 +30,10 @@ def publish(archive, *, results, files, named_files, project):
     given = {file: place for place, file in named_files.items()} | {f"{results}/{used}": used}
     made = {file: place for file, place in places.items() if place not in given.values()}
     campaign = load_configuration(Path(results, used)).campaign
+    records = Path(".snakemake/metadata")
+    jobs = recorded_jobs(records, made, given, scripts=Path(project, "workflow/scripts"))
+    asked = {place: asked_of(recorded_parameters(records, file)) for file, place in made.items()}
+    refuse_mixed(Path(results), campaign, asked)
     make_deposit(
         archive.removesuffix(".zip"),
         archive,
@@ -32,17 +42,9 @@ def publish(archive, *, results, files, named_files, project):
         publication=campaign.published(),
         campaign=campaign,
         source=program_source(project),
-        jobs=_recorded_jobs(Path(project, "workflow"), made, given),
+        jobs=jobs,
         cost=whole_cost(campaign, Path(results)),
     )
-
-
-def _recorded_jobs(workflow, made, given):
-    # Beside the rules, which it belongs to, and not beside the scripts.
-    sys.path.insert(0, str(workflow))
-    from provenance import recorded_jobs
-
-    return recorded_jobs(Path(".snakemake/metadata"), made, given, scripts=workflow / "scripts")
 
 
 if "snakemake" in globals():

@@ -2,7 +2,7 @@
 
 import os
 import pickle
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import BinaryIO, NamedTuple
 
@@ -44,15 +44,17 @@ class Members:
 
 
 def spooled(
-    runs: Iterable[tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]], spool: BinaryIO
+    runs: Iterable[tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]],
+    spool: BinaryIO,
+    settings: Mapping[RunLabels | tuple, str] = {},
 ) -> dict[str, Members]:
     """Note of every run what is needed of all, by study, and put its values into the spool.
 
     Raises
     ------
     ValueError
-        Naming the run: if it is given twice, has other labels than its dataset, or holds a value that is not finite;
-        if there is none.
+        Naming the run: if it is given twice, has other labels than its dataset, was computed with other settings than
+        it should, or holds a value that is not finite; if there is none.
     """
     studies: dict[str, Members] = {}
     # Most runs have the same variables, sizes and snapshots, which are then kept once.
@@ -64,6 +66,12 @@ def spooled(
             raise ValueError(f"{labels}: this run is given twice")
         values, attrs = _values_of(source) if isinstance(source, xr.Dataset) else read_run_values(source, CELLS)
         _check_labels(labels, values, attrs)
+        if attrs.get("config_sha256") != settings.get(labels, attrs.get("config_sha256")):
+            file = labels if isinstance(source, xr.Dataset) else source
+            raise ValueError(
+                f"{file}: this run was computed with other settings than are asked for; remove it and give the same "
+                "command again, which computes it"
+            )
         _refuse_values_not_finite(labels, values)
         sizes = {dim: n for dims, v in values.values() for dim, n in zip(dims, v.shape, strict=False)}
         alike = frozenset(values), tuple(sorted(sizes.items())), _snapshots(values)

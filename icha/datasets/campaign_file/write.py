@@ -35,6 +35,7 @@ def write_campaign(
     path: str | os.PathLike,
     *,
     design: Iterable[RunLabels | tuple] | None = None,
+    settings: Mapping[RunLabels | tuple, str] = {},
     attrs: Mapping[str, str] = {},
 ) -> None:
     """Write all runs of a campaign to one netCDF-4 file: a group per study, full arrays along the labels of the runs.
@@ -58,18 +59,21 @@ def write_campaign(
     path : the file, which appears whole or not at all. The same runs give the same bytes.
     design : labels of the runs that were asked for; those given, if left out. Other combinations of their labels are
         not in the design.
+    settings : checksums of the settings that runs are to have been computed with (their attribute `config_sha256`), by
+        their labels.
     attrs : global attributes of the file (title, summary, campaign, license, …).
 
     Raises
     ------
     ValueError
-        Naming the run: if it is given twice, is not in the design, has other labels than its dataset, holds a value
-        that is not finite, or does not fit its study's other runs; if a study has no run; if a file cannot be read.
+        Naming the run: if it is given twice, is not in the design, has other labels than its dataset, was computed with
+        other settings than it should, holds a value that is not finite, or does not fit its study's other runs; if a
+        study has no run; if a file cannot be read.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=path.parent) as spool:
-        studies = arranged(spooled(runs, spool), design)
+        studies = arranged(spooled(runs, spool, settings), design)
         with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
             origins = [each for study in studies for each in study.origins]
             own = collected("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
