@@ -1,25 +1,22 @@
-"""Compute a deposit again, from its own source and lock file, and compare."""
+"""Compute a deposit again, by the program that is installed or by its own, and compare."""
 
-import contextlib
-import os
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
+import textwrap
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from icha.cli.options import Cores
+from icha.cli.options import Cores, Large
 from icha.cli.project import FAILED, Mistake, shown
-from icha.cli.terminal import say
+from icha.cli.rerun_programs import fail, run_installed, run_own_source, stopped_by_signals
+from icha.cli.terminal import confirmed, say
+from icha.support import in_words
 from icha.support.in_words import counted
-
-# In the folder of a rerun: what was said while its environment was installed.
-_LOG = "environment.log"
-_LAST_LINES = 8
+from icha.support.printable import printable
 
 
 def reproduce(
@@ -42,40 +39,75 @@ def reproduce(
         ),
     ] = None,
     cores: Cores = None,
+    own_source: Annotated[
+        bool, typer.Option("--own-source", help="Run the program that is in the deposit, which may do anything.")
+    ] = False,
     environment: Annotated[
-        Literal["lock", "here"],
-        typer.Option(help="lock: install what the deposit's lock file says; here: use what is there, if it agrees."),
-    ] = "lock",
+        Literal["lock", "here"] | None,
+        typer.Option(
+            help="Of its own source: lock (if left out) installs what its lock file says; here uses what is there, if "
+            "it agrees.",
+            show_default=False,
+        ),
+    ] = None,
+    isolation: Annotated[
+        Literal["bwrap", "podman", "docker", "none"] | None,
+        typer.Option(
+            help="Of its own source: what keeps it to the folder, and off the network once all is installed. Left out: "
+            "bwrap, where that works.",
+            show_default=False,
+        ),
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
     json: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the comparison to this file.", show_default=False)
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the temporary folder in any case.")] = False,
+    large: Large = False,
 ) -> None:
     """Compute a deposit again and compare every number with it.
 
-    The deposit is verified and only read. Its source is copied, its environment is installed from the lock file (that
-    needs network, make and Python), its configuration is run, and everything that was computed is compared, variable by
-    variable: identical, within tolerance, or different. With `--only smallest` this takes minutes.
+    The deposit is verified and only read. Its configuration is run by the ICHA that is installed, if its version and
+    those of all packages are those of the deposit; nothing in the deposit is executed. With --own-source the program in
+    the deposit is run instead, in the environment of its lock file (that needs network, make and Python); you are told
+    what that means, and asked. Everything that was computed is compared, variable by variable: identical, within
+    tolerance, or different. With `--only smallest` this takes minutes.
 
-    Exit status: 0 if all is identical or within tolerance, 1 if not, 2 if the deposit is damaged or not there.
+    Exit status: 0 if all is identical or within tolerance, 1 if not, 2 if the deposit is damaged or not there, or
+    cannot be computed.
     """
     from icha.publication.deposit_files import contents, verify_deposit
-    from icha.publication.rerun import Refused, asked_runs, begin, campaign_of
+    from icha.publication.isolation import NO_ISOLATION
+    from icha.publication.rerun import LOCK, OWN_SOURCE, PROGRAM, Refused, asked_runs, begin, campaign_of
+    from icha.publication.strangers_files import LIMITS, NO_LIMITS
 
     if not deposit.exists():
         raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")
-    if wrong := verify_deposit(deposit):
-        raise Mistake(f"{deposit}: the deposit is damaged; needed: a whole one:\n" + "\n".join(wrong))
+    if not own_source and (environment or isolation):
+        given = "--environment" if environment else "--isolation"
+        raise Mistake(f"{given}: is about the deposit's own source, which is not run; needed: --own-source as well")
+    if wrong := verify_deposit(deposit, NO_LIMITS if large else LIMITS):
+        raise Mistake(f"{printable(deposit)}: the deposit is damaged; needed: a whole one:\n" + "\n".join(wrong))
     sizes = contents(deposit)
     temporary = folder is None
     try:
-        campaign, runs = campaign_of(deposit, sizes), asked_runs(only or (), deposit, sizes)
+        campaign = campaign_of(deposit, sizes, OWN_SOURCE if own_source else (PROGRAM, LOCK))
+        runs = asked_runs(only or (), deposit, sizes)
+        isolation = _isolation(isolation, environment) if own_source else NO_ISOLATION
+        place = shown(folder) if folder else "a temporary folder"
+        _tell_what_it_says(deposit, sizes)
+        if own_source:
+            _tell_of_own_source(environment or "lock", isolation, place)
+            _ask(yes)
+        else:
+            _tell_of_installed(deposit, place)
         folder = Path(tempfile.mkdtemp(prefix="icha-reproduce-") if temporary else folder).resolve()
         begin(folder, deposit)
     except Refused as refused:
         raise Mistake(str(refused)) from None
     try:
-        made, comparison, status = _computed_again(deposit, folder, campaign, runs, sizes, environment, cores)
+        how = (environment or "lock", isolation) if own_source else None
+        made, comparison, status = _computed_again(deposit, folder, campaign, runs, sizes, how, cores)
     except Mistake:
         if temporary:
             shutil.rmtree(folder)
@@ -93,111 +125,105 @@ def reproduce(
         raise typer.Exit(FAILED)
 
 
-def _computed_again(deposit, folder, campaign, runs, sizes, environment, cores):
+def _isolation(asked: str | None, environment: str | None) -> str:
+    """The program that isolates: the one that is asked for, or `bwrap` where it works."""
+    from icha.publication.isolation import BWRAP, CONTAINERS, NO_ISOLATION, works
+
+    if asked == NO_ISOLATION:
+        return NO_ISOLATION
+    if asked in CONTAINERS and environment == "here":
+        raise Mistake(f"--isolation {asked}: cannot use what is installed here; allowed: bwrap, none")
+    if works(asked or BWRAP):
+        return asked or BWRAP
+    if asked:
+        raise Mistake(f"--isolation {asked}: is not installed, or cannot isolate here; allowed: another one, or none")
+    return NO_ISOLATION
+
+
+def _tell_what_it_says(deposit: Path, sizes) -> None:
+    """Print what the deposit is, and what it says of itself."""
+    from icha.publication.statement import METADATA, metadata_of, statement
+
+    said = {}
+    if METADATA in sizes:
+        try:
+            said = {name: text for name, text in statement(metadata_of(deposit)).items() if text}
+        except ValueError as error:
+            raise Mistake(f"{printable(deposit)}: {error}") from None
+    say(f"deposit:    {printable(deposit)}, {counted(len(sizes), 'file')}, {in_words.size(sum(sizes.values()))}")
+    say("it says of itself, and nobody has checked it:" if said else "it does not say whose it is")
+    for name, text in said.items():
+        say(f"  {name + ':':<10}{printable(textwrap.shorten(text, 200, placeholder=' …'))}")
+
+
+def _tell_of_installed(deposit: Path, place) -> None:
+    """Print that the installed program is run; `Mistake` if it is not the one that made the deposit."""
+    from icha.publication.rerun import changed_modules, unlike_installed
+
+    if wrong := unlike_installed(deposit):
+        raise Mistake(
+            f"what is installed is not what {printable(deposit)} was made with; needed: these versions, as "
+            "`make environment` installs them in a clone of that version; or --own-source, which runs the program in "
+            "the deposit:\n" + "\n".join(wrong)
+        )
+    say(f"is run:     the ICHA that is installed, {version('icha')}; nothing in the deposit is executed")
+    if changed := changed_modules(deposit):
+        say(f"            (the deposit's source differs from it in {counted(changed, 'module')})", fg="yellow")
+    say(f"can touch:  {place}")
+
+
+def _tell_of_own_source(environment: str, isolation: str, place) -> None:
+    """Print that the deposit's own program is run, what it can touch, and what is better."""
+    from icha.publication.isolation import BWRAP, CONTAINERS, NO_ISOLATION, works
+    from icha.publication.rerun import surroundings
+
+    first = "" if environment == "here" else "its `make environment`, and then "
+    say(f"is run:     the program in the deposit: {first}its `icha run`")
+    if isolation == NO_ISOLATION:
+        say("can touch:  whatever you can: your files, your network, your programs", fg="red")
+        there = next((name for name in CONTAINERS if works(name)), None)
+        advice = f"with --isolation {there}" if there else f"install {BWRAP} (bubblewrap), which is then used"
+        say(f"advice:     run it isolated: {advice}", fg="yellow")
+    else:
+        until = "no network" if environment == "here" else "the network until its environment is installed"
+        say(f"can touch:  {place}, and by {isolation} nothing else; {until}")
+    say(f"variables:  {', '.join(sorted(surroundings()))}; no other ones of yours")
+
+
+def _ask(yes: bool) -> None:
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise Mistake("there is no terminal to ask at, so nothing of the deposit is run; needed: --yes, or a terminal")
+    if not confirmed("Run it?"):
+        say("Nothing was run.")
+        raise typer.Exit(FAILED)
+
+
+def _computed_again(deposit, folder, campaign, runs, sizes, how, cores):
     """The folder with the results, their comparison with the deposit's, and the exit status of the campaign."""
-    from icha.publication.rerun import prepare
+    from icha.publication.rerun import Refused, prepare, refuse_wrong_configuration
 
     goes_on = f"the same command with --folder {shown(folder)} goes on from here"
+    name = campaign["name"]
     try:
-        with _stopped_by_signals():
-            project, original = prepare(folder, deposit)
-            program = _program(project, folder, environment)
-            made = project / "results" / campaign
-            status = _run(program, project, _targets(runs, campaign), cores)
+        with stopped_by_signals():
+            project, original = prepare(folder, deposit, own_source=bool(how))
+            say(f"computing in {shown(project)}")
+            targets = [f"results/{name}/{run}" for run in runs] or ["all"]
+            if how:
+                status = run_own_source(project, folder, campaign, targets, cores, *how)
+            else:
+                refuse_wrong_configuration(project)
+                status = run_installed(project, targets, cores)
+            made = project / "results" / name
             if not made.is_dir():
-                _fail(f"nothing was computed; {goes_on}")
+                fail(f"nothing was computed; {goes_on}")
             return made, _compared(original, made, runs, sizes), status
+    except Refused as refused:
+        raise Mistake(str(refused)) from None
     except KeyboardInterrupt:
-        _fail(f"stopped; {goes_on}")
-
-
-def _fail(message: str):
-    say(f"Error: {message}", err=True, fg="red")
-    raise typer.Exit(FAILED) from None
-
-
-@contextlib.contextmanager
-def _stopped_by_signals():
-    """Let what asks us to end interrupt us, as Ctrl-C does."""
-
-    def interrupt(number, frame):
-        raise KeyboardInterrupt
-
-    heeded = [each for each in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(each) is not signal.SIG_IGN]
-    former = {each: signal.signal(each, interrupt) for each in heeded}
-    try:
-        yield
-    finally:
-        for each, handler in former.items():
-            signal.signal(each, handler)
-
-
-def _targets(runs: list[str], campaign: str) -> list[str]:
-    return [f"results/{campaign}/{run}" for run in runs] or ["all"]
-
-
-def _program(project: Path, folder: Path, environment: str) -> tuple[list[str], dict[str, str]]:
-    """The command `icha` of the deposit's source in the environment that is asked for, and its variables."""
-    from icha.publication.rerun import environment_target, surroundings
-
-    if environment == "here":
-        from icha.publication.environment import differences
-
-        if wrong := differences(project / "uv.lock"):
-            raise Mistake(
-                "--environment here: what is installed is not what the deposit's uv.lock says; needed: that, or "
-                "--environment lock:\n" + "\n".join(wrong)
-            )
-        called = [sys.executable, "-c", "from icha.cli import main; main()"]
-        return called, {**surroundings(), "PATH": os.environ.get("PATH", ""), "PYTHONPATH": str(project)}
-    log = folder / _LOG
-    say(f"installing the environment of the deposit ({shown(log)})")
-    python = os.path.realpath(sys.executable)  # that of no environment
-    with log.open("w", encoding="utf-8") as said:
-        try:
-            status = _call(
-                ["make", environment_target(project), f"PYTHON={python}"],
-                cwd=project,
-                env=surroundings(),
-                stdin=subprocess.DEVNULL,
-                stdout=said,
-                stderr=subprocess.STDOUT,
-            )
-        except FileNotFoundError:
-            _fail("`make`, which installs the environment, was not found; needed: make, or --environment here")
-    if status:
-        lines = [line for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
-        last = "\n".join(f"    {line}" for line in lines[-_LAST_LINES:])
-        _fail(
-            f"the environment could not be installed; without network, --environment here uses what is installed, if "
-            f"it agrees with the lock file:\n{last}\n    log: {shown(log)}"
-        )
-    return [str(project / ".venv/bin/icha")], surroundings()
-
-
-def _run(program, project: Path, targets: list[str], cores: str | None) -> int:
-    """Run the campaign, which says itself how it goes; return its exit status."""
-    from icha.datasets.results import CONFIGURATION
-
-    command, variables = program
-    say(f"computing in {shown(project)}; paths are relative to it")
-    asked = ["run", CONFIGURATION, *targets, *(["--cores", cores] if cores else [])]
-    sys.stdout.flush()
-    return _call([*command, *asked], cwd=project, env=variables, stdin=subprocess.DEVNULL)
-
-
-def _call(command: list[str], **how) -> int:
-    """Run a program to its end; tell it once if we are interrupted, and wait until it has ended, too."""
-    process = subprocess.Popen(command, process_group=0, **how)
-    try:
-        return process.wait()
-    except KeyboardInterrupt:
-        # What ignores one of them, started in the background of a script for one, heeds the other.
-        ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGTERM if ignored else signal.SIGINT)
-        process.wait()
-        raise
+        fail(f"stopped; {goes_on}")
 
 
 def _compared(original: Path, made: Path, runs: list[str], sizes):
@@ -216,6 +242,9 @@ def _tell(comparison, status: int) -> bool:
 
     say(f"\nthe deposit, and what was computed again:\n\n{table(comparison)}\n")
     files = counted(len(comparison.files), "file")
+    if not comparison.files:
+        say("nothing was compared, so nothing is reproduced", fg="red")
+        return False
     if comparison.verdict == DIFFERENT:
         say("different: not everything is reproduced", fg="red")
     elif comparison.verdict == IDENTICAL:

@@ -1,5 +1,7 @@
 """What commands print: whatever is in it, nothing acts on the terminal but the colours that are asked for here."""
 
+import sys
+
 import typer
 
 from icha.support.printable import printable_lines
@@ -15,3 +17,12 @@ def markup(text: object) -> str:
     from rich.markup import escape
 
     return escape(printable_lines(text))
+
+
+def confirmed(question: str) -> bool:
+    """The answer of who sits at the terminal; that there is none, and Ctrl-C, are a no."""
+    try:
+        return sys.stdin.isatty() and typer.confirm(question)
+    except typer.Abort:
+        say()
+        return False

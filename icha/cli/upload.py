@@ -1,7 +1,7 @@
 """Send a deposit to Zenodo, after having said what is sent, and asked."""
 
 import contextlib
-import json
+import math
 import os
 import re
 import sys
@@ -11,14 +11,15 @@ from typing import Annotated
 
 import typer
 
+from icha.cli.options import Large
 from icha.cli.project import FAILED, Mistake, shown
-from icha.cli.terminal import say
+from icha.cli.terminal import confirmed, say
 from icha.support import in_words
+from icha.support.printable import printable
 
 TOKEN = "ZENODO_TOKEN"
 # Beside the archive, where Zenodo shows them.
 _BESIDE = ("README.md", "ro-crate-metadata.json")
-_METADATA = ".zenodo.json"
 
 
 def upload(
@@ -48,6 +49,7 @@ def upload(
         bool, typer.Option("--publish", help="Also publish it. This cannot be undone, so you are asked again.")
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    large: Large = False,
 ) -> None:
     """Send a deposit to Zenodo as a draft, after showing what is sent where, and asking.
 
@@ -70,7 +72,7 @@ def upload(
         raise Mistake(f"--url: {error}") from None
     draft, new_version_of = _number("--draft", draft), _number("--new-version-of", new_version_of)
     token = _token(address)
-    archive = _archive(deposit)
+    archive = _archive(deposit, large)
     with tempfile.TemporaryDirectory() as folder:
         files, metadata = _contents(archive, Path(folder))
         _refuse_foreign_doi(metadata, draft)
@@ -102,9 +104,10 @@ def _token(address: str) -> str:
     return token
 
 
-def _archive(deposit: Path) -> Path:
+def _archive(deposit: Path, large: bool) -> Path:
     """The zip of a deposit, verified."""
     from icha.publication.deposit_files import CHECKSUMS, read_file, verify_deposit
+    from icha.publication.strangers_files import LIMITS, NO_LIMITS
 
     archive = deposit
     if deposit.is_dir():
@@ -113,7 +116,7 @@ def _archive(deposit: Path) -> Path:
             raise Mistake(f"{deposit}: there is no {archive.name} beside it; `icha run … publish` makes both")
     if not archive.is_file():
         raise Mistake(f"{deposit}: no such file or folder")
-    wrong = verify_deposit(archive)
+    wrong = verify_deposit(archive, NO_LIMITS if large else LIMITS)
     if not wrong and deposit.is_dir() and read_file(archive, CHECKSUMS) != read_file(deposit, CHECKSUMS):
         wrong = ["its zip and its folder have different checksums"]
     if wrong:
@@ -124,14 +127,18 @@ def _archive(deposit: Path) -> Path:
 def _contents(archive: Path, folder: Path) -> tuple[list[Path], dict]:
     """The files that are sent, and the metadata for Zenodo."""
     from icha.publication.deposit_files import contents, read_file
+    from icha.publication.statement import METADATA, metadata_of
 
     there = contents(archive)
-    for name in (*_BESIDE, _METADATA):
+    for name in (*_BESIDE, METADATA):
         if name not in there:
             raise Mistake(f"{archive}: has no {name}, as a deposit has")
     for name in _BESIDE:
-        (folder / name).write_bytes(read_file(archive, name))
-    return [archive, *(folder / name for name in _BESIDE)], json.loads(read_file(archive, _METADATA))
+        (folder / name).write_bytes(read_file(archive, name, math.inf))
+    try:
+        return [archive, *(folder / name for name in _BESIDE)], metadata_of(archive)
+    except ValueError as error:
+        raise Mistake(f"{archive}: {error}") from None
 
 
 def _refuse_foreign_doi(metadata: dict, draft: str | None) -> None:
@@ -145,19 +152,16 @@ def _refuse_foreign_doi(metadata: dict, draft: str | None) -> None:
 
 
 def _summary(metadata: dict, files: list[Path], where: str) -> str:
-    authors = "; ".join(creator.get("name", "") for creator in metadata.get("creators", ()))
-    communities = ", ".join(each.get("identifier", "") for each in metadata.get("communities", ()))
+    from icha.publication.statement import names, statement
+
     sizes = [(path, path.stat().st_size) for path in files]
     rows = [
         ("to", where),
-        ("title", metadata.get("title")),
-        ("version", metadata.get("version")),
-        ("authors", authors),
-        ("licence", metadata.get("license")),
-        ("community", communities or "none"),
+        *statement(metadata).items(),
+        ("community", names(metadata, "communities", "identifier")),
         *(("file", f"{path.name}, {in_words.size(size)} ({size:,} bytes)") for path, size in sizes),
     ]
-    return "\n".join(f"{name + ':':<11}{value or 'none'}" for name, value in rows)
+    return "\n".join(f"{name + ':':<11}{printable(value or 'none')}" for name, value in rows)
 
 
 def _ask(yes: bool) -> None:
@@ -165,7 +169,7 @@ def _ask(yes: bool) -> None:
         return
     if not sys.stdin.isatty():
         raise Mistake("there is no terminal to ask at, so nothing is sent; needed: --yes, or a terminal")
-    if not _confirmed("Send it?"):
+    if not confirmed("Send it?"):
         say("Nothing was sent.")
         raise typer.Exit(FAILED)
 
@@ -196,14 +200,14 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
             if path.name in there:
                 say(f"{path.name}: is there already")
                 continue
-            confirmed = server.upload(draft, path, sums[path.name])
-            checked = "its checksum is right" if confirmed else "the server gives no checksum"
+            arrived = server.upload(draft, path, sums[path.name])
+            checked = "its checksum is right" if arrived else "the server gives no checksum"
             say(f"{path.name}: sent, {checked}")
         if others:
             say(f"The draft also has other files, which stay there: {', '.join(others)}")
         if draft.doi:
             say(f"DOI:       {draft.doi} (reserved)")
-        if publish and (yes or _confirmed("Publish it? What is published cannot be deleted.")):
+        if publish and (yes or confirmed("Publish it? What is published cannot be deleted.")):
             published = server.publish(draft)
             say(f"published: {published.page}\nDOI:       {published.doi}")
         else:
@@ -219,12 +223,3 @@ def _send(archive, files, metadata, address, token, number, new_version_of, publ
                 err=True,
             )
         raise typer.Exit(FAILED) from None
-
-
-def _confirmed(question: str) -> bool:
-    """The answer of who sits at the terminal; that there is none, and Ctrl-C, are a no."""
-    try:
-        return sys.stdin.isatty() and typer.confirm(question)
-    except typer.Abort:
-        say()
-        return False

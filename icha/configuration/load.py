@@ -42,13 +42,16 @@ class Configuration:
     warnings: tuple[str, ...] = field(compare=False, default=())
 
 
-def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | None = None) -> Configuration:
+def load_configuration(
+    path: str | os.PathLike, overrides: Mapping[str, Any] | None = None, *, within: str | os.PathLike | None = None
+) -> Configuration:
     """Read and check a configuration file.
 
     Parameters
     ----------
     path : YAML file.
     overrides : values that replace those of the file, key by key, as given by `snakemake --config`.
+    within : folder in which all files that it names must lie, as those of a stranger must; anywhere if left out.
 
     Raises
     ------
@@ -78,6 +81,7 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
         fail(problem_of(details, content) for details in error.errors())
     campaign, design_problems = designed(campaign.with_files_beside(path.parent), content)
     fail(design_problems)
+    fail(_files_outside(campaign, within) if within is not None else ())
     topographies, unread = _topographies(campaign)
     fail(unread)
     campaign = campaign.with_topographies(topographies)
@@ -90,6 +94,17 @@ def load_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | N
         said(each.location, each.value, f"is unusual{each.how}, but confirmed; usual: {each.usual}") for each in unusual
     ]
     return Configuration(campaign, dumped(written), str(path), (*campaign.warnings(), *confirmed))
+
+
+def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
+    """Files that a campaign names and that do not lie in a folder, links followed."""
+    named = {("surfaces", name): each.path for name, each in campaign.surfaces.items() if not each.random}
+    named |= {("measurements", name): each.path for name, each in campaign.measurements.items()}
+    return [
+        ((section, campaign.origin(section, name), "path"), path, "lies elsewhere; allowed: files beside it")
+        for (section, name), path in named.items()
+        if not Path(path).resolve().is_relative_to(Path(folder).resolve())
+    ]
 
 
 def _origin(path: Path, from_file: Mapping, overrides: Mapping, location: tuple) -> str:

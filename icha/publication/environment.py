@@ -44,7 +44,7 @@ def refuse_results_of_another_environment(results: Path, project: Path) -> None:
     ValueError
         If other versions were noted; the message lists them and says what to do.
     """
-    locked = {(_normal(package["name"]), package["version"]) for package in _locked(project / "uv.lock")}
+    locked = {(_normal(package["name"]), package["version"]) for package in _locked(_text(project))}
     names = {name for name, _ in locked}
     made = (tuple(line.split("==")) for line in sorted(_noted(results)))
     if other := [f"  {name} {version}" for name, version in made if name in names and (name, version) not in locked]:
@@ -74,7 +74,7 @@ def refuse_other_environment(project: Path) -> None:
         If a package that is installed has another version than in the lock, or if the package `icha` that jobs import
         is not the one of the project.
     """
-    wrong = differences(project / "uv.lock")
+    wrong = differences(_text(project))
     own, imported = package_of(project.resolve()), Path(importlib.util.find_spec("icha").origin).resolve().parent
     if imported != own:
         wrong = [f"  icha: imported from {imported}, and not from {own}", *wrong]
@@ -91,11 +91,19 @@ def refuse_other_environment(project: Path) -> None:
         )
 
 
-def differences(lock: Path) -> list[str]:
+def _text(project: Path) -> str:
+    return (project / "uv.lock").read_text(encoding="utf-8")
+
+
+def differences(lock: str) -> list[str]:
     """Packages that are installed in another version than in the lock, a line each.
 
     What is locked and not installed is left out (no environment has all optional parts), and so is what has no
     version there: the project itself.
+
+    Parameters
+    ----------
+    lock : the text of uv.lock.
     """
     locked: dict[str, set[str]] = {}
     for package in _locked(lock):
@@ -109,7 +117,7 @@ def differences(lock: Path) -> list[str]:
     return [*wrong[:_MOST_NAMES], *([f"  and {len(wrong) - _MOST_NAMES} more"] if len(wrong) > _MOST_NAMES else [])]
 
 
-def constraints(lock: Path) -> list[str]:
+def constraints(lock: str) -> list[str]:
     """The versions of a lock for this Python and system, a line each, as pip takes them."""
     from packaging.markers import Marker
 
@@ -123,9 +131,9 @@ def constraints(lock: Path) -> list[str]:
     ]
 
 
-def _locked(lock: Path) -> Iterator[dict]:
+def _locked(lock: str) -> Iterator[dict]:
     """The packages of a lock, but for the project itself, which has no version there."""
-    for package in tomllib.loads(lock.read_text(encoding="utf-8"))["package"]:
+    for package in tomllib.loads(lock)["package"]:
         if "editable" not in package["source"]:
             yield package
 
@@ -136,4 +144,4 @@ def _normal(name: str) -> str:
 
 
 if __name__ == "__main__":
-    print("\n".join(constraints(own_workflow() / "uv.lock")))
+    print("\n".join(constraints(_text(own_workflow()))))

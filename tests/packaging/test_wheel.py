@@ -122,7 +122,7 @@ def built(tmp_path_factory):
 def install(built, tmp_path_factory):
     """Install the wheel, with an extra, in an empty environment, in the versions of the lock."""
     locked = tmp_path_factory.mktemp("locked") / "locked.txt"
-    locked.write_text("\n".join(constraints(REPOSITORY / "uv.lock")))
+    locked.write_text("\n".join(constraints((REPOSITORY / "uv.lock").read_text())))
 
     def installed(name, extra=""):
         place = tmp_path_factory.mktemp("environments") / name

@@ -520,10 +520,11 @@ def test_whole_deposits_are_said_to_be_whole(published):
 
 
 @pytest.mark.slow
-def test_computed_again_it_has_the_same_bytes(published, tmp_path):
-    """By its own source, elsewhere, without the repository: every file of the results."""
+@pytest.mark.parametrize("own_source", [[], ["--own-source", "--yes", "--environment", "here"]])
+def test_computed_again_it_has_the_same_bytes(own_source, published, tmp_path):
+    """By what is installed, and by its own source without the repository: every file of the results."""
     archive = published.with_name(f"{published.name}.zip")
-    asked = ["--environment", "here", "--folder", str(tmp_path / "again"), "--json", str(tmp_path / "out.json")]
+    asked = [*own_source, "--folder", str(tmp_path / "again"), "--json", str(tmp_path / "out.json")]
     done = CliRunner().invoke(app, ["reproduce", str(archive), *asked])
     assert done.exit_code == 0, done.output
     files = json.loads((tmp_path / "out.json").read_text())["files"]

@@ -21,7 +21,7 @@ def test_another_environment_than_the_locked_one_is_refused(tmp_path):
             for name, number, source in packages
         )
         (tmp_path / "uv.lock").write_text(f"version = 1\n{text}")
-        return tmp_path / "uv.lock"
+        return (tmp_path / "uv.lock").read_text()
 
     index = 'registry = "https://pypi.org/simple"'
     own = ("icha", "99.0", 'editable = "."')

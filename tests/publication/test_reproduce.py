@@ -1,8 +1,9 @@
-"""`icha reproduce`: a deposit whose program is a small script, for all that may go right and wrong around it."""
+"""`icha reproduce --own-source`: a program that is a small script, for all that may go right and wrong around it."""
 
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -13,6 +14,7 @@ from importlib.metadata import version
 import netCDF4
 import numpy as np
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from icha.cli import app
@@ -20,6 +22,8 @@ from icha.publication.deposit_files import verify_deposit
 from icha.publication.rerun import environment_target
 
 NAME = "mine-1.0.0"
+# Nothing is isolated, so that a test can plant something; `LC_` is a beginning of names that are passed on.
+OWN = ("--own-source", "--isolation", "none", "--yes")
 SOFT, HARD = "load/rough/seed1/slope1/soft", "load/rough/seed2/slope1/hard"
 # Stands for the deposit's `icha`: it makes what it is asked for, a number each, and tells how it was called.
 PROGRAM = """
@@ -34,31 +38,31 @@ files = [*runs, "surfaces/rough/seed1.nc", "surfaces/rough/seed2.nc", "dataset/m
 asked = [t.removeprefix("results/mine/") for t in targets if t.endswith(".nc")]
 with open("called.jsonl", "a") as log:
     log.write(json.dumps([sys.argv[1:], dict(os.environ)]) + "\\n")
-if os.environ.get("PLANTED") == "fails":
+if os.environ.get("LC_PLANTED") == "fails":
     sys.exit("the program fails")
 surfaces = [f"surfaces/rough/{path.split('/')[3]}.nc" for path in asked]
 for path in [*surfaces, *asked] or files:
     (results / path).parent.mkdir(parents=True, exist_ok=True)
     with netCDF4.Dataset(results / path, "w") as file:
         file.createDimension("step", 3)
-        planted = os.environ.get("PLANTED", "")
+        planted = os.environ.get("LC_PLANTED", "")
         factor = 1 + float(planted or 0) if path.endswith("soft.nc") and planted != "sleeps" else 1
         file.createVariable("pressure", "f8", ("step",))[:] = [number, 2.0 * factor, 3.0]
         if "seed2" in path:
             file.note = 1000 * "large"
-    print("made", path, flush=True)
-    if os.environ.get("PLANTED") == "sleeps":
-        try:
+    try:
+        print("made", path, flush=True)
+        if os.environ.get("LC_PLANTED") == "sleeps":
             time.sleep(60)
-        except KeyboardInterrupt:
-            time.sleep(0.5)
-            pathlib.Path("ended").touch()
-            sys.exit(1)
+    except KeyboardInterrupt:
+        time.sleep(0.5)
+        pathlib.Path("ended").touch()
+        sys.exit(1)
 (results / "verdict.txt").write_text("passed")
 """
 MAKEFILE = f"""
 environment:
-	@test "$$PLANTED" != "no network" || (echo "cannot reach the index" && exit 1)
+	@test "$$LC_PLANTED" != "no network" || (echo "cannot reach the index" && exit 1)
 	@mkdir -p .venv/bin
 	@printf '#!{sys.executable}\\nimport runpy; runpy.run_path("program.py")\\n' > .venv/bin/icha
 	@chmod +x .venv/bin/icha
@@ -117,9 +121,9 @@ def reproduce(monkeypatch, tmp_path, capfd):
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
 
-    def call(*arguments, planted=""):
-        monkeypatch.setenv("PLANTED", planted)
-        done = CliRunner().invoke(app, ["reproduce", *map(str, arguments)])
+    def call(*arguments, planted="", how=OWN):
+        monkeypatch.setenv("LC_PLANTED", planted)
+        done = CliRunner().invoke(app, ["reproduce", *map(str, arguments), *how])
         assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
         out, err = capfd.readouterr()
         return done.exit_code, done.output + out + err
@@ -153,20 +157,33 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, made, r
     ],
 )
 def test_the_environment_is_the_one_that_the_campaign_needs(asked, targets, target, tmp_path):
-    (tmp_path / "config.used.yaml").write_text(asked)
     (tmp_path / "Makefile").write_text("".join(f"{each}:\n\t@true\n" for each in targets.split()))
-    assert environment_target(tmp_path) == target
+    assert environment_target(tmp_path, yaml.safe_load(asked)) == target
 
 
 def test_nothing_of_the_caller_s_environment_gets_in(made, reproduce, tmp_path, monkeypatch):
     leaking = ("VIRTUAL_ENV", "PYTHONPATH", "PYTHONHOME_", "SNAKEMAKE_PROFILE", "UV_PROJECT_ENVIRONMENT", "MAKEFLAGS")
+    leaking += ("ZENODO_TOKEN", "GITHUB_TOKEN", "AWS_SECRET_ACCESS_KEY", "SSH_AUTH_SOCK", "UV_PUBLISH_TOKEN", "X")
     for name in leaking:
         monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setenv("HTTPS_PROXY", "http://user:secret@proxy:8080")
+    monkeypatch.setenv("HTTP_PROXY", "http://proxy:8080")
     monkeypatch.setenv("PATH", os.pathsep.join([f"{sys.prefix}/bin", os.environ["PATH"]]))
-    assert reproduce(made, "--folder", tmp_path / "again", "--cores", "3")[0] == 0
+    status, said = reproduce(made, "--folder", tmp_path / "again", "--cores", "3")
+    assert status == 0
     ((arguments, environment),) = calls(tmp_path / "again")
     assert arguments == ["run", "config.used.yaml", "all", "--cores", "3"]
-    assert not set(leaking) & set(environment) and "PLANTED" in environment
+    assert not {*leaking, "HTTPS_PROXY"} & set(environment) and {"LC_PLANTED", "HTTP_PROXY"} <= set(environment)
+    passed = re.search("^variables:  (.*); no other ones of yours$", said, re.MULTILINE)[1].split(", ")
+    # Make and the shell add some of their own.
+    assert {"HTTP_PROXY", "PATH"} <= set(passed) and set(environment) <= {
+        *passed,
+        "PWD",
+        "SHLVL",
+        "_",
+        "LC_CTYPE",
+        "HDF5_PLUGIN_PATH",
+    }
     if sys.prefix != sys.base_prefix:
         assert f"{sys.prefix}/bin" not in environment["PATH"].split(os.pathsep)
 
@@ -305,10 +322,11 @@ def test_what_was_stopped_goes_on(made, reproduce, tmp_path):
         str(made),
         "--folder",
         str(folder),
+        *OWN,
     ]
     process = subprocess.Popen(
         program,
-        env=os.environ | {"PLANTED": "sleeps"},
+        env=os.environ | {"LC_PLANTED": "sleeps"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
