@@ -2,7 +2,6 @@
 
 PYTHON ?= python3
 CORES ?= 2
-UV_VERSION := 0.13.8
 CONFIG ?=
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -14,7 +13,7 @@ export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all wheel lint format schema docs linkcheck benchmarks benchmarks-page short-range faults validators-environment validate clean
+.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all audit wheel lint format schema docs linkcheck benchmarks benchmarks-page short-range faults validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -24,6 +23,7 @@ help:
 	@echo "make tamaas  install Tamaas as well, for boundary elements at finite ranges (campaign validation, tests)"
 	@echo "make test    run the tests that one waits for (four minutes): physics, every rule, wrong input"
 	@echo "make test-all  run them and all others: thousands of random cases, kills, resumption, Slurm, browser, deposits"
+	@echo "make audit   ask whether vulnerabilities of the locked packages are known (part of test-all; needs network)"
 	@echo "make wheel   build the sdist, and from it the wheel, in dist/"
 	@echo "make lint    check style of Python code and workflow"
 	@echo "make format  put Python code and workflow into that style"
@@ -40,10 +40,12 @@ help:
 
 environment: .venv/.installed
 
-.venv-tools/bin/uv:
+# Whatever is installed is what its checksum says: uv by the list of pip, all else by uv.lock and lists like it.
+.venv-tools/bin/uv: workflow/envs/uv.txt
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "ICHA needs Python 3.11 or newer")'
 	$(PYTHON) -m venv .venv-tools
-	.venv-tools/bin/python -m pip install --quiet uv==$(UV_VERSION)
+	.venv-tools/bin/python -m pip install --quiet --require-hashes --requirement workflow/envs/uv.txt
+	@touch $@
 
 .venv/.installed: .venv-tools/bin/uv pyproject.toml uv.lock
 	.venv-tools/bin/uv sync --quiet --locked $(if $(wildcard .venv/.tamaas),,--no-group tamaas) --python $(PYTHON)
@@ -80,8 +82,12 @@ test: tamaas
 	pytest -n $(CORES) --dist worksteal -m "not slow"
 
 # Tests of random cases are run again, with more of them.
-test-all: test
+test-all: test audit
 	pytest -n $(CORES) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough
+
+# Known vulnerabilities of the locked packages, by the database OSV; skipped, with the reason, where it cannot be asked.
+audit: environment
+	@python tests/packaging/audit.py $(OPTIONS)
 
 # From the sdist, so that nothing that it lacks is in the wheel.
 wheel: .venv-tools/bin/uv
@@ -113,7 +119,7 @@ linkcheck: environment
 # The codes compared with have an environment of their own; where aspher cannot be built, the page says so.
 .venv-benchmarks/.installed: .venv-tools/bin/uv benchmarks/requirements.txt benchmarks/requirements-aspher.txt
 	.venv-tools/bin/uv venv --quiet --clear --python $(PYTHON) .venv-benchmarks
-	.venv-tools/bin/uv pip sync --quiet --python .venv-benchmarks/bin/python benchmarks/requirements.txt
+	.venv-tools/bin/uv pip sync --quiet --require-hashes --python .venv-benchmarks/bin/python benchmarks/requirements.txt
 	-.venv-tools/bin/uv pip install --quiet --python .venv-benchmarks/bin/python -r benchmarks/requirements-aspher.txt
 	@touch $@
 

@@ -1,0 +1,29 @@
+"""The page on trust names tests that exist, and the limits as they are."""
+
+import re
+
+from conftest import REPOSITORY
+from typer.main import get_command
+
+from icha.cli import app
+from icha.publication.deposit_files import LARGEST_TEXT
+from icha.publication.strangers_files import LIMITS
+
+PAGE = (REPOSITORY / "docs/threat_model.md").read_text(encoding="utf-8")
+
+
+def test_every_test_that_is_named_is_there():
+    there = {path.name for path in (REPOSITORY / "tests").rglob("test_*.py")}
+    assert set(re.findall(r"test_\w+\.py", PAGE)) <= there
+
+
+def test_every_command_that_reads_files_has_its_line():
+    table = PAGE.partition("| command |")[2].partition("\n\n")[0]
+    for name in get_command(app).commands:
+        assert f"`{name}`" in table or f"`icha {name}`" in table or name == "simulate", name
+
+
+def test_limits_are_those_of_the_code():
+    assert f"more than {LIMITS.files:,} files".replace(",", " ") in PAGE
+    assert f"more than {LIMITS.ratio} times its size and {LIMITS.allowance // 10**6} MB" in PAGE
+    assert f"have at most {LARGEST_TEXT // 10**6} MB" in PAGE
