@@ -9,12 +9,15 @@ from typing import Any, NamedTuple
 
 from icha.cli.project import Mistake
 from icha.cli.scans import in_yaml
+from icha.support.input_files import flaw_of_path
 
 _TEMPLATE = Path(__file__).parent / "templates/measured.yaml"
 # What stands in the place of what is left to fill in while the rest is checked, in SI units and in a configuration.
 _GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
 _GUESSED = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
 _EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
+# Bytes that show whether anything is in a file.
+_BEGINNING = 2**16
 
 _BOUNDARY = """\
     # What lies beyond the edges. One of:
@@ -92,12 +95,11 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
 
 
 def _check_file(path):
-    if path.is_dir():
-        raise Mistake(f"--measured {path}: is a folder; allowed: a file that holds a topography")
-    if not path.is_file():
-        raise Mistake(f"--measured {path}: no such file")
-    if not path.read_bytes().strip():
-        raise Mistake(f"--measured {path}: the file is empty; allowed: one that holds a topography")
+    if flaw := flaw_of_path(path):
+        raise Mistake(f"--measured {path}: {flaw}; allowed: a file that holds a topography")
+    with path.open("rb") as file:
+        if not file.read(_BEGINNING).strip():
+            raise Mistake(f"--measured {path}: the file is empty; allowed: one that holds a topography")
 
 
 def _read(path, data):

@@ -24,6 +24,9 @@ def about_scan(name: str, scan, *, to_scale: bool = True) -> Iterator[str]:
     from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, slope_left
 
     used = scan.used
+    points = in_words.counted(scan.filled, "point")
+    filled = f"{points} had no height and {'was' if scan.filled == 1 else 'were'} filled" if scan.filled else ""
+    yield f"{name}: read as {scan.format}, {filled or 'no point is missing'}"
     nodes = f"{used.grid} x {used.grid} nodes"
     scale = f" {in_words.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}," if to_scale else ","
     few = "; fewer than " if scan.cells_per_summit < LEAST_CELLS_OF_SUMMIT else "; at least "

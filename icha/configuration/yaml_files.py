@@ -7,6 +7,11 @@ from pathlib import Path
 import yaml
 
 from icha.configuration.errors import ConfigurationError
+from icha.support import in_words
+from icha.support.input_files import flaw_of_path
+
+# No configuration comes near: those that come with ICHA have some hundred values.
+_MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 50_000, 50, 100
 
 
 def read_yaml(path: Path) -> dict:
@@ -35,12 +40,15 @@ def read_yaml(path: Path) -> dict:
 
 
 def _text_of(path: Path) -> str:
+    if flaw := flaw_of_path(path):
+        raise ConfigurationError(f"{path}: {flaw}; allowed: a readable YAML file")
     try:
-        content = path.read_bytes()
-    except IsADirectoryError:
-        raise ConfigurationError(f"{path}: is a folder; allowed: a YAML file") from None
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror}; allowed: a readable YAML file") from None
+    if len(content) > _MOST_BYTES:
+        raise ConfigurationError(f"{path}: is longer than {in_words.size(_MOST_BYTES)}; allowed: a shorter YAML file")
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise ConfigurationError(f"{path}: is text in UTF-16; allowed: a YAML file saved in UTF-8")
     if b"\0" in content:
@@ -56,7 +64,49 @@ def _text_of(path: Path) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML in which a key that is given twice is an error, not the last one's secret win."""
+    """YAML in which a key that is given twice is an error, not the last one's secret win, and all is bounded.
+
+    Aliases count as what they stand for: a few lines of aliases of aliases stand for billions of values.
+    """
+
+    def __init__(self, text):
+        super().__init__(text)
+        self._depth, self._values = 0, 0
+        # Values that a node stands for, by the identity of the node.
+        self._sizes = {}
+
+    def compose_node(self, parent, index):
+        event, before = self.peek_event(), self._values
+        self._values += 1 + self._size_of_alias(event)
+        self._depth += 1
+        self._refuse(event, getattr(event, "tag", None) is not None, "a tag")
+        self._refuse(event, self._depth > _DEEPEST, f"more than {_DEEPEST} sections or lists in one another")
+        many = f"the file has more than {_MOST_VALUES} values, aliases written out"
+        self._refuse(event, self._values > _MOST_VALUES, many)
+        node = super().compose_node(parent, index)
+        if isinstance(node, yaml.ScalarNode):
+            # What may not stand in the file may not be written as an escape either.
+            self._refuse(event, self.NON_PRINTABLE.search(node.value), "an escaped control character")
+        self._depth -= 1
+        self._sizes[id(node)] = self._values - before
+        return node
+
+    def _size_of_alias(self, event):
+        if not isinstance(event, yaml.AliasEvent) or event.anchor not in self.anchors:
+            return 0
+        size = self._sizes.get(id(self.anchors[event.anchor]))
+        # The node is not composed yet: the alias stands in it.
+        self._refuse(event, size is None, "an alias of what it stands in")
+        return size
+
+    def _refuse(self, event, wrong, problem):
+        if wrong:
+            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
+
+    def construct_yaml_int(self, node):
+        # Longer ones are text, which is checked where it belongs: Python refuses to read some thousand digits.
+        long = len(self.construct_scalar(node)) > _LONGEST_NUMBER
+        return self.construct_scalar(node) if long else super().construct_yaml_int(node)
 
     def construct_yaml_timestamp(self, node):
         try:
@@ -77,6 +127,7 @@ class _Loader(yaml.SafeLoader):
 
 
 _Loader.add_constructor("tag:yaml.org,2002:timestamp", _Loader.construct_yaml_timestamp)
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
 
 
 def dumped(content: Mapping) -> str:

@@ -17,6 +17,8 @@ from icha.datasets.labels import LABELS
 from icha.datasets.variables import run as variables_of_run
 from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
 from icha.datasets.variables.terms import Variable
+from icha.support.hdf5 import refuse_data_elsewhere
+from icha.support.input_files import bounded_memory, flaw_of_path
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
 SOLUTION = "solution by boundary elements at a finite range"
@@ -118,14 +120,17 @@ def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
     UnknownFile
         If it is none of them, or cannot be read.
     """
-    if os.path.isdir(path):
-        raise UnknownFile(f"{path}: is a folder; allowed: a file")
-    if os.path.isfile(path) and not os.path.getsize(path):
+    if flaw := flaw_of_path(path):
+        raise UnknownFile(f"{path}: {flaw}; allowed: a file")
+    if not os.path.getsize(path):
         raise UnknownFile(f"{path}: the file is empty")
     try:
-        data = read_campaign(path) if has_groups(path) else read_dataset(path)
-    except ValueError as error:
-        raise UnknownFile(str(error)) from None
+        with bounded_memory():
+            refuse_data_elsewhere(path)
+            data = read_campaign(path) if has_groups(path) else read_dataset(path)
+    except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
+        reason = str(error).removeprefix(f"{path}: ")
+        raise UnknownFile(f"{path}: {reason}") from None
     groups = [data] if isinstance(data, xr.Dataset) else [node.to_dataset() for node in data.children.values()]
     for kind, variable in _OTHERS.items():
         if all(variable in group.variables for group in groups):

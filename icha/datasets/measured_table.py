@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from icha.support.input_files import TooLarge, bounded_memory, flaw_of_path
+
 
 def read_columns(path: str | Path, columns: dict[str, float]) -> list[np.ndarray]:
     """Read columns of a CSV file, in the file's own order.
@@ -19,10 +21,12 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list[np.ndarray
     ValueError
         If the file cannot be read, or a column is missing or holds anything but positive numbers.
     """
+    if flaw := flaw_of_path(path):
+        raise ValueError(f"{flaw}; allowed: a CSV file")
     try:
-        with Path(path).open(encoding="utf-8-sig", newline="") as file:
+        with bounded_memory(), Path(path).open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.DictReader(file, skipinitialspace=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, UnicodeDecodeError, csv.Error, TooLarge) as error:
         reason = getattr(error, "strerror", None) or error
         raise ValueError(f"cannot be read ({reason}); allowed: a CSV file") from None
     if not rows:

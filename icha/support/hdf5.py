@@ -1,5 +1,6 @@
-"""Attributes of HDF5 files, which netCDF-4 files are."""
+"""HDF5 files, which netCDF-4 files are: attributes, and data that lie elsewhere."""
 
+import os
 from collections.abc import Iterable
 
 
@@ -8,3 +9,44 @@ def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
     if not isinstance(attribute, bytes | str):
         (attribute,) = attribute
     return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
+
+
+def refuse_data_elsewhere(path: str | os.PathLike) -> None:
+    """Refuse a file whose names or data lie in other files, which could be any of this machine.
+
+    Soft links stay: they end in the same file. What is no HDF5 file passes.
+
+    Raises
+    ------
+    ValueError
+        Naming the link or dataset.
+    OSError
+        If the file is damaged.
+    """
+    import h5py
+
+    if not h5py.is_hdf5(path):
+        return
+    with h5py.File(path, "r") as file:
+
+        def look(name, link):
+            if link.type == h5py.h5l.TYPE_EXTERNAL:
+                raise ValueError(f"{_shown(name)} is a link to another file; allowed: files with all of their data")
+            if link.type == h5py.h5l.TYPE_HARD:
+                node = h5py.h5o.open(file.id, name)
+                if isinstance(node, h5py.h5d.DatasetID) and _lies_elsewhere(node.get_create_plist()):
+                    raise ValueError(f"{_shown(name)} has its data elsewhere; allowed: files with all of their data")
+
+        file.id.links.visit(look, info=True)
+
+
+def _lies_elsewhere(properties):
+    import h5py
+
+    return properties.get_layout() == h5py.h5d.VIRTUAL or (
+        properties.get_layout() == h5py.h5d.CONTIGUOUS and properties.get_external_count() > 0
+    )
+
+
+def _shown(name):
+    return repr(name.decode("utf-8", "replace"))

@@ -1,16 +1,40 @@
 """Readers of arrays with or without their units: npy, netCDF and HDF5."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 
+from icha.support.input_files import require_room
 from icha.surfaces.measured.found import Found, chosen_name, metres_of, regular_ticks, with_y_first
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
+
+# Copies of an array, as floats, that are held while it is read.
+_COPIES = 3
 
 
 def read_npy(path: Path, how: Preparation) -> Found:
     """An array of NumPy's, without names or units."""
-    return Found(with_y_first(np.load(path, allow_pickle=False), how))
+    return Found(with_y_first(whole_npy(path), how))
+
+
+def whole_npy(path: Path) -> np.ndarray:
+    """The array of a file of NumPy's."""
+    # Mapped, no more is declared than is there.
+    array = np.lib.format.open_memmap(path, mode="r")
+    _require_room(array)
+    return np.array(array)
+
+
+def whole_variable(variable) -> np.ndarray:
+    """The numbers of a netCDF variable as floats, nan where they are missing."""
+    _require_room(variable)
+    return np.ma.filled(variable[...].astype(float), np.nan)
+
+
+def _require_room(declared):
+    """Refuse an array by what is declared of it, before it is read; on the way to heights it is copied."""
+    require_room(_COPIES * 8 * math.prod(declared.shape))
 
 
 def read_netcdf(path: Path, how: Preparation) -> Found:
@@ -24,7 +48,7 @@ def read_netcdf(path: Path, how: Preparation) -> Found:
             raise UnfitTopography(
                 "data", f"has {chosen.ndim} dimensions; allowed: {', '.join(plane) or 'none is there'}"
             )
-        heights = np.ma.filled(chosen[...].astype(float), np.nan)
+        heights = whole_variable(chosen)
         names = [name.lower() for name in chosen.dimensions]
         turned = names[0] == "x" if set(names) == {"x", "y"} else how.first_axis == "x"
         sides = []
@@ -44,7 +68,7 @@ def _side(coordinate, count):
     if coordinate is None or coordinate.ndim != 1:
         return None, False
     about, unit = coordinate.__dict__, _unit_of(coordinate.__dict__)
-    values = np.ma.filled(coordinate[...].astype(float), np.nan)
+    values = whole_variable(coordinate)
     if unit is not None and "length" in about:
         return float(about["length"]) * unit, False
     if count < 2:
@@ -70,6 +94,7 @@ def read_hdf5(path: Path, how: Preparation) -> Found:
         )
         asked = how.data.strip("/") if how.data else None
         chosen = file[chosen_name(asked, sorted(plane), (), "dataset")]
+        _require_room(chosen)
         return Found(with_y_first(chosen[...], how), _unit_of(dict(chosen.attrs)))
 
 

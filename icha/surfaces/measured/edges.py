@@ -3,6 +3,7 @@
 import numpy as np
 import scipy.fft
 
+from icha.support.input_files import TooLarge, require_room
 from icha.surfaces.heights import flaw_of_heights
 from icha.surfaces.measured.scan import Scan
 from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
@@ -11,6 +12,7 @@ from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
     """The surface with edges as its boundary has them, on the grid that is asked for."""
+    _require_room_for(how.grid or (2 if how.boundary == MIRROR else 1) * max(scan.heights.shape))
     heights, side = scan.heights - np.mean(scan.heights), scan.size[0]
     said = []
     if how.boundary == WINDOW:
@@ -32,6 +34,14 @@ def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
     free = how.boundary == FREE
     said.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     return Surface(heights, side, FREE if free else PERIODIC), said
+
+
+def _require_room_for(grid):
+    """Refuse a grid that takes more memory than a surface from a file may; heights are copied as they are resampled."""
+    try:
+        require_room(3 * 8 * grid**2)
+    except TooLarge as error:
+        raise UnfitTopography("grid", f"gives a surface of {grid} x {grid} points, which {error}") from None
 
 
 def _taper(n, part):

@@ -16,13 +16,14 @@ _MOST_NODES = 32768
 class Found:
     """What a reader finds: heights (ny, nx) in its own unit, nan where missing; unit and size in m, if it knows them.
 
-    coordinates: size (x, y) in units of length that the file does not tell.
+    coordinates: size (x, y) in units of length that the file does not tell. format: name of the instrument's format.
     """
 
     heights: np.ndarray
     unit: float | None = None
     size: tuple[float, float] | None = None
     coordinates: tuple[float, float] | None = None
+    format: str = ""
 
 
 def with_y_first(heights: np.ndarray, how: Preparation) -> np.ndarray:

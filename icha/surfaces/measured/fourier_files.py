@@ -6,9 +6,14 @@ from pathlib import Path
 import numpy as np
 import scipy.fft
 
+from icha.support.input_files import require_room
+from icha.support.rules import GRID
 from icha.surfaces.measured.found import Found
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
 from icha.surfaces.measured.text_files import read_table
+
+# The spectrum, its conjugate, their difference, the heights, and what is where.
+_BYTES_OF_NODE = 64
 
 
 def read_fourier(path: Path, how: Preparation) -> Found:
@@ -29,6 +34,7 @@ def read_fourier(path: Path, how: Preparation) -> Found:
             f"is too coarse for waves {highest} times as short as the period; allowed: at "
             f"least {2 * highest + 2}, advisable: {4 * highest} or more",
         )
+    require_room(_BYTES_OF_NODE * n**2)
     spectrum = np.zeros((n, n), dtype=complex)
     order = np.lexsort((k[:, 0], k[:, 1]))
     k, modes = k[order], modes[order]
@@ -48,6 +54,12 @@ def read_fourier(path: Path, how: Preparation) -> Found:
     return Found(heights, coordinates=(period, period))
 
 
+def _require_few(highest):
+    """Refuse waves that no grid has."""
+    if highest > GRID.most / 2:
+        raise ValueError(f"waves {highest:g} times as short as the period, but a grid has at most {GRID.most} nodes")
+
+
 def _wave_numbers(q, how):
     """Wave vectors (n, 2) as multiples of 2 pi over the period: as they are written if they are integers."""
     largest = np.max(np.abs(q))
@@ -56,6 +68,7 @@ def _wave_numbers(q, how):
     if how.size is not None and how.size[0] != how.size[1]:
         raise UnfitTopography("size", "has two sides that differ, for a Fourier series; allowed: one length")
     if np.all(q == np.rint(q)):
+        _require_few(largest)
         if how.size is None:
             raise UnfitTopography(
                 "size",
@@ -68,4 +81,5 @@ def _wave_numbers(q, how):
     k = np.rint(q * (np.max(np.abs(k)) / largest))
     if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
         raise ValueError("the wave vectors are no multiples of the smallest one")
+    _require_few(np.max(np.abs(k)))
     return k.astype(int)

@@ -4,7 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from icha.support.hdf5 import refuse_data_elsewhere
+from icha.support.input_files import bounded_memory, flaw_of_path
 from icha.surfaces.heights import flaw_of_heights
+from icha.surfaces.measured.array_files import whole_npy, whole_variable
 
 _ALLOWED = "allowed: a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
 
@@ -23,10 +26,12 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
         If the file cannot be read or its heights are not a square array of finite numbers.
     """
     path = Path(path)
-    if not path.is_file():
-        raise ValueError(f"no such file; {_ALLOWED}")
+    if flaw := flaw_of_path(path):
+        raise ValueError(f"{flaw}; {_ALLOWED}")
     try:
-        heights = _heights(path)
+        with bounded_memory():
+            refuse_data_elsewhere(path)
+            heights = _heights(path)
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
         raise ValueError(f"cannot be read ({error}); {_ALLOWED}") from None
     if heights.dtype.kind not in "iuf":
@@ -38,10 +43,10 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
 
 def _heights(path: Path) -> np.ndarray:
     if path.suffix == ".npy":
-        return np.load(path, allow_pickle=False)
+        return whole_npy(path)
     if path.suffix == ".nc":
         import netCDF4
 
         with netCDF4.Dataset(path) as data:
-            return np.ma.filled(data["height"][...].astype(float), np.nan)
+            return whole_variable(data["height"])
     raise ValueError(f"unknown kind of file {path.suffix!r}")

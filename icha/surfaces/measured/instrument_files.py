@@ -7,6 +7,9 @@ import numpy as np
 from icha.surfaces.measured.found import Found, chosen_name, metres_of
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
 
+# Formats in which any bytes of the right number are heights: there it is the ending of the name that tells.
+_WITHOUT_SIGNATURE = ("hgt", "nms")
+
 
 def read_instrument(path: Path, how: Preparation) -> Found:
     """Whatever SurfaceTopography reads. Its arrays have x as first axis."""
@@ -18,6 +21,9 @@ def read_instrument(path: Path, how: Preparation) -> Found:
     except CannotDetectFileFormat:  # its message lists what every reader says
         raise ValueError("none of the formats that SurfaceTopography knows") from None
     with opened as file:
+        if file.format() in _WITHOUT_SIGNATURE and path.suffix.lower().removeprefix(".") not in file.file_extensions():
+            raise ValueError("none of the formats that SurfaceTopography knows by more than the length of a file")
+        name = file.name()
         names = [channel.name for channel in file.channels]
         if how.data is None:
             channel = file.default_channel
@@ -34,5 +40,5 @@ def read_instrument(path: Path, how: Preparation) -> Found:
         unit = None if topography.unit is None else metres_of(topography.unit)
         sides = None if said is None else tuple(float(side) for side in topography.physical_sizes)
     if sides is not None and (lateral := how.lateral_unit or unit) is not None:
-        return Found(heights, unit, tuple(side * lateral for side in sides))
-    return Found(heights, unit, coordinates=sides)
+        return Found(heights, unit, tuple(side * lateral for side in sides), format=name)
+    return Found(heights, unit, coordinates=sides, format=name)

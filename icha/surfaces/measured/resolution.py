@@ -47,12 +47,15 @@ class ScanResolution:
     """A scan before its short waves are cut off, and the surface that is made of it.
 
     measured : the scan as a square, without filter, edges and changes of its grid. used : the prepared surface.
-    cutoff : nesting index of its filter, m; None: it has none.
+    cutoff : nesting index of its filter, m; None: it has none. format : as which the file was read. filled : number of
+    points that had no height.
     """
 
     measured: Surface
     used: Surface
     cutoff: float | None
+    format: str = ""
+    filled: int = 0
 
     @cached_property
     def summits(self) -> int:
@@ -100,8 +103,8 @@ def scan_resolution(path: str | os.PathLike, preparation: Mapping) -> ScanResolu
     if preparation["boundary"] != PERIODIC:
         raw |= {"boundary": FREE, "grid": None}
     measured = prepared_topography(path, raw).surface
-    used = prepared_topography(path, preparation).surface
-    return ScanResolution(measured, used, preparation.get("cutoff"))
+    used = prepared_topography(path, preparation)
+    return ScanResolution(measured, used.surface, preparation.get("cutoff"), used.format, used.filled)
 
 
 def noise_floor(surface: Surface) -> NoiseFloor | None:

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from icha.support import in_words
+from icha.support.hdf5 import refuse_data_elsewhere
+from icha.support.input_files import TooLarge, bounded_memory
 from icha.surfaces.measured.array_files import read_hdf5, read_netcdf, read_npy
 from icha.surfaces.measured.fourier_files import read_fourier
 from icha.surfaces.measured.instrument_files import read_instrument
@@ -30,13 +32,15 @@ READERS = {
 class Scan:
     """What a file says in metres: heights (ny, nx), nan where missing, first axis y, and the size (x, y) of it all.
 
-    coordinate_unit: metres, where the size follows from coordinates whose unit the file does not tell.
+    coordinate_unit: metres, where the size follows from coordinates whose unit the file does not tell. format: as
+    which the file was read.
     """
 
     heights: np.ndarray
     size: tuple[float, float]
     description: str = ""
     coordinate_unit: float | None = None
+    format: str = ""
 
     @property
     def pixel(self) -> tuple[float, float]:
@@ -69,8 +73,9 @@ def read_scan(path: Path, how: Preparation) -> Scan:
     if size is None:
         raise UnfitTopography("size", "is missing, and the file does not say it; allowed: a length, such as '90 um'")
     rows, columns = found.heights.shape
-    said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
-    scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit)
+    format_ = f"{name} ({found.format})" if found.format else name
+    said = f"{format_}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
+    scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit, format_)
     if not all(np.isfinite(each) and each > 0 for each in size):
         raise UnfitTopography(
             "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; allowed: give it here"
@@ -81,9 +86,13 @@ def read_scan(path: Path, how: Preparation) -> Scan:
 def _read(path, name, how):
     """What the reader of a format finds, if that are heights."""
     try:
-        found = READERS[name](path, how)
+        with bounded_memory():
+            refuse_data_elsewhere(path)
+            found = READERS[name](path, how)
     except UnfitTopography:
         raise
+    except TooLarge as error:
+        raise UnfitTopography("path", str(error)) from None
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
         reason = " ".join(str(error).replace(str(path), path.name).split()) or type(error).__name__
         if len(reason) > _LONGEST_REASON:

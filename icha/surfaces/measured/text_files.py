@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from icha.support.input_files import require_room
 from icha.surfaces.measured.found import Found, metres_of, regular_ticks, with_y_first
 from icha.surfaces.measured.instrument_files import read_instrument
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
@@ -61,6 +62,7 @@ def read_xyz(path: Path, how: Preparation) -> Found:
     if np.any(np.diff(place[order]) == 0):
         x, y = table[order[np.flatnonzero(np.diff(place[order]) == 0)[0]], :2]
         raise ValueError(f"the point x = {x:g}, y = {y:g} is given twice")
+    require_room(2 * 8 * nx * ny)
     heights = np.full(nx * ny, np.nan)
     heights[place] = table[:, 2]
     heading = _heading(path)

@@ -17,7 +17,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
+
 from icha.support.checksums import sha256_of
+from icha.support.input_files import flaw_of_path
 from icha.surfaces.measured.crop import cropped
 from icha.surfaces.measured.cutoff import without_short_waves
 from icha.surfaces.measured.edges import bounded
@@ -31,12 +34,17 @@ from icha.surfaces.surface import Surface
 
 @dataclass(frozen=True, eq=False)
 class PreparedTopography:
-    """A surface at its own heights, and what was done to the file to get it."""
+    """A surface at its own heights, and what was done to the file to get it.
+
+    format : as which the file was read. filled : number of points that had no height.
+    """
 
     surface: Surface
     source_file: str
     source_sha256: str
     description: str
+    format: str
+    filled: int
 
     @property
     def rms_slope(self) -> float:
@@ -65,13 +73,14 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     steps.append(f"{how.touches_first} numbers touch first")
     part, said = cropped(scan, how)
     steps += said
+    missing = int(np.count_nonzero(~np.isfinite(part.heights)))
     left = part
     for step in (detrended, filled, squared, without_short_waves):
         left, said = step(left, how)
         steps += said
     refuse_flat(left, part, how)
     surface, said = bounded(left, how)
-    return PreparedTopography(surface, path.name, sha256_of(path), "; ".join([*steps, *said]))
+    return PreparedTopography(surface, path.name, sha256_of(path), "; ".join([*steps, *said]), scan.format, missing)
 
 
 @dataclass(frozen=True)
@@ -98,6 +107,6 @@ def _facts(path, modified, size, preparation):
 
 def _existing(path):
     path = Path(path)
-    if not path.is_file():
-        raise UnfitTopography("path", "no such file; allowed: a file of heights")
+    if flaw := flaw_of_path(path):
+        raise UnfitTopography("path", f"{flaw}; allowed: a file of heights")
     return path
