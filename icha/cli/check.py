@@ -38,7 +38,7 @@ def check(
     Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is none that ICHA writes. All
     files are checked in any case.
     """
-    from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, flaws, kind_of
+    from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, kind_of
 
     status = 0
     for file in files:
@@ -54,11 +54,10 @@ def check(
         if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
             say(f"{file}: {kind}; it can be read, and has no checks of its own")
             continue
-        found = flaws(kind, data) if kind != SOLUTION else []
-        tested = 0
-        if not found and kind != SURFACE:
-            findings, tested = _physics(kind, data)
-            found += findings
+        try:
+            found, tested = _checked(kind, data)
+        except Exception as error:  # whatever is missing, or of another shape, in a file from elsewhere
+            found, tested = [f"is of another format: {error!r}"], 0
         if found:
             status = max(status, FAILED)
             say(f"{file}: {kind}, {counted(len(found), 'flaw')}", fg="red")
@@ -80,6 +79,14 @@ def _without_checks(file: Path) -> str | None:
     if file.is_dir():
         return None
     return next((told for pattern, told in _BY_NAME.items() if file.match(pattern)), None)
+
+
+def _checked(kind, data):
+    """Everything that is wrong with a file, as text, and how many checks of its numbers there are."""
+    from icha.datasets.format import SOLUTION, SURFACE, flaws
+
+    found = flaws(kind, data) if kind != SOLUTION else []
+    return (found, 0) if found or kind == SURFACE else _physics(kind, data)
 
 
 def _physics(kind, data):

@@ -39,17 +39,20 @@ def show(
         if study is not None and study not in studies:
             raise Mistake(f"--study {study}: there is none in {file}; there are: {', '.join(studies)}")
         data = data if study is None else data.filter(lambda node: node.name in (None, data.name, study))
-    if kind == RUN:
-        show_run(data, str(file))
-    elif kind == SURFACE:
-        _show_surface(data, file)
-    else:
-        _show_campaign(data, file)
-    if plot is not None:
-        from icha.cli.quick_plot import draw
+    try:
+        if kind == RUN:
+            show_run(data, str(file))
+        elif kind == SURFACE:
+            _show_surface(data, file)
+        else:
+            _show_campaign(data, file)
+        if plot is not None:
+            from icha.cli.quick_plot import draw
 
-        draw(kind, data, plot)
-        say(f"drawn:   {plot}")
+            draw(kind, data, plot)
+            say(f"drawn:   {plot}")
+    except (AttributeError, LookupError, TypeError, ValueError) as error:  # of files from elsewhere
+        raise Mistake(f"{file}: {kind} of another format ({error!r}); `icha check` lists what is wrong") from None
 
 
 def show_run(run, name: str) -> None:

@@ -7,6 +7,7 @@ import typer
 
 from icha.cli.project import FAILED, Mistake
 from icha.contact.models import ASPERITIES, MODELS
+from icha.support.input_files import flaw_of_path
 
 
 def _length(value: str | None) -> float | None:
@@ -71,6 +72,7 @@ def simulate(
     areas: Annotated[str | None, _unset("Stops at contact area fractions A/A0 instead, increasing.", _numbers)] = None,
     model: Annotated[str, typer.Option(help=f"Contact model: {' or '.join(MODELS)}, which are slower.")] = ASPERITIES,
     unload: Annotated[bool, typer.Option("--unload", help="Pull the surfaces apart again.")] = False,
+    confirmed: Annotated[bool, typer.Option("--confirmed", help="Take unusual values as they are.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
 ) -> None:
     """Press one surface against one material and write the run, without a campaign.
@@ -79,12 +81,22 @@ def simulate(
     holds the stops that were reached, and says why there are no more.
     """
     for path in (output, surface):
-        if path is not None and path.is_dir():
-            raise Mistake(f"{path}: is a folder; allowed: a file")
+        if path is not None and path.exists() and (flaw := flaw_of_path(path)):
+            raise Mistake(f"{path}: {flaw}; allowed: a file")
     if output.exists() and not force:
         raise Mistake(f"{output} is there already; --force replaces it")
     if not output.absolute().parent.is_dir():
         raise Mistake(f"{output}: no such folder as {output.parent}")
+    if not confirmed:
+        _refuse_unusual(
+            period=("--period", period if surface is None or surface.suffix == ".npy" else None),
+            rolloff_wavelength=("--rolloff", rolloff),
+            short_wavelength=("--short", short),
+            rms_slope=("--rms-slope", rms_slope),
+            contact_modulus=("--modulus", modulus),
+            surface_energy=("--energy", energy),
+            interaction_range=("--range", interaction_range),
+        )
     from icha.asperity.material import Material
     from icha.cli.show import show_run
     from icha.datasets.files import write_dataset
@@ -112,6 +124,20 @@ def simulate(
         raise typer.Exit(FAILED)
 
 
+def _refuse_unusual(**given: tuple[str, float | None]) -> None:
+    """Refuse values, by the keys that configurations have for them, that are almost surely slips."""
+    from icha.configuration.plausibility import USUAL
+
+    for key, (option, value) in given.items():
+        usual = USUAL[key]
+        written = value if usual.si_unit == "1" else f"{value!r} {usual.si_unit}"
+        if value is not None and not usual.holds(written):
+            raise Mistake(
+                f"{option}: {written} is unusual; usual: {usual}; allowed: another value, or, if it is meant, this one "
+                "with --confirmed"
+            )
+
+
 def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope, model):
     from icha.support.rules import GRID
     from icha.surfaces.spectrum import SelfAffineSpectrum
@@ -130,12 +156,15 @@ def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope, mode
         except ValueError as error:
             raise ValueError(f"{file}: {error}") from None
     else:
-        from icha.datasets.files import read_dataset
-        from icha.datasets.surface_file import as_measured, read_surface
+        from icha.datasets.format import SURFACE, kind_of
+        from icha.datasets.surface_file import as_measured, surface_of
 
-        found = read_surface(file)
+        kind, data = kind_of(file)
+        if kind != SURFACE:
+            raise ValueError(f"{file}: {kind}; allowed: a {SURFACE}, or heights as .npy")
+        found = surface_of(data, file)
         if rms_slope is None:  # scans are kept at rms slope 1
-            rms_slope = as_measured(read_dataset(file)) * found.rms_slope
+            rms_slope = as_measured(data) * found.rms_slope
     return found if rms_slope is None else found.scaled_to_rms_slope(rms_slope)
 
 

@@ -26,6 +26,7 @@ from icha.support.values import (
     increasing,
     integer,
     list_of_names,
+    listed,
     number,
     stops,
     unknown,
@@ -67,30 +68,33 @@ class BesideStudy(Section):
             yield ("study",), self.study, reason
         for key in ("surfaces", "seeds", "rms_slopes", "materials"):
             there = getattr(study, key)
+            known = set(there)
             for index, value in enumerate(getattr(self, key) or []):
-                if value not in there:
-                    allowed = ", ".join(map(str, there))
-                    yield (key, index), value, f"is not in study {self.study!r}; allowed: {allowed}"
+                if value not in known:
+                    yield (key, index), value, f"is not in study {self.study!r}; allowed: {listed(there)}"
         contacts = campaign.solved(self)
         if not contacts:
             yield (), self.study, "has none of the chosen combinations; allowed: combinations that the study has"
-        for name in dict.fromkeys(each.surface for each in contacts):
+        materials: dict[str, dict[str, None]] = {}
+        for each in contacts:
+            materials.setdefault(each.surface, {})[each.material] = None
+        for name in materials:
             if campaign.boundary(name) != "periodic":
                 reason = (
                     "has a surface without periods; allowed: studies of periodic surfaces, as boundary elements are"
                 )
                 yield ("study",), self.study, f"{reason} ({name!r} is not)"
                 continue
-            yield from self._unresolved(campaign, name)
+            yield from self._unresolved(campaign, name, materials[name])
             nodes = campaign.grid(name) * self.refinement
             if nodes > GRID.most:
                 reason = f"gives {nodes} nodes a side on {name!r}; allowed: {GRID.most} at most"
                 yield ("refinement",), self.refinement, reason
 
-    def _unresolved(self, campaign, surface):
-        """Materials whose attraction the grid of a surface does not resolve."""
+    def _unresolved(self, campaign, surface, materials):
+        """Those of some materials whose attraction the grid of a surface does not resolve."""
         spacing = campaign.period(surface) / (campaign.grid(surface) * self.coarsest)
-        for label in dict.fromkeys(each.material for each in campaign.solved(self) if each.surface == surface):
+        for label in materials:
             material = Material(**campaign.materials[label].model_dump())
             if problem := resolution_problem(material, spacing):
                 yield ("materials",), label, f"on surface {surface!r}: {problem}"

@@ -43,6 +43,8 @@ from icha.support.values import (
 
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
+# Each of these looks at all runs of its study.
+_FEW = Field(max_length=100)
 # Cells of boundary elements per shortest wavelength: fewer are refused, and fewer than that warned of.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
@@ -96,21 +98,21 @@ class Campaign(Section):
     )
     materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)] = Field(description="Materials by name.")
     studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
-    boundary_elements: dict[Name, BoundaryElements] = Field(
+    boundary_elements: Annotated[dict[Name, BoundaryElements], _FEW] = Field(
         default={}, description="Boundary-element solutions by name, compared with the runs of a study."
     )
-    boundary_element_loops: dict[Name, BoundaryElementLoops] = Field(
+    boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = Field(
         default={},
         description="Boundary elements in loading and unloading by name, to compare with the runs of a "
         "study that unloads.",
     )
-    error_sources: dict[Name, ErrorSources] = Field(
+    error_sources: Annotated[dict[Name, ErrorSources], _FEW] = Field(
         default={}, description="Studies of the sources of the model's error, by name."
     )
     one_asperity: OneAsperity | None = Field(
         default=None, description="One asperity by the model and by boundary elements."
     )
-    measurements: dict[Name, Measurement] = Field(
+    measurements: Annotated[dict[Name, Measurement], _FEW] = Field(
         default={}, description="Measurements by name, drawn over figure 5. None come with ICHA."
     )
     figures: Figures = Field(default=Figures(), description="Figures and what they show.")
@@ -200,21 +202,24 @@ class Campaign(Section):
         if self.studies[study].snapshots is None and not loads:
             return None
         own = self.studies[study].own_snapshots
-        return own + [("reduced_pressure", p) for p in loads if ("reduced_pressure", p) not in own]
+        kept = set(own)
+        return own + [("reduced_pressure", p) for p in loads if ("reduced_pressure", p) not in kept]
 
     def solved(self, entry: BesideStudy) -> list[Contact]:
         """The contacts for which an entry beside a study asks."""
 
-        def asked(wanted, value):
-            return wanted is None or value in wanted
+        def among(wanted):
+            return (lambda value: True) if wanted is None else set(wanted).__contains__
 
+        surface, seed = among(entry.surfaces), among(entry.seeds)
+        rms_slope, material = among(entry.rms_slopes), among(entry.materials)
         return [
             each
             for each in self._contacts[entry.study]
-            if asked(entry.surfaces, each.surface)
-            and (asked(entry.seeds, each.seed) or not self.surfaces[each.surface].random)
-            and asked(entry.rms_slopes, each.rms_slope)
-            and asked(entry.materials, each.material)
+            if surface(each.surface)
+            and (seed(each.seed) or not self.surfaces[each.surface].random)
+            and rms_slope(each.rms_slope)
+            and material(each.material)
         ]
 
     def problems(self) -> Iterator[Problem]:
@@ -261,12 +266,12 @@ class Campaign(Section):
         section = self.surfaces[surface]
         return math.ceil(cells * section.period / section.short_wavelength * (1 - ROUNDING))
 
-    def _pressed_by_boundary_elements(self, surface: str) -> bool:
-        return any(surface in each.surfaces and BOUNDARY_ELEMENTS in each.models for each in self.studies.values())
-
     def warnings(self) -> list[str]:
         """What is allowed but not advisable."""
         found = []
+        by_patches = {
+            name for each in self.studies.values() if BOUNDARY_ELEMENTS in each.models for name in each.surfaces
+        }
         for name in dict.fromkeys(name for study in self.studies.values() for name in study.surfaces):
             surface = self.surfaces[name]
             origin = self.origin("surfaces", name)
@@ -277,11 +282,7 @@ class Campaign(Section):
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
                     f"{variant}; recommended: 8, at least 4"
                 )
-            elif (
-                cells is not None
-                and cells < _ADVISABLE_CELLS * (1 - ROUNDING)
-                and self._pressed_by_boundary_elements(name)
-            ):
+            elif cells is not None and cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_patches:
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
                     f"wavelength{variant}, with which areas are off by a few per cent; recommended: "

@@ -1,12 +1,15 @@
 """Values of a configuration from more than one place: overrides, and the section `defaults`."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 
 from pydantic import BaseModel
 
 from icha.configuration.campaign import Defaults
 from icha.configuration.surfaces import SURFACE_KINDS
+from icha.support.values import NOTHING, Problem
+
+_MOST_VALUES = 500_000
 
 
 def merged(content: Mapping, overrides: Mapping) -> dict:
@@ -38,6 +41,22 @@ def with_defaults(content: Mapping) -> dict:
             foreign = _of_other_kinds(kind) if section == "surfaces" and kind else ()
             entries[name] = {key: deepcopy(value) for key, value in given.items() if key not in foreign} | entry
     return result
+
+
+def excessive_defaults(written: Mapping) -> Iterator[Problem]:
+    """Sections of defaults that would be as long as a book, written out in all entries."""
+    defaults = written.get("defaults")
+    for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
+        entries = written.get(section)
+        count = _values_in(defaults.get(section)) * (len(entries) if isinstance(entries, Mapping) else 0)
+        if count > _MOST_VALUES:
+            reason = f"stand for {count} values in all {section}; allowed: {_MOST_VALUES} at most"
+            yield ("defaults", section), NOTHING, reason
+
+
+def _values_in(content) -> int:
+    inside = content.values() if isinstance(content, Mapping) else content if isinstance(content, list) else ()
+    return 1 + sum(map(_values_in, inside))
 
 
 def _of_other_kinds(kind: type[BaseModel]) -> set[str]:

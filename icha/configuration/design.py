@@ -7,6 +7,7 @@ named after it: `rough-hurst0.6`.
 
 import hashlib
 import itertools
+import math
 import re
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
@@ -15,14 +16,17 @@ from typing import Any
 from pydantic import ValidationError
 
 from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
+from icha.configuration.errors import MOST_TOLD
 from icha.configuration.materials import MaterialSection
 from icha.configuration.studies import SCALARS, Study
 from icha.configuration.surfaces import SURFACE_KINDS
 from icha.configuration.values import MEASURED
 from icha.datasets.labels import number_label
-from icha.support.values import NOTHING, Problem, Unit
+from icha.support.values import LONGEST_LABEL, NOTHING, Problem, Unit, listed
 
 MAX_RUNS = 100_000
+# Stops of the paths of all runs together.
+_MAX_STOPS = 5_000_000
 # Lists of a study, and what one of their entries is called in a case.
 _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
 _SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
@@ -45,9 +49,10 @@ def designed(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Probl
     The campaign and an empty list; or the campaign as it was and all problems. Slopes that are `measured` remain to be
     replaced (`Campaign.with_topographies`).
     """
-    found = [
+    found = (
         problem for label, study in campaign.studies.items() for problem in _study_problems(campaign, label, study)
-    ]
+    )
+    found = list(itertools.islice(found, MOST_TOLD + 1)) or list(_too_many(campaign))
     if found:
         return campaign, found
     variants = _Variants(campaign, content)
@@ -97,19 +102,55 @@ def _points(label: str, study: Study) -> Iterator[dict[str, _Placed]]:
 
 
 def _product(lists, groups, fixed) -> Iterator[dict[str, _Placed]]:
-    axes, done = [], set(fixed)
+    axes = [
+        [dict(zip(group, values, strict=True)) for values in zip(*(lists[n] for n in group), strict=True)]
+        for group in _axes(lists, groups, fixed)
+    ]
+    for parts in itertools.product(*axes):
+        point = dict(fixed)
+        for part in parts:
+            point |= part
+        yield point
+
+
+def _axes(lists, groups, fixed) -> Iterator[list[str]]:
+    """Names of the lists that are multiplied with each other, those that go along together in one group."""
+    done = set(fixed)
     for name in lists:
         if name in done:
             continue
         group = next((group for group in groups if name in group), [name])
         group = [each for each in group if each not in fixed]
         done |= set(group)
-        axes.append([dict(zip(group, values, strict=True)) for values in zip(*(lists[n] for n in group), strict=True)])
-    for parts in itertools.product(*axes):
-        point = dict(fixed)
-        for part in parts:
-            point |= part
-        yield point
+        yield group
+
+
+def _too_many(campaign: Campaign) -> Iterator[Problem]:
+    """More runs, or stops of their paths, than can be planned; they are counted before any is written out."""
+    runs = {label: _run_count(label, study) for label, study in campaign.studies.items()}
+    stops = {label: runs[label] * len(study.targets.states) for label, study in campaign.studies.items()}
+    for what, counts, most in (("runs", runs, MAX_RUNS), ("stops of all its runs", stops, _MAX_STOPS)):
+        large = [label for label, count in counts.items() if count > most]
+        for label in large:
+            yield ("studies", label), NOTHING, f"asks for {counts[label]} {what}; allowed: {most} at most"
+        total = sum(counts.values())
+        if total > most and not large:
+            yield ("studies",), NOTHING, f"ask for {total} {what} together; allowed: {most} at most"
+        if total > most:
+            return
+
+
+def _run_count(label: str, study: Study) -> int:
+    """Number of runs of a study, one by one model counted once, without those that are the same."""
+    lists = _lists(label, study)
+    groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
+
+    def count(fixed):
+        return math.prod(len(lists[group[0]]) for group in _axes(lists, groups, fixed))
+
+    if study.cases is None:
+        return count(())
+    return sum(count(case.model_dump(exclude_none=True)) for case in study.cases)
 
 
 def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Problem]:
@@ -124,7 +165,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
         placed = [*lists[one], *((((*at, "cases", i, one), getattr(c, one))) for i, c in enumerate(cases))]
         for location, name in placed:
             if name is not None and name not in names:
-                yield location, name, f"is not defined; allowed: {', '.join(names)}"
+                yield location, name, f"is not defined; allowed: {listed(names)}"
     yield from _zip_problems(at, study, lists)
     slopes = [*lists["rms_slope"], *(((*at, "cases", i, "rms_slope"), c.rms_slope) for i, c in enumerate(cases))]
     for location, slope in slopes:
@@ -135,13 +176,6 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
                 if name in campaign.surfaces and campaign.surfaces[name].random:
                     reason = f"surface {name!r} is made at random and has no slope of its own; allowed: numbers"
                     yield location, slope, reason
-    size = 1
-    for name, values in lists.items():
-        together = next((g for g in study.zip if name in [_LISTS.get(n, n) for n in g]), None)
-        if together is None or _LISTS.get(together[0], together[0]) == name:
-            size *= len(values)
-    if not cases and size > MAX_RUNS:
-        yield at, NOTHING, f"asks for {size} runs; allowed: {MAX_RUNS} at most"
 
 
 def _zip_problems(at, study, lists) -> Iterator[Problem]:
@@ -222,6 +256,10 @@ class _Variants:
             location, value = next(iter(changes.values()))
             reason = f"gives {base!r} a variant named {name!r}, but this name is taken; allowed: rename that entry"
             self.problems[(section, name)] = (location, value, reason)
+        if len(name) > LONGEST_LABEL:
+            location, value = next(iter(changes.values()))
+            reason = f"gives {base!r} a variant with a name of {len(name)} letters, which files cannot have"
+            self.problems[(section, name)] = (location, value, f"{reason}; allowed: {LONGEST_LABEL} at most")
         self.derived[section][name] = made
         self.origin[section, name] = base
         return name

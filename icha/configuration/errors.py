@@ -11,6 +11,9 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SURFACE_KINDS
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
+# Of what is wrong with a configuration so much is told at once.
+MOST_TOLD = 50
+
 
 class ConfigurationError(ValueError):
     """A configuration that cannot be run; the message lists file, key, value and what is allowed, line by line."""
@@ -18,14 +21,17 @@ class ConfigurationError(ValueError):
 
 def line(origin: str, location: tuple, value: Any, reason: str) -> str:
     """A problem as a line for the author of the file."""
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{_cut(str(part), 80)}" for part in location).lstrip(".")
     shown = "" if value is NOTHING else " (empty)" if value is None else f" {_short(value)}"
-    return f"{origin}: {key or 'top level'}:{shown} {reason}"
+    return f"{origin}: {key or 'top level'}:{shown} {_cut(reason, 2000)}"
 
 
 def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."
+    return _cut(repr(value), 80)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def problem_of(details: Mapping, content: Mapping) -> Problem:
@@ -52,9 +58,15 @@ def problem_of(details: Mapping, content: Mapping) -> Problem:
         given = value.get("kind", NOTHING) if isinstance(value, Mapping) else value
         return (*location, "kind"), given, f"is no kind of surface; allowed: {', '.join(SURFACE_KINDS)}"
     if kind == "string_pattern_mismatch" and context.get("pattern") == NAME_PATTERN:
-        return location, value, "is not a name; allowed: lower-case letters, digits, '_' and '-'"
+        return (
+            location,
+            value,
+            "is not a name; allowed: lower-case letters, digits, '_' and, but not first, '-'",
+        )
     if kind in ("too_short", "string_too_short"):
         return location, value, "is empty; allowed: at least one entry"
+    if kind in ("too_long", "string_too_long"):
+        return location, value, f"is too long; allowed: a length of {context['max_length']} at most"
     if kind == "literal_error":
         return location, value, f"is not a choice; allowed: {context['expected']}"
     wrong_type = {

@@ -1,5 +1,6 @@
 """From the text of a configuration file to a campaign, or to a list of everything that is wrong with it."""
 
+import itertools
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -9,9 +10,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from icha.configuration.campaign import Campaign, Topography
-from icha.configuration.defaults import merged, place_in_defaults, with_defaults
+from icha.configuration.defaults import excessive_defaults, merged, place_in_defaults, with_defaults
 from icha.configuration.design import designed
-from icha.configuration.errors import ConfigurationError, line, problem_of
+from icha.configuration.errors import MOST_TOLD, ConfigurationError, line, problem_of
 from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.configuration.plausibility import (
     CONFIRMED,
@@ -61,7 +62,6 @@ def load_configuration(
     path = Path(path)
     from_file = read_yaml(path)
     written = merged(from_file, overrides or {})
-    content = with_defaults(written)
     unusual, meant = unusual_values(written), written.get(CONFIRMED)
     # Told with whatever else is wrong, of which they may be the cause.
     slips = list(plausibility_problems(unusual, meant))
@@ -70,11 +70,17 @@ def load_configuration(
         return line(_origin(path, from_file, overrides or {}, location), location, *what)
 
     def fail(found: Iterable[Problem]):
-        found = [(place_in_defaults(location, written), value, reason) for location, value, reason in found]
-        lines = [said(*problem) for problem in [*found, *slips]] if found else []
-        if lines:
-            raise ConfigurationError("\n".join(dict.fromkeys(lines)))
+        found = list(itertools.islice(found, MOST_TOLD + 1))
+        if not found:
+            return
+        told = [(place_in_defaults(location, written), value, reason) for location, value, reason in found]
+        lines = list(dict.fromkeys(said(*problem) for problem in [*told, *slips[: MOST_TOLD + 1]]))
+        if len(lines) > MOST_TOLD:
+            lines[MOST_TOLD:] = [f"{path}: more is wrong, which is told once this is right"]
+        raise ConfigurationError("\n".join(lines))
 
+    fail(excessive_defaults(written))
+    content = with_defaults(written)
     try:
         campaign = Campaign.model_validate(content)
     except ValidationError as error:
@@ -89,7 +95,7 @@ def load_configuration(
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
     slips = list(plausibility_problems(unusual, meant))
-    fail([*campaign.problems(), *slips, *needless_confirmations(unusual, meant)])
+    fail(itertools.chain(campaign.problems(), slips, needless_confirmations(unusual, meant)))
     confirmed = [
         said(each.location, each.value, f"is unusual{each.how}, but confirmed; usual: {each.usual}") for each in unusual
     ]

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any
 
 from pydantic import (
+    AfterValidator,
     Field,
     field_validator,
     model_validator,
@@ -22,6 +23,24 @@ from icha.support.values import (
 )
 
 
+def _drawable(value: str) -> str:
+    """Refuse formulas in a label that no figure can draw."""
+    if "$" not in value:
+        return value
+    # Imports matplotlib, for which no other label waits.
+    from matplotlib.cbook import is_math_text
+    from matplotlib.mathtext import MathTextParser
+
+    try:
+        if is_math_text(value):
+            MathTextParser("path").parse(value)
+    except Exception as error:  # of its parser, of Python for a thousand braces
+        last = (str(error).strip().splitlines() or [type(error).__name__])[-1]
+        allowed = r"allowed: formulas between two $ as matplotlib reads them, or \$ for the sign"
+        raise ValueError(f"holds a formula that cannot be drawn ({last}); {allowed}") from None
+    return value
+
+
 class Column(Section):
     """A column of a table of measurements."""
 
@@ -35,7 +54,9 @@ class Measurement(Section):
     """Measured contact areas, drawn over the figure of the study that they belong to."""
 
     path: File = Field(description="CSV file with a line of headings. Relative to the configuration file.")
-    label: Text = Field(description="Its name in the legend.")
+    label: Annotated[str, Field(strict=True, min_length=1, max_length=200), AfterValidator(_drawable)] = Field(
+        description="Its name in the legend; formulas stand between two `$`."
+    )
     citation: Text = Field(description="Where the numbers come from; printed in the report.")
     study: Name = Field(description="Name of the study that it is compared with.")
     load: Column = Field(

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from icha.support import in_words
 from icha.support.units import to_number, to_si
-from icha.support.values import Problem
+from icha.support.values import Problem, listed
 
 CONFIRMED = "confirmed"
 # Where keys of that name are quantities; in all other sections they are not, or are names of what is in these.
@@ -129,8 +129,9 @@ def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Itera
 
     `confirmed` is the list as it is written; what is no such list is refused elsewhere.
     """
+    meant = set(_keys(confirmed))
     for each in unusual:
-        if each.key not in _keys(confirmed):
+        if each.key not in meant:
             reason = f"is unusual{each.how}; usual: {each.usual}; allowed: another value, or, if it is meant, this one"
             yield each.location, each.value, f"{reason} with `{CONFIRMED}: [{each.key}]` at the top level"
 
@@ -140,9 +141,7 @@ def needless_confirmations(unusual: Collection[Unusual], confirmed: Any) -> Iter
     keys = dict.fromkeys(each.key for each in unusual)
     for index, key in enumerate(_keys(confirmed)):
         if key not in keys:
-            reason = (
-                f"is the key of no unusual value; allowed: {', '.join(keys) or 'nothing, for all values are usual'}"
-            )
+            reason = f"is the key of no unusual value; allowed: {listed(keys) or 'nothing, for all values are usual'}"
             yield (CONFIRMED, index), key, reason
 
 

@@ -7,6 +7,7 @@ import datetime
 import re
 import unicodedata
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from itertools import combinations
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
@@ -74,6 +75,8 @@ _ROR_SITE = re.compile(r"https?://ror\.org/", re.IGNORECASE)
 # The digits of Crockford's base 32.
 _BASE_32 = "0123456789abcdefghjkmnpqrstvwxyz"
 _ROR = re.compile(rf"0([{_BASE_32}]{{6}})([0-9]{{2}})")
+# Entries of a list of which each is compared with all others.
+_MOST_ENTRIES = 1000
 _FIRST_DAY, _LAST_DAY = "1900-01-01", "2199-12-31"
 
 
@@ -103,6 +106,8 @@ def _once(what: str, same: Callable[[Any, Any], bool], shown: Callable[[Any], st
     """Refuse a list with two entries that mean the same."""
 
     def check(entries):
+        if len(entries) > _MOST_ENTRIES:
+            raise ValueError(f"has {len(entries)} entries; allowed: {_MOST_ENTRIES} at most")
         for entry, other in combinations(entries, 2):
             if same(entry, other):
                 raise ValueError(f"{shown(other)!r} is given twice; allowed: every {what} once")
@@ -111,6 +116,7 @@ def _once(what: str, same: Callable[[Any, Any], bool], shown: Callable[[Any], st
     return AfterValidator(check)
 
 
+@lru_cache(maxsize=2 * _MOST_ENTRIES)
 def _alike(*names: str | None) -> tuple[str, ...]:
     """Names as they are compared: capitals, spaces and the encoding of accents make no other name."""
     return tuple(" ".join(unicodedata.normalize("NFC", name or "").split()).casefold() for name in names)

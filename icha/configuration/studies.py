@@ -14,7 +14,7 @@ from pydantic import (
 
 from icha.configuration.materials import MaterialSection
 from icha.configuration.surfaces import SURFACE_KINDS
-from icha.configuration.values import SCALAR_SCHEMA, Slope, Slopes, Values
+from icha.configuration.values import SCALAR_SCHEMA, Slope, Slopes, Values, scalar
 from icha.contact.models import ASPERITIES, MODELS
 from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
@@ -127,7 +127,7 @@ def _of_scalars(name, kind, doc, fields=None):
 Vary = _of_scalars(
     "Vary", Values, "Parameters of surfaces and materials that a study varies: one value each, or a list."
 )
-Scalar = Annotated[Any, WithJsonSchema(SCALAR_SCHEMA)]
+Scalar = Annotated[Any, AfterValidator(scalar), WithJsonSchema(SCALAR_SCHEMA)]
 Case = _of_scalars(
     "Case",
     Scalar,
@@ -244,18 +244,20 @@ class Study(Section):
         yield from self._path_problems(snapshots)
 
     def _load_problems(self):
-        """Loads that a slope makes too large for the model."""
+        """Loads that a slope, the smallest for one, makes too large for the model."""
+        if not self.rms_slopes:
+            return
+        slope = min(self.rms_slopes)
         kept = [] if self.snapshots == EVERY_STOP else self.snapshots
         for key, states in (("snapshots", kept), ("turning_points", self.turning_points)):
             for index, state in enumerate(states or []):
-                for slope in self.rms_slopes:
-                    if (state.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
-                        yield (
-                            (key, index, "relative_load"),
-                            state.relative_load,
-                            f"at rms slope {slope:g} is a reduced pressure of {state.relative_load / slope:g}; "
-                            f"allowed: relative loads up to {MAX_REDUCED_PRESSURE * min(self.rms_slopes):g}",
-                        )
+                if (state.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
+                    yield (
+                        (key, index, "relative_load"),
+                        state.relative_load,
+                        f"at rms slope {slope:g} is a reduced pressure of {state.relative_load / slope:g}; "
+                        f"allowed: relative loads up to {MAX_REDUCED_PRESSURE * slope:g}",
+                    )
 
     def _path_problems(self, snapshots):
         """What keeps the way back from being a path."""

@@ -33,8 +33,17 @@ Slopes = Annotated[
     WithJsonSchema({"anyOf": [{"const": MEASURED}, {"type": "array", "minItems": 1, "items": _ONE_SLOPE}]}),
 ]
 SCALAR_SCHEMA = {"type": ["string", "number", "boolean"]}
+
+
+def scalar(value: Any) -> Any:
+    """Refuse what is no single value."""
+    if not isinstance(value, str | int | float):
+        raise ValueError("is no single value; allowed: a number, a text, true or false")
+    return value
+
+
 Values = Annotated[
-    list[Any],
+    list[Annotated[Any, AfterValidator(scalar)]],
     BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
     Field(min_length=1),
     AfterValidator(distinct),

@@ -41,7 +41,7 @@ def read_yaml(path: Path) -> dict:
 
 def _text_of(path: Path) -> str:
     if flaw := flaw_of_path(path):
-        raise ConfigurationError(f"{path}: {flaw}; allowed: a readable YAML file")
+        raise ConfigurationError(f"{path}: {flaw}; allowed: a YAML file")
     try:
         with path.open("rb") as file:
             content = file.read(_MOST_BYTES + 1)

@@ -95,14 +95,18 @@ def read_surface(path: str | os.PathLike) -> Surface:
     ValueError
         If the file cannot be read, lacks heights or period, or its heights are not finite, not square or flat.
     """
-    dataset = read_dataset(path)
+    return surface_of(read_dataset(path), path)
+
+
+def surface_of(dataset: xr.Dataset, path: str | os.PathLike) -> Surface:
+    """The topography of what was read of a surface file; errors as `read_surface`."""
     for name in ("height", "period"):
         if name not in dataset:
             raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
     try:
         heights = dataset["height"].transpose("y", "x").values
         return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC))
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise ValueError(f"{path}: {error}") from None
 
 

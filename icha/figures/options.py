@@ -12,7 +12,7 @@ from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.declaration import Campaign, FigureOptions, Inputs
 from icha.path.states import Snapshot
-from icha.support.values import Label, Name, Positive, Problem, Seed, unknown
+from icha.support.values import Label, Name, Positive, Problem, Seed, listed, unknown
 
 
 class StudyFigure(FigureOptions):
@@ -40,7 +40,7 @@ class StudyFigure(FigureOptions):
         ):
             value = getattr(self, key, None)
             if value is not None and value not in there:
-                yield (key,), value, f"is not in study {self.study!r}; allowed: {', '.join(map(str, there))}"
+                yield (key,), value, f"is not in study {self.study!r}; allowed: {listed(there)}"
 
 
 class TruthFigure(StudyFigure):
@@ -82,7 +82,7 @@ class SnapshotFigure(StudyFigure):
         if snapshots == []:
             yield ("study",), self.study, "keeps no snapshot to draw; allowed: a study with one"
         if self.snapshot is not None and self.snapshot.target not in (snapshots or []):
-            there = ", ".join(f"{kind} {value:g}" for kind, value in snapshots or [])
+            there = listed(f"{kind} {value:g}" for kind, value in snapshots or [])
             kind, value = self.snapshot.target
             reason = f"is no snapshot of study {self.study!r}; allowed: {there or 'none, for the study names none'}"
             yield ("snapshot",), f"{kind} {value:g}", reason

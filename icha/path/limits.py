@@ -6,8 +6,9 @@ from icha.support.rules import LENGTH, POSITIVE, Real
 # adhesion meet.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
-# Longest step of the mean separation, in h_rms, that may be asked for, and the one taken if none is.
-MAX_STEP = 0.5
+# Shortest and longest step of the mean separation, in h_rms, that may be asked for, and the one taken if none is. With
+# the shortest a path has some ten thousand equilibria.
+MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
 
 # By the kind of quantity.
@@ -17,4 +18,4 @@ STATES = {
     "area_fraction": Real(above=0, most=MAX_AREA_FRACTION, model_ends=True),
     "mean_separation": LENGTH,
 }
-STEP = Real("h_rms", above=0, most=MAX_STEP)
+STEP = Real("h_rms", least=MIN_STEP, most=MAX_STEP)

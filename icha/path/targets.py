@@ -63,7 +63,7 @@ class Path:
         and jumps, at constant load, where it would have to turn back. Then all stops and turning points are loads.
     united_until : how long united spots stay united on the way back: "overlap", where the two spots that they were
         made of would just touch, or "detachment", where they detach as a whole and fall back into their asperities.
-    max_step : longest change of the mean separation between two equilibria, in units of h_rms, in (0, 0.5].
+    max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
     ------
@@ -103,7 +103,8 @@ class Path:
         values = _stops(LISTS[kind], kind, values)
         wanted = _wanted([(kind, values[-1])] if snapshots is None else snapshots)
         targets = [Target(kind, value, (kind, value) in wanted) for value in values]
-        targets += [Target(k, v, True) for k, v in wanted if k != kind or v not in values]
+        listed = set(values)
+        targets += [Target(k, v, True) for k, v in wanted if k != kind or v not in listed]
         turns = _turns(turning_points, targets[len(values) - 1])
         if control == LOAD_CONTROL:
             _require_loads((*targets, *turns), unload or bool(turns))
@@ -134,12 +135,12 @@ def _one_list(*lists):
 
 def _wanted(snapshots):
     """Kinds and values of the snapshots."""
-    wanted = []
+    wanted = {}
     for label, kind, value in _pairs("snapshots", snapshots):
         value = STATES[kind].checked(label, value)
         if (kind, value) in wanted:
             raise ValueError(f"{label}: {kind} {value!r} is given twice")
-        wanted.append((kind, value))
+        wanted[kind, value] = None
     return wanted
 
 

@@ -204,7 +204,8 @@ def _loads(path, snapshots, rms_slope):
         "mean_separation": lambda value: _UNKNOWN_LOAD,
     }
     stops = [(kind, value) for kind in loads for value in path.get(f"{kind}s") or ()]
-    stops += [tuple(snapshot) for snapshot in snapshots if snapshot and tuple(snapshot) not in stops]
+    there = set(stops)
+    stops += [tuple(snapshot) for snapshot in snapshots if snapshot and tuple(snapshot) not in there]
     return [loads[kind](value) for kind, value in stops]
 
 

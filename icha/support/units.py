@@ -10,6 +10,9 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*")
 
+# Letters of a number or a unit; patterns and pint take their time for texts that are neither.
+_LONGEST = 100
+
 # The quantities of a configuration, by the SI unit in which the model gets them.
 PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "1": "ratio"}
 
@@ -49,6 +52,8 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
     ValueError
         If `unit` is no unit that pint knows, or one of another dimension.
     """
+    if len(unit) > _LONGEST:
+        raise ValueError(f"a text of {len(unit)} letters is not a unit")
     if unit == si_unit == "1":
         return Decimal(1)
     if (unit, si_unit) in USUAL:
@@ -64,13 +69,16 @@ def _by_pint(unit, si_unit):
         raise ValueError(f"{unit!r} is not a unit")
     try:
         quantity = registry.Quantity(Decimal(1), registry.parse_units(unit))
-        return quantity.to("" if si_unit == "1" else si_unit).magnitude
+        factor = quantity.to("" if si_unit == "1" else si_unit).magnitude
     except pint.UndefinedUnitError:
         raise ValueError(f"{unit!r} is not a known unit") from None
     except pint.DimensionalityError:
         raise ValueError(f"{unit!r} is not a unit of {PHYSICAL_NAMES[si_unit]}") from None
     except Exception:  # pint raises a dozen kinds of errors for text that is not a unit
         raise ValueError(f"{unit!r} is not a unit") from None
+    if not 0 < float(factor) < math.inf:
+        raise ValueError(f"{unit!r} is not a unit of any use")
+    return factor
 
 
 def to_si(value, si_unit: str) -> float:
@@ -85,13 +93,16 @@ def to_si(value, si_unit: str) -> float:
         raise ValueError("is not a number with a unit")
     if not isinstance(value, str):
         raise ValueError("the unit is missing")
-    match = _QUANTITY.fullmatch(value)
+    match = _QUANTITY.fullmatch(value) if len(value) <= _LONGEST else None
     if not match:
         raise ValueError("is not a number with a unit")
     magnitude, unit = match.groups()
     if not unit:
         raise ValueError("the unit is missing")
-    return finite(Decimal(magnitude) * conversion_factor(unit, si_unit))
+    try:
+        return finite(Decimal(magnitude) * conversion_factor(unit, si_unit))
+    except ArithmeticError:  # beyond what a Decimal can hold, 1e999999 MPa
+        raise ValueError("is not finite") from None
 
 
 def to_number(value) -> float:
@@ -103,17 +114,19 @@ def to_number(value) -> float:
         If it is not a finite number, or has a unit.
     """
     if isinstance(value, str):
+        if len(value) > _LONGEST:
+            raise ValueError("is not a number")
         if not re.fullmatch(rf"\s*{_NUMBER}\s*", value):
             what = "is a pure number and takes no unit" if _QUANTITY.fullmatch(value) else "is not a number"
             raise ValueError(what)
-        return finite(Decimal(value.strip()))
+        return finite(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError("is not a number")
     return finite(value)
 
 
 def finite(value) -> float:
-    """Return `value` as a float; raise ValueError unless it is finite."""
+    """Return `value`, a number or the text of one, as a float; raise ValueError unless it is finite."""
     try:
         value = float(value)
     except OverflowError:

@@ -11,7 +11,10 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from icha.support.rules import CONTACT_MODULUS, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, Integer, Real
 from icha.support.units import PATTERN, PHYSICAL_NAMES, to_number, to_si
 
-NAME_PATTERN = r"^[a-z0-9_-]+$"
+# Names are those of folders and files, too, which commands would take for options if they began with a hyphen.
+NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
+# Letters of a name, and of one with the values that a study varies: a file's name with its ending has up to 255.
+_LONGEST_NAME, LONGEST_LABEL = 80, 200
 # Rounding of the quotient of two lengths must not decide whether a wave has its cells.
 ROUNDING = 1e-9
 
@@ -80,13 +83,11 @@ def flag(value: Any) -> bool:
 
 def distinct(values):
     """Refuse a list in which an entry stands twice."""
-    # Seeds may be many; of the others, which cannot all be hashed, there are few.
-    quick = all(isinstance(value, str | int | float) for value in values)
-    seen: set | list = set() if quick else []
+    seen = set()
     for value in values:
         if value in seen:
             raise ValueError(f"{value!r} is given twice; allowed: every entry once")
-        seen.add(value) if quick else seen.append(value)
+        seen.add(value)
     return values
 
 
@@ -115,6 +116,17 @@ def exactly_one(section):
     return section
 
 
+# Names that messages list at most.
+_MOST_LISTED = 30
+
+
+def listed(names: Iterable) -> str:
+    """Names as a message lists them: `a, b, c`, or the first ones and how many more there are."""
+    names = list(names)
+    more = f", … ({len(names) - _MOST_LISTED} more)" if len(names) > _MOST_LISTED else ""
+    return ", ".join(map(str, names[:_MOST_LISTED])) + more
+
+
 # Location in a configuration, value, and what is wrong with it and allowed.
 Problem = tuple[tuple, Any, str]
 # In the place of a value that is not there, in problems.
@@ -124,12 +136,12 @@ NOTHING = object()
 def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
     """The problem of a name that is none of some section's, if it is one."""
     if name not in names:
-        yield location, name, f"is not defined; allowed: {', '.join(names) or 'none, for there is none'}"
+        yield location, name, f"is not defined; allowed: {listed(names) or 'none, for there is none'}"
 
 
-Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=80)]
+Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGEST_NAME)]
 # A name, or that of a variant made by a study's `vary`.
-Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_.+-]+$", max_length=200)]
+Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 
 
@@ -166,7 +178,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-_RANGE = re.compile(r"\s*(\d+)\s*\.\.\s*(\d+)\s*")
+_RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
 # More are a slip of the pen.
 _MOST_SEEDS = 10**5
 
@@ -189,6 +201,8 @@ def _seeds(value: Any) -> Any:
         if last < first or last - first >= _MOST_SEEDS:
             raise ValueError(f"{shown}ends before it begins, or has more than {_MOST_SEEDS} seeds; {allowed}")
         found += range(first, last + 1)
+        if len(found) > _MOST_SEEDS:
+            raise ValueError(f"{shown}makes more than {_MOST_SEEDS} seeds; {allowed}")
     return found if isinstance(value, list | str) else value
 
 

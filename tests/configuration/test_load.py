@@ -59,7 +59,7 @@ def test_files_that_are_no_configuration(content, message, tmp_path):
 def test_missing_file(tmp_path):
     with pytest.raises(ConfigurationError, match="is a folder; allowed: a YAML file"):
         load_configuration(tmp_path)
-    with pytest.raises(ConfigurationError, match="No such file"):
+    with pytest.raises(ConfigurationError, match="no such file; allowed: a YAML file"):
         load_configuration(tmp_path / "none.yaml")
 
 

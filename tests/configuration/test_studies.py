@@ -82,7 +82,7 @@ BAD = {
         [{"reduced_pressure": 0}, {"relative_load": 0.1}],
         "studies.one.turning_points[1].relative_load: 0.1 at rms slope 0.2 is a reduced pressure of 0.5",
     ),
-    "step too long": ("studies.one.max_step", 0.6, "(0, 0.5]"),
+    "step too long": ("studies.one.max_step", 0.6, "[1e-4, 0.5]"),
     "range of seeds backwards": ("studies.one.seeds", "5..1", "studies.one.seeds: '5..1' ends before it begins"),
     "range that is none": ("studies.one.seeds", ["1-5"], "'1-5' is no range of seeds; allowed: integers from 0"),
     "seed in a range twice": ("studies.one.seeds", ["1..5", 3], "3 is given twice"),

@@ -1,0 +1,311 @@
+"""Configurations of strangers: each is refused at once with file, key, value and what is allowed, or it is sound."""
+
+import os
+import resource
+import sys
+from pathlib import Path
+from subprocess import run
+
+import pytest
+import yaml
+from demo_configuration import GOOD, REPOSITORY, measured_surface
+from hypothesis import given
+from hypothesis import strategies as st
+
+from icha.configuration.errors import MOST_TOLD, ConfigurationError
+from icha.configuration.load import load_configuration
+from icha.configuration.yaml_files import read_yaml
+from icha.planning.plan import plan
+
+ALIASES = "a0: &a0 [x, x]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 20))
+MERGED = "a0: &a0 {k: 1}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 10)}]}}\n" for i in range(1, 20))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (ALIASES, "line 6: the file has more than 50000 values, aliases written out"),
+        (MERGED, "more than 50000 values"),
+        ("studies: {one: {vary: {hurst: &a [*a]}}}", "line 1: an alias of what it stands in"),
+        ("a: " + "[" * 5000 + "]" * 5000, "more than 50 sections or lists in one another"),
+        ("a: " + "{a: " * 5000, "more than 50 sections or lists in one another"),
+        ("? " * 3000, "more than 50 sections or lists in one another"),
+        ("a: " + "x" * 10**6, "is longer than 1 MB"),
+        ("a: !!int x", "line 1: a tag; allowed"),
+        ("a: 1\nb: !!set {a, b}", "line 2: a tag; allowed"),
+        ('a: 1\nb: "\\e[2J"', "line 2: an escaped control character"),
+        ('a: "\\ud800"', "line 1: an escaped control character"),
+    ],
+)
+def test_texts_that_would_never_end(text, message, tmp_path):
+    (tmp_path / "campaign.yaml").write_text(text)
+    with pytest.raises(ConfigurationError, match=r"campaign\.yaml.*; allowed: ") as error:
+        load_configuration(tmp_path / "campaign.yaml")
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize("number", ["9" * 5000, "0x" + "f" * 5000, "1" + ":59" * 3000])
+def test_integers_of_thousands_of_digits_are_text_until_they_are_checked(number, tmp_path):
+    (tmp_path / "one.yaml").write_text(f"a: {number}")
+    assert read_yaml(tmp_path / "one.yaml") == {"a": number}
+    (tmp_path / "two.yaml").write_text(GOOD.replace("grid: 80", f"grid: {number}"))
+    with pytest.raises(ConfigurationError, match=r"rough\.grid: .* is not an integer from 8 to 32768; allowed: "):
+        load_configuration(tmp_path / "two.yaml")
+
+
+def test_pipes_and_devices_are_not_opened(tmp_path, refused):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(ConfigurationError, match="pipe: is a pipe; allowed: a YAML file"):
+        load_configuration(pipe)
+    with pytest.raises(ConfigurationError, match="is a device; allowed"):
+        load_configuration(Path("/dev/zero"))
+    for path, kind in ((str(pipe), "pipe"), ("/dev/zero", "device")):
+        for surface in (measured_surface(path=path), {"kind": "file", "height_unit": "um", "period": "1 mm"}):
+            refused("surfaces.rough", surface | {"path": path}, f"surfaces.rough.path: '{path}' is a {kind}; allowed: ")
+        columns = {"load": {"column": "a", "unit": "1"}, "area": {"column": "b", "unit": "1"}}
+        entry = {"path": path, "label": "a", "citation": "b", "study": "one"} | columns
+        refused("measurements", {"m": entry}, f"measurements.m.path: '{path}' is a {kind}; allowed: a CSV file")
+
+
+WRONG = {
+    "unit of 100 kB": ("surfaces.rough.period", "1 " + "m" * 100_000, "is not a number with a unit; allowed: "),
+    "spaces": ("surfaces.rough.period", "1" + " " * 100_000 + "um", "is not a number with a unit; allowed: "),
+    "beyond decimals": ("materials.soft.contact_modulus", "1e999999 MPa", "is not finite; allowed: "),
+    "far beyond decimals": ("materials.soft.contact_modulus", f"1e{'9' * 50} MPa", "is not finite; allowed: "),
+    "powers": ("surfaces.rough.period", "1 m**9**9**9", "is not a unit; allowed: "),
+    "name": ("name", "-n", "name: '-n' is not a name; allowed: "),
+    "name of a study": ("studies", {"-s": yaml.safe_load(GOOD)["studies"]["one"]}, "is not a name; allowed: "),
+    "step": ("studies.one.max_step", 1e-300, "out of range; allowed: a number in [1e-4, 0.5]"),
+    "list to vary": ("studies.one.vary", {"hurst": [[0.5]]}, "vary.hurst[0]: [0.5] is no single value; allowed: "),
+    "list in a case": ("studies.one.cases", [{"hurst": [0.5]}], "cases[0].hurst: [0.5] is no single value; allowed: "),
+    "seeds": ("studies.one.seeds", ["1..100000", "100001..200000"], "makes more than 100000 seeds; allowed: "),
+    "runs": ("studies.one.seeds", "1..60000", "studies.one: asks for 120000 runs; allowed: 100000 at most"),
+    "cases times seeds": (
+        {
+            "studies.one.cases": [{"surface": "rough", "material": "soft"}] * 100,
+            "studies.one.seeds": "1..30000",
+        },
+        None,
+        "studies.one: asks for 6000000 runs; allowed: 100000 at most",
+    ),
+    "runs of all studies": (
+        "studies",
+        {f"s{i}": yaml.safe_load(GOOD)["studies"]["one"] | {"seeds": "1..20000"} for i in range(3)},
+        "studies: ask for 120000 runs together; allowed: 100000 at most",
+    ),
+    "stops of all runs": (
+        {
+            "studies.one.seeds": "1..20000",
+            "studies.one.targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(1000)]},
+        },
+        None,
+        "studies.one: asks for 40000000 stops of all its runs; allowed: 5000000 at most",
+    ),
+    "entries beside a study": (
+        "boundary_elements",
+        {f"b{i}": {"study": "one", "reduced_pressures": [0.01]} for i in range(101)},
+        "is too long; allowed: a length of 100 at most",
+    ),
+    "defaults of all studies": (
+        {
+            "defaults": {"studies": {"targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(2000)]}}},
+            "studies": {f"s{i}": {"surfaces": ["rough"]} for i in range(1000)},
+        },
+        None,
+        "defaults.studies: stand for 2003000 values in all studies; allowed: 500000 at most",
+    ),
+    "authors": ("publication", {"authors": [{"name": f"a{i}"} for i in range(1001)]}, "allowed: 1000 at most"),
+    "grid": (
+        {"surfaces.rough": measured_surface(grid=32768), "studies.one.seeds": [1]},
+        None,
+        "surfaces.rough.grid: 32768 gives a surface of 32768 x 32768 points, which needs about 25.8 GB of memory; "
+        "allowed: 2 GB, or what the environment variable ICHA_INPUT_MB says, in MB",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_values_that_would_take_too_long_or_fail_late(case, refused):
+    key, value, message = WRONG[case]
+    refused(None if value is None else key, key if value is None else value, message)
+
+
+def test_values_to_vary_make_names_that_files_can_have(refused):
+    varied = {
+        "period": ["100.123456789012345 um"],
+        "rolloff_wavelength": ["21.123456789012345 um"],
+        "short_wavelength": ["10.123456789012345 um"],
+        "hurst": [0.123456789012345],
+    }
+    surface = "r" * 80
+    changes = {
+        "surfaces": {surface: yaml.safe_load(GOOD)["surfaces"]["rough"]},
+        "studies.one.surfaces": [surface],
+        "studies.one.vary": varied,
+    }
+    refused(None, changes, "which files cannot have; allowed: 200 at most")
+
+
+@pytest.mark.parametrize(
+    ("label", "message"),
+    [
+        (r"glass $\frac{1$", "label: 'glass $\\\\frac{1$' holds a formula that cannot be drawn ("),
+        (r"$\nosuchthing$", "holds a formula that cannot be drawn ("),
+        ("$" + "{" * 90 + "$", "holds a formula that cannot be drawn ("),
+        ("x" * 201, "is too long; allowed: a length of 200 at most"),
+    ],
+)
+def test_labels_that_no_figure_can_draw(label, message, refused):
+    columns = {"load": {"column": "a", "unit": "1"}, "area": {"column": "b", "unit": "1"}}
+    entry = {"path": "x.csv", "label": label, "citation": "b", "study": "one"} | columns
+    refused("measurements", {"m": entry}, f"{message}")
+
+
+def test_formulas_and_dollars_that_can_be_drawn(load, tmp_path):
+    (tmp_path / "x.csv").write_text("a,b\n0.01,0.02\n")
+    columns = {"load": {"column": "a", "unit": "1"}, "area": {"column": "b", "unit": "1"}}
+    for label in (r"$\Delta\gamma$ of glass", "5 $ a piece", r"\$5 and \$6"):
+        entry = {"path": "x.csv", "label": label, "citation": "b", "study": "one"} | columns
+        assert load({"measurements": {"m": entry}}).campaign.measurements["m"].label == label
+
+
+def test_of_a_thousand_mistakes_the_first_are_told(load):
+    with pytest.raises(ConfigurationError) as error:
+        load({f"key{i}": 1 for i in range(1000)} | {"studies.one.surfaces": [f"none{i}" for i in range(1000)]})
+    lines = str(error.value).splitlines()
+    assert len(lines) == MOST_TOLD + 1 and lines[-1].endswith("more is wrong, which is told once this is right")
+    with pytest.raises(ConfigurationError) as error:
+        load({"boundary_elements": {"b": {"study": "one", "seeds": "3..9000", "reduced_pressures": [0.01]}}})
+    assert len(str(error.value)) < 10_000
+
+
+def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
+    """Each with each would be 10^8 comparisons and more."""
+    study = {
+        "studies.one.targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(20_000)]},
+        "studies.one.snapshots": "every_stop",
+        "studies.one.unload": True,
+    }
+    assert len(plan(load(study).campaign, tmp_path)) > 0
+    beside = {"study": "one", "seeds": "1..10000", "reduced_pressures": [0.01]}
+    many = load(
+        {
+            "studies.one.seeds": "1..10000",
+            "materials.soft.interaction_range": "120 nm",
+            "boundary_elements": {f"b{i}": beside for i in range(20)},
+        }
+    )
+    assert len(many.campaign.solved(many.campaign.boundary_elements["b0"])) == 20_000
+
+
+# What hypothesis puts in the place of values of configurations that come with ICHA.
+_NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([0, -1, 2**31, 1e300, -1e-300, 5e-324]))
+_TEXTS = st.one_of(
+    st.text(max_size=20),
+    st.sampled_from(["", "measured", "every_stop", "1..3", "3..1", "1e999999 MPa", "1 um", "-1 um", "nan", "..", "/"]),
+    st.builds("{} {}".format, st.floats(), st.sampled_from(["m", "um", "MPa", "J/m^2", "1", "m^-1", "hour"])),
+)
+_SCALARS = st.one_of(st.none(), st.booleans(), _NUMBERS, _TEXTS, st.dates())
+_VALUES = st.recursive(
+    _SCALARS,
+    lambda each: st.lists(each, max_size=4) | st.dictionaries(_TEXTS | _NUMBERS, each, max_size=4),
+    max_leaves=8,
+)
+_SHIPPED = [
+    yaml.safe_load((REPOSITORY / f"config/campaigns/{name}.yaml").read_text())
+    for name in ("smoke", "hysteresis", "tabor", "validation")
+]
+
+
+@st.composite
+def mutated(draw):
+    """A configuration that comes with ICHA, in which some values are others, gone, or elsewhere."""
+    content = yaml.safe_load(yaml.safe_dump(draw(st.sampled_from(_SHIPPED))))
+    for _ in range(draw(st.integers(1, 3))):
+        inside = content
+        while True:
+            keys = list(inside) if isinstance(inside, dict) else list(range(len(inside)))
+            if not keys:
+                break
+            key = draw(st.sampled_from(keys))
+            if isinstance(inside[key], dict | list) and inside[key] and draw(st.integers(0, 4)):
+                inside = inside[key]
+                continue
+            change = draw(st.sampled_from(["value", "gone", "twice", "new"]))
+            if change == "value":
+                inside[key] = draw(_VALUES)
+            elif change == "gone":
+                del inside[key]
+            elif isinstance(inside, list):
+                inside.append(inside[key] if change == "twice" else draw(_VALUES))
+            else:
+                inside[draw(_TEXTS)] = inside[key] if change == "twice" else draw(_VALUES)
+            break
+    return content
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """Where configurations are written, one after the other."""
+    return tmp_path_factory.mktemp("mutated") / "campaign.yaml"
+
+
+@given(content=mutated())
+def test_mutated_configurations_are_right_or_refused(file, content):
+    _loaded_or_refused(file, yaml.safe_dump(content, allow_unicode=True))
+
+
+@given(content=st.sampled_from(_SHIPPED), data=st.data())
+def test_mutated_texts_are_right_or_refused(file, content, data):
+    """Of the text single characters are others, or lines are gone or come twice."""
+    text = yaml.safe_dump(content, allow_unicode=True)
+    lines = text.splitlines(keepends=True)
+    for _ in range(data.draw(st.integers(1, 3))):
+        k = data.draw(st.integers(0, len(lines) - 1))
+        at = data.draw(st.integers(0, len(lines[k]) - 1))
+        lines[k] = data.draw(
+            st.sampled_from(
+                [
+                    lines[k][:at] + data.draw(st.sampled_from(list("{}[]:-&*!|>'\"%@`#,?0\t\x00é \n"))) + lines[k][at:],
+                    lines[k] * 2,
+                    "\n",
+                ]
+            )
+        )
+    _loaded_or_refused(file, "".join(lines))
+
+
+def _loaded_or_refused(file, text):
+    file.write_text(text, encoding="utf-8")
+    try:
+        plan(load_configuration(file).campaign, file.parent)
+    except ConfigurationError as error:
+        assert str(error).startswith(str(file)) and len(str(error)) < 200_000
+
+
+def test_refusals_take_little_memory(tmp_path):
+    """In a process of 1 GB the worst configurations end with their messages."""
+    worst = {name: value for name, value in WRONG.items() if name in ("cases times seeds", "grid", "runs")}
+    script = "import sys; from icha.configuration.load import load_configuration as l\nfor f in sys.argv[1:]:\n"
+    script += "    try: l(f)\n    except ValueError as e: print(e)\n"
+    files = [tmp_path / "aliases.yaml", tmp_path / "merged.yaml", tmp_path / "nested.yaml"]
+    for file, text in zip(files, (ALIASES, MERGED, "a: " + "[" * 200_000), strict=True):
+        file.write_text(text)
+    for name, (key, value, _) in worst.items():
+        content = yaml.safe_load(GOOD)
+        for place, each in ({key: value} if value is not None else key).items():
+            *path, last = place.split(".")
+            inside = content
+            for part in path:
+                inside = inside[part]
+            inside[last] = each
+        files.append(tmp_path / f"{name}.yaml")
+        files[-1].write_text(yaml.safe_dump(content))
+
+    def bounded():
+        resource.setrlimit(resource.RLIMIT_DATA, (10**9, 10**9))
+
+    done = run([sys.executable, "-c", script, *files], capture_output=True, text=True, preexec_fn=bounded, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("; allowed: ") >= len(files)

@@ -1,0 +1,301 @@
+"""Data files of strangers: what they declare, unpack to or point to is bounded, and refused with what is allowed."""
+
+import os
+import socket
+import subprocess
+import sys
+import zlib
+
+import h5py
+import netCDF4
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, scan, write_xyz
+
+from icha.datasets.format import UnknownFile, kind_of
+from icha.surfaces.measured.height_map import read_height_map
+from icha.surfaces.measured.settings import UnfitTopography
+from icha.surfaces.measured.topography import prepared_topography
+
+HUGE = 200_000  # nodes a side: 320 GB as floats
+LINES = {"height_unit": NM, "size": SIZE}
+
+
+def declare_npy(path):
+    with path.open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (HUGE, HUGE)})
+        file.write(bytes(8))
+    with path.open("r+b") as file:  # as long as declared, though nothing is on the disk
+        file.truncate(8 * HUGE**2 + 128)
+
+
+def declare_netcdf(path):
+    with netCDF4.Dataset(path, "w") as file:
+        for axis in "yx":
+            file.createDimension(axis, HUGE)
+        file.createVariable("height", "f8", ("y", "x"), chunksizes=(100, 100), compression="zlib")
+
+
+def declare_classic_netcdf(path):
+    """Of the old format, which is not HDF5."""
+    with netCDF4.Dataset(path, "w", format="NETCDF3_64BIT_DATA") as file:
+        file.set_fill_off()
+        for axis in "yx":
+            file.createDimension(axis, HUGE)
+        file.createVariable("height", "f8", ("y", "x"))
+
+
+def declare_hdf5(path):
+    with h5py.File(path, "w") as file:
+        file.create_dataset("height", (HUGE, HUGE), "f8", chunks=(100, 100), compression="gzip")
+
+
+def declare_waves(path):
+    path.write_text("1 0 1 0\n16000 0 1 0\n")
+
+
+def declare_points(path):
+    """Four points in the corners of a scan, and their neighbours."""
+    ends = (0, 1, 30_000, 30_001)
+    path.write_text("".join(f"{x} {y} {x % 7}\n" for y in ends for x in ends))
+
+
+DECLARED = {
+    "scan.npy": declare_npy,
+    "scan.nc": declare_netcdf,
+    "old.nc": declare_classic_netcdf,
+    "scan.h5": declare_hdf5,
+    "scan.xyz": declare_points,
+    "waves.txt": declare_waves,
+}
+
+
+@pytest.mark.parametrize("name", DECLARED)
+def test_declared_sizes_are_bounded_before_anything_is_read(name, tmp_path):
+    DECLARED[name](tmp_path / name)
+    size = SIZE[0] if name == "waves.txt" else SIZE
+    with pytest.raises(
+        UnfitTopography, match=r"needs about .*B of memory; allowed: 2 GB, or what .* ICHA_INPUT_MB"
+    ) as e:
+        scan(tmp_path / name, height_unit=NM, size=(size, size) if name == "waves.txt" else size)
+    assert e.value.key == "path"
+    if name.endswith(".nc") or name.endswith(".npy"):
+        with pytest.raises(ValueError, match=r"needs about .* allowed: 2 GB, or what .* ICHA_INPUT_MB"):
+            read_height_map(tmp_path / name, 1.0)
+
+
+def test_an_array_that_is_shorter_than_declared_is_refused(tmp_path):
+    np.save(tmp_path / "scan.npy", HEIGHTS)
+    whole = (tmp_path / "scan.npy").read_bytes()
+    (tmp_path / "scan.npy").write_bytes(whole[:-8])
+    with pytest.raises(UnfitTopography, match="cannot be read as npy"):
+        scan(tmp_path / "scan.npy", **LINES)
+
+
+def test_the_limit_can_be_raised_and_must_be_a_number(tmp_path, monkeypatch):
+    np.save(tmp_path / "scan.npy", np.random.default_rng(1).normal(size=(300, 300)))
+    monkeypatch.setenv("ICHA_INPUT_MB", "1")
+    with pytest.raises(UnfitTopography, match=r"needs about 2\.16 MB of memory; allowed: 1 MB"):
+        scan(tmp_path / "scan.npy", **LINES)
+    monkeypatch.setenv("ICHA_INPUT_MB", "3")
+    assert scan(tmp_path / "scan.npy", **LINES).heights.shape == (300, 300)
+    monkeypatch.setenv("ICHA_INPUT_MB", "much")
+    with pytest.raises(UnfitTopography, match="ICHA_INPUT_MB: 'much' is not a number of MB"):
+        scan(tmp_path / "scan.npy", **LINES)
+
+
+def packed(megabytes):
+    """So many megabytes of zeros, packed to a thousandth."""
+    packer, block = zlib.compressobj(1), bytes(10**6)
+    return b"".join(packer.compress(block) for _ in range(megabytes)) + packer.flush()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can bound the memory of a process")
+@pytest.mark.parametrize("name", ["scan.h5", "scan.nc", "scan.npz"])
+def test_files_that_unpack_to_more_than_they_declare_are_refused(name, tmp_path):
+    """Read in a process of their own, with 200 MB; each would unpack to 2 GB."""
+    path = tmp_path / name
+    if name == "scan.npz":
+        np.savez_compressed(path, heights=np.zeros((5000, 5000)))
+        limit = 100
+    else:
+        with h5py.File(path, "w") as file:
+            heights = file.create_dataset("height", (64, 64), "f8", chunks=(64, 64), compression="gzip")
+            heights.id.write_direct_chunk((0, 0), packed(2000))
+        limit = 200
+    script = (
+        "import sys, resource; from pathlib import Path\n"
+        "import h5py, netCDF4, SurfaceTopography\n"
+        "from icha.surfaces.measured.scan import read_scan\n"
+        "from icha.surfaces.measured.settings import Preparation\n"
+        "try: read_scan(Path(sys.argv[1]), Preparation('auto', 'free', height_unit=1.0, size=(1.0, 1.0)))\n"
+        "except ValueError as error: print(type(error).__name__, error)\n"
+        "with open('/proc/self/status') as s: print([l.split()[1] for l in s if l.startswith('VmPeak')][0])\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+    )
+    environment = os.environ | {"ICHA_INPUT_MB": str(limit), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run([sys.executable, "-c", script, path], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    said, _, most = done.stdout.splitlines()
+    assert said.startswith("UnfitTopography"), said
+    assert int(most) < 1_000_000  # kB, with all libraries
+
+
+def write_external_storage(path, secret):
+    with h5py.File(path, "w") as file:
+        file.create_dataset("height", (16, 16), "f8", external=[(str(secret), 0, 2048)])
+
+
+def write_external_link(path, secret):
+    with h5py.File(secret, "w") as file:
+        file["height"] = HEIGHTS
+    with h5py.File(path, "w") as file:
+        file["height"] = h5py.ExternalLink(str(secret), "/height")
+
+
+def write_virtual(path, secret):
+    with h5py.File(secret, "w") as file:
+        file["height"] = np.ones((16, 16))
+    layout = h5py.VirtualLayout((16, 16), "f8")
+    layout[:] = h5py.VirtualSource(str(secret), "height", (16, 16))
+    with h5py.File(path, "w") as file:
+        file.create_virtual_dataset("height", layout)
+
+
+@pytest.mark.parametrize("name", ["scan.h5", "scan.nc", "scan.dat"])
+@pytest.mark.parametrize("write", [write_external_storage, write_external_link, write_virtual])
+def test_data_that_lie_in_other_files_are_refused(write, name, tmp_path):
+    secret, path = tmp_path / "secret", tmp_path / name
+    secret.write_bytes(bytes(4096))
+    write(path, secret)
+    with pytest.raises(UnfitTopography, match=r"'height' (is a link to another file|has its data elsewhere)"):
+        scan(path, **LINES)
+    with pytest.raises(UnknownFile, match=r"'height' (is a link to another file|has its data elsewhere)"):
+        kind_of(path)
+    if name == "scan.nc":
+        with pytest.raises(ValueError, match=r"'height' (is a link to another file|has its data elsewhere)"):
+            read_height_map(path, 1.0)
+
+
+def test_soft_links_are_no_datasets(tmp_path):
+    path = tmp_path / "scan.h5"
+    with h5py.File(path, "w") as file:
+        file["heights"] = HEIGHTS
+        file["other"] = h5py.SoftLink("/heights")
+        file["nowhere"] = h5py.SoftLink("/none")
+    assert scan(path, **LINES).heights.shape == HEIGHTS.shape
+    with pytest.raises(UnfitTopography, match="is no dataset of the file; allowed: heights"):
+        scan(path, **LINES, data="other")
+
+
+def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "pipe.npy")
+    how = {"format": "auto", "boundary": "free"}
+    with socket.socket(socket.AF_UNIX) as own:
+        monkeypatch.chdir(tmp_path)
+        own.bind("socket.npy")
+        for path, flaw in (
+            (tmp_path / "pipe.npy", "is a pipe"),
+            (tmp_path / "socket.npy", "is a socket"),
+            ("/dev/zero", "is a device"),
+            (tmp_path, "is a folder"),
+            (tmp_path / "none.npy", "no such file"),
+            ("a\0b", "no such file"),
+            ("x" * 5000, "cannot be read"),
+        ):
+            with pytest.raises(UnfitTopography, match=f"{flaw}.*; allowed: a file of heights") as raised:
+                prepared_topography(path, how)
+            assert raised.value.key == "path"
+
+
+@pytest.mark.parametrize("size", [2, 8, 128, 8192, 100_000])
+def test_random_bytes_are_the_file_of_no_instrument(size, tmp_path):
+    """Some formats have no signature: of these any bytes of the right number are heights."""
+    (tmp_path / "scan.dat").write_bytes(np.random.default_rng(size).bytes(size))
+    with pytest.raises(UnfitTopography, match="cannot be read as instrument"):
+        scan(tmp_path / "scan.dat", **LINES)
+
+
+def test_the_name_tells_where_the_content_cannot(tmp_path):
+    heights = np.random.default_rng(1).integers(0, 1000, (64, 64)).astype(">i2")
+    (tmp_path / "N47E007.hgt").write_bytes(heights.tobytes())
+    assert scan(tmp_path / "N47E007.hgt", **LINES).format == "instrument (NASA SRTM)"
+
+
+def test_waves_that_no_grid_has(tmp_path):
+    (tmp_path / "waves.txt").write_text("1 0 1 0\n1e30 0 1 0\n")
+    with pytest.raises(UnfitTopography, match=r"waves 1e\+30 times as short as the period, but a grid has at most"):
+        scan(tmp_path / "waves.txt", height_unit=NM, size=(SIZE[0], SIZE[0]))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Sound files of all formats, by their names, and a folder for others."""
+    folder = tmp_path_factory.mktemp("whole")
+    np.save(folder / "scan.npy", HEIGHTS)
+    np.savetxt(folder / "scan.txt", HEIGHTS)
+    write_xyz(folder / "scan.xyz")
+    (folder / "waves.txt").write_text("1 0 1 0\n0 2 1 1\n3 1 0.5 0\n")
+    with h5py.File(folder / "scan.h5", "w") as file:
+        file.create_dataset("height", data=HEIGHTS, chunks=(5, 8), compression="gzip")
+        file["height"].attrs["units"] = "nm"
+    for name, kind in (("scan.nc", "NETCDF4"), ("old.nc", "NETCDF3_CLASSIC")):
+        with netCDF4.Dataset(folder / name, "w", format=kind) as file:
+            for axis, count in (("y", ROWS), ("x", COLUMNS)):
+                file.createDimension(axis, count)
+                file.createVariable(axis, "f8", (axis,))[:] = np.arange(count) * 0.25
+                file[axis].units = "um"
+            file.createVariable("height", "f8", ("y", "x"))[:] = HEIGHTS
+            file["height"].units = "nm"
+    data = os.path.join(os.path.dirname(__file__), "..", "data", "topographies")
+    for name in ("frt-2.frt", "top-1.top", "x3p-2_part.x3p"):
+        with open(os.path.join(data, name), "rb") as file:
+            (folder / name).write_bytes(file.read())
+    return folder, {each.name: each.read_bytes() for each in folder.iterdir()}
+
+
+NAMES = ["scan.npy", "scan.txt", "scan.xyz", "waves.txt", "scan.h5", "scan.nc", "old.nc"]
+NAMES += ["frt-2.frt", "top-1.top", "x3p-2_part.x3p"]
+
+
+@given(name=st.sampled_from(NAMES), data=st.data())
+@pytest.mark.filterwarnings("ignore")
+def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
+    """Bytes that are others, gone or inserted, most of them at the beginning, where headers are."""
+    folder, contents = whole
+    content = bytearray(contents[name])
+    for _ in range(data.draw(st.integers(1, 4))):
+        most = data.draw(st.sampled_from([64, 1024, len(content)]))
+        at = data.draw(st.integers(0, max(min(most, len(content)) - 1, 0)))
+        change = data.draw(st.sampled_from(["byte", "number", "gone", "more", "end"]))
+        if change == "byte":
+            content[at : at + 1] = bytes([data.draw(st.integers(0, 255))])
+        elif change == "number":
+            content[at : at + 4] = data.draw(
+                st.sampled_from([b"\xff\xff\xff\x7f", bytes(4), b"\xff" * 4, b"nan ", b"1e99"])
+            )
+        elif change == "gone":
+            del content[at : at + data.draw(st.integers(1, 100))]
+        elif change == "more":
+            content[at:at] = data.draw(st.binary(min_size=1, max_size=20))
+        else:
+            del content[at:]
+    path = folder / f"changed_{name}"
+    path.write_bytes(content)
+    size = (SIZE[0], SIZE[0]) if name == "waves.txt" else SIZE
+    how = {
+        "format": "auto",
+        "boundary": "mirror",
+        "height_unit": NM,
+        "size": size,
+        "missing": "fill",
+        "detrend": "tilt",
+    }
+    try:
+        surface = prepared_topography(path, how).surface
+    except UnfitTopography as error:
+        assert "allowed: " in str(error)
+    else:
+        assert np.all(np.isfinite(surface.heights))
