@@ -84,9 +84,6 @@ class _Loader(yaml.SafeLoader):
         many = f"the file has more than {_MOST_VALUES} values, aliases written out"
         self._refuse(event, self._values > _MOST_VALUES, many)
         node = super().compose_node(parent, index)
-        if isinstance(node, yaml.ScalarNode):
-            # What may not stand in the file may not be written as an escape either.
-            self._refuse(event, self.NON_PRINTABLE.search(node.value), "an escaped control character")
         self._depth -= 1
         self._sizes[id(node)] = self._values - before
         return node

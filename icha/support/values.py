@@ -1,6 +1,7 @@
 """Types of the values of a configuration: read with their units, kept in SI units, refused with what is allowed."""
 
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -142,7 +143,17 @@ def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Proble
 Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGEST_NAME)]
 # A name, or that of a variant made by a study's `vary`.
 Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
-Text = Annotated[str, Field(strict=True, min_length=1)]
+
+
+def _without_controls(value: str) -> str:
+    """Refuse what a YAML file cannot hold but as an escape: characters that act on a terminal, halves of characters."""
+    for char in value:
+        if unicodedata.category(char) in ("Cc", "Cs") and char not in "\n\t":
+            raise ValueError(f"holds the control character {char!r}; allowed: text")
+    return value
+
+
+Text = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_without_controls)]
 
 
 def _file(value: str) -> str:
@@ -153,7 +164,7 @@ def _file(value: str) -> str:
 
 
 # The path of a file.
-File = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_file)]
+File = Annotated[Text, AfterValidator(_file)]
 Length = quantity(LENGTH, "100 um")
 Modulus = quantity(CONTACT_MODULUS, "25 MPa")
 SurfaceEnergy = quantity(SURFACE_ENERGY, "50 mJ/m^2")

@@ -35,7 +35,7 @@ def test_measurements(load, tmp_path):
         ("p,a\n1,2\n3,x\n", {}, "column 'a', row 2: 'x'"),
         ("p,a\n1,nan\n", {}, "numbers greater than 0"),
         ("p,a\n1,-2\n", {}, "numbers greater than 0"),
-        ("p,a\n1,2\n", {"path": "none.csv"}, "cannot be read"),
+        ("p,a\n1,2\n", {"path": "none.csv"}, "no such file; allowed: a CSV file"),
         ("p,a\n1,2\n", {"study": "two"}, "'two' is not defined"),
         ("p,a\n1,2\n", {"material": "hard"}, "'hard' is not defined"),
         ("p,a\n1,2\n", {"rms_slope": None}, "without material and rms_slope"),
