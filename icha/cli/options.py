@@ -1,6 +1,7 @@
 """Options that several commands have."""
 
 import os
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -8,9 +9,16 @@ import typer
 
 
 def _cores(value: str | None) -> str | None:
-    if value is not None and value != "all" and not (value.isdecimal() and int(value) > 0):
+    if value is not None and value != "all" and not re.fullmatch("0*[1-9][0-9]{0,5}", value, re.ASCII):
         raise typer.BadParameter(f"{value!r} is neither a number of cores, 1 or more, nor `all`")
     return value
+
+
+def _folder(value: Path | None) -> Path | None:
+    try:
+        return value if value is None else value.resolve()
+    except RuntimeError:  # of Python before 3.13
+        raise typer.BadParameter(f"{str(value)!r} is a link that leads to itself; allowed: a folder") from None
 
 
 def core_count(cores: str | None) -> int:
@@ -34,6 +42,7 @@ Folder = Annotated[
         "--directory",
         "-d",
         help="Folder that holds results/. Left out: the clone, or the working directory.",
+        callback=_folder,
         show_default=False,
     ),
 ]

@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 
 from icha.cli.terminal import say
+from icha.support.input_files import flaw_of_path
 from icha.support.program import own_workflow
 
 CAMPAIGNS = Path("config/campaigns")
@@ -30,6 +31,9 @@ def told(command: Callable) -> Callable:
             return command(*args, **kwargs)
         except Mistake as mistake:
             say(f"Error: {mistake}", err=True, fg="red")
+            raise typer.Exit(WRONG) from None
+        except UnicodeEncodeError as error:
+            say(f"Error: {error.object!r}: holds bytes that are no UTF-8; allowed: text", err=True, fg="red")
             raise typer.Exit(WRONG) from None
         except BrokenPipeError:
             # Whoever read our output has seen enough (`icha describe --runs | head`).
@@ -86,8 +90,8 @@ def configuration_path(asked: str | None) -> Path:
     there = campaigns()
     if asked in there:
         return shown(there[asked])
-    if Path(asked).is_dir():
-        raise Mistake(f"{asked}: is a folder; allowed: a YAML file, or the name of a campaign")
+    if Path(asked).exists():
+        raise Mistake(f"{asked}: {flaw_of_path(asked)}; allowed: a YAML file, or the name of a campaign")
     raise Mistake(
         f"{asked}: no such file and no campaign of that name; there are: {', '.join(sorted(there))}. `icha new NAME` "
         "writes a campaign to start from"

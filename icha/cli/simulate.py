@@ -139,12 +139,15 @@ def _refuse_unusual(**given: tuple[str, float | None]) -> None:
 
 
 def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope, model):
-    from icha.support.rules import GRID
+    from icha.support.rules import GRID, LENGTH
     from icha.surfaces.spectrum import SelfAffineSpectrum
     from icha.surfaces.surface import Surface
 
     if file is None:
         slope = 1.0 if rms_slope is None else rms_slope
+        for name, length in (("--period", period), ("--rolloff", rolloff), ("--short", short)):
+            if length is not None:
+                LENGTH.checked(name, length)
         rolloff, short = _cutoffs(period, rolloff, short, GRID.checked("grid", grid))
         _refuse_too_large(grid, period / short, model)
         return SelfAffineSpectrum(period, rolloff, short, hurst, slope).realise(grid, seed)

@@ -29,15 +29,18 @@ def refuse_data_elsewhere(path: str | os.PathLike) -> None:
         return
     with h5py.File(path, "r") as file:
 
-        def look(name, link):
+        def elsewhere(name, link):
+            """What ends the visit, and is given by it."""
             if link.type == h5py.h5l.TYPE_EXTERNAL:
-                raise ValueError(f"{_shown(name)} is a link to another file; allowed: files with all of their data")
+                return f"{_shown(name)} is a link to another file"
             if link.type == h5py.h5l.TYPE_HARD:
                 node = h5py.h5o.open(file.id, name)
                 if isinstance(node, h5py.h5d.DatasetID) and _lies_elsewhere(node.get_create_plist()):
-                    raise ValueError(f"{_shown(name)} has its data elsewhere; allowed: files with all of their data")
+                    return f"{_shown(name)} has its data elsewhere"
+            return None
 
-        file.id.links.visit(look, info=True)
+        if found := file.id.links.visit(elsewhere, info=True):
+            raise ValueError(f"{found}; allowed: files that hold all of their data")
 
 
 def _lies_elsewhere(properties):

@@ -281,13 +281,33 @@ def test_a_scan_is_looked_at_before_anything_is_computed(project):
         (["describe", "nonsense"], "nonsense: no such file and no campaign of that name; there are: cmc_full,"),
         (["run", "nonsense"], "nonsense: no such file"),
         (["run", "smoke", "--cores", "some"], "'some' is neither a number of cores"),
+        (["describe", "smoke", "--cores", "9" * 400], "is neither a number of cores"),
+        (["describe", "smoke", "--directory", "loop"], "is a link that leads to itself; allowed: a folder"),
         (["run", "smoke", "--profile", "none"], "--profile none: no folder with a config.yaml; there are: default"),
         (["simulate", "none/run.nc"], "none/run.nc: no such folder as none"),
         (["simulate", "run.nc", "--modulus", "25"], "'25': the unit is missing; allowed: such as '25 MPa'"),
+        (
+            ["simulate", "run.nc", "--modulus", "2 mPa"],
+            "--modulus: 0.002 Pa is unusual; usual: 1 kPa to 2000 GPa (from",
+        ),
+        (
+            ["simulate", "run.nc", "--energy", "5 J/m^2"],
+            "allowed: another value, or, if it is meant, this one with --co",
+        ),
+        (["simulate", "run.nc", "--rms-slope", "1e3"], "--rms-slope: 1000.0 is unusual; usual: 1e-4 to 5"),
+        (["simulate", "run.nc", "--short", "0 m", "--confirmed"], "--short: 0.0 must be greater than 0 (in m)"),
+        (["simulate", "\udcff.nc", "--grid", "16"], "holds bytes that are no UTF-8; allowed: text"),
+        (["simulate", "run.nc", "--surface", "/dev/zero"], "/dev/zero: is a device; allowed: a file"),
+        (["check", "/dev/zero"], "/dev/zero: is a device; allowed: a file"),
+        (["new", "scan", "--measured", "/dev/zero"], "/dev/zero: is a device; allowed: a file that holds"),
+        (["describe", "/dev/zero"], "/dev/zero: is a device; allowed: a YAML file, or"),
         (["simulate", "run.nc", "--period", "1 kg"], "is not a unit of length"),
         (["simulate", "run.nc", "--hurst", "2"], "hurst: 2.0 must lie in (0, 1]"),
         (["simulate", "run.nc", "--grid", "1000000"], "grid: 1000000 must be at most 32768"),
-        (["simulate", "run.nc", "--short", "1e-15 m"], "needs about 1600000000000 TB of memory, and this machine has"),
+        (
+            ["simulate", "run.nc", "--short", "1e-15 m", "--confirmed"],
+            "needs about 1600000000000 TB of memory, and this machine has",
+        ),
         (["simulate", "run.nc", "--grid", "32", "--rolloff", "20 um"], "--short 25 um, which is 8 grid cells if left"),
         (["simulate", "run.nc", "--short", "30 um", "--rolloff", "20 um"], "give a smaller --short or a longer --roll"),
         (["simulate", "run.nc", "--pressures", "a,b"], "'a,b' is no list of numbers"),
@@ -305,6 +325,7 @@ def test_a_scan_is_looked_at_before_anything_is_computed(project):
     ],
 )
 def test_mistakes_are_messages_and_status_2(project, arguments, message):
+    Path("loop").symlink_to("loop")
     refused = icha(*arguments)
     assert refused.exit_code == 2
     assert message in " ".join(refused.output.split())
