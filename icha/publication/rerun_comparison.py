@@ -26,6 +26,7 @@ import numpy as np
 from icha.analysis.checks import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.publication.deposit_files import COMPUTED
 from icha.support.atomic_files import whole_file
+from icha.support.printable import printable
 
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (
     "identical",
@@ -384,7 +385,7 @@ def table(comparison: Comparison, most: int = 20) -> str:
         [line for line in found if line.item.verdict != WITHIN],
         [x for x in found if x.item.verdict == WITHIN],
     ):
-        text += [_told(line) for line in part[:most]]
+        text += [printable(_told(line)) for line in part[:most]]
         if len(part) > most:
             text.append(f"… and {len(part) - most} more")
     if comparison.remarks:

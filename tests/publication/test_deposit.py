@@ -507,6 +507,23 @@ def test_failures_are_published_only_with_their_reason(project, published, resul
     assert f"{len(checks) - 1} of {len(checks)} checks passed" in page
 
 
+@pytest.mark.parametrize("name", ["heights\n.npy", "a\x1b[2J.npy", "a\\b.npy", "x" * 256])
+def test_names_that_verify_would_refuse_are_not_published(name, tmp_path):
+    with pytest.raises(ValueError, match="not published, for these names; needed: others"):
+        make_deposit(
+            tmp_path / "tiny",
+            tmp_path / "tiny.zip",
+            results=tmp_path,
+            files=[f"inputs/{name}"],
+            publication=None,
+            campaign=None,
+            source=None,
+            jobs=(),
+            cost=None,
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
 # Verified.
 
 

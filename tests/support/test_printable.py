@@ -4,7 +4,10 @@ import sys
 import unicodedata
 
 import pytest
+from typer.testing import CliRunner
 
+import icha
+from icha.cli import app
 from icha.cli.events import Job, last_line, reason_of
 from icha.cli.project import Mistake, told
 from icha.cli.terminal import markup, say
@@ -47,6 +50,23 @@ def test_messages_of_jobs_are_printable(tmp_path):
     job = Job("run", "title", ("out",), ("log",), 0.0)
     assert all(map(is_printable, [*reason_of(job, tmp_path), last_line(job, tmp_path)]))
     assert any(r"\x1b[2J" in line for line in reason_of(job, tmp_path))
+
+
+def test_attributes_of_a_file_are_shown_in_their_lines(tmp_path):
+    run = icha.simulate(
+        icha.SelfAffineSpectrum(
+            period=1e-4, rolloff_wavelength=4e-5, short_wavelength=2e-5, hurst=0.8, rms_slope=1.0
+        ).realise(grid=64, seed=1),
+        icha.Material(contact_modulus=25e6, surface_energy=0.0, interaction_range=2e-9),
+        icha.Path(reduced_pressures=[1e-3]),
+    )
+    evil = f"{EVIL}\nrun.nc: all is well"
+    run.attrs |= {"title": evil, "campaign": evil, "study": evil, "incomplete": evil, "contact_model": evil}
+    run.to_netcdf(tmp_path / "run.nc")
+    shown = CliRunner().invoke(app, ["show", str(tmp_path / "run.nc")])
+    assert shown.exit_code == 0, shown.output
+    assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(shown.output)
+    assert shown.output.count("all is well") == 5 and "\nrun.nc" not in shown.output
 
 
 def test_pages_hold_no_overrides_and_no_control_characters():
