@@ -3,6 +3,7 @@
 Tests that need them are skipped without it, and fail with `ICHA_REQUIRE_VALIDATORS=1`.
 """
 
+import hashlib
 import os
 import subprocess
 from pathlib import Path
@@ -19,6 +20,16 @@ def python_of_validators():
         reason = "the validators are not installed: make validators-environment"
         (pytest.fail if os.environ.get("ICHA_REQUIRE_VALIDATORS") == "1" else pytest.skip)(reason)
     return PYTHON
+
+
+def sealed(folder):
+    """A folder with the checksums of all its files, as a deposit has them."""
+    sums = folder / "SHA256SUMS"
+    sums.unlink(missing_ok=True)
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    digests = {file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+    sums.write_text("".join(f"{digest}  {name}\n" for name, digest in digests.items()))
+    return folder
 
 
 def validated(deposit, *names):

@@ -26,6 +26,7 @@ import numpy as np
 from icha.analysis.checks import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.publication.deposit_files import COMPUTED
 from icha.support.atomic_files import whole_file
+from icha.support.hdf5 import refuse_data_elsewhere
 from icha.support.printable import printable
 
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (
@@ -148,9 +149,10 @@ def _compare_datasets(deposit, rerun, path):
     try:
         for file, whose in ((deposit, "deposit"), (rerun, "rerun")):
             try:
+                refuse_data_elsewhere(file)
                 opened.append(netCDF4.Dataset(file))
-            except OSError as error:
-                return File(path, DIFFERENT, f"the {whose}'s cannot be opened: {error.strerror or error}")
+            except (OSError, ValueError) as error:
+                return File(path, DIFFERENT, f"the {whose}'s cannot be opened: {error}")
         items = tuple(_compare_groups(*opened, ""))
     except RuntimeError as error:  # the library's, for what it cannot read
         return File(path, DIFFERENT, f"one of the two cannot be read: {error}")

@@ -6,7 +6,7 @@ import re
 import pytest
 import yaml
 from conftest import REPOSITORY
-from outside_validators import validated
+from outside_validators import sealed, validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import RELATIONS, RESOURCES, RelatedIdentifier
@@ -36,7 +36,7 @@ def test_all_of_it_is_valid_after_the_schemas_of_others(name, tmp_path):
     publication = PUBLICATIONS[name]
     if name == "all":
         publication = publication.model_copy(update={"related_identifiers": [*ALL.related_identifiers, *related]})
-    done = validated(written(tmp_path / "deposit", publication), "cffconvert", "datacite", "zenodo")
+    done = validated(sealed(written(tmp_path / "deposit", publication)), "cffconvert", "datacite", "zenodo")
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.findall(r"^(\w+): passed", done.stdout, re.MULTILINE) == ["cffconvert", "datacite", "zenodo"]
 
@@ -52,7 +52,7 @@ def test_the_validators_see_what_is_wrong(tmp_path):
         text = (folder / file).read_text(encoding="utf-8")
         assert old in text
         (folder / file).write_text(text.replace(old, new), encoding="utf-8")
-    done = validated(folder, "cffconvert", "datacite", "zenodo")
+    done = validated(sealed(folder), "cffconvert", "datacite", "zenodo")
     assert done.returncode == 1
     assert re.findall(r"^(\w+): failed", done.stdout, re.MULTILINE) == ["cffconvert", "datacite", "zenodo"]
 
@@ -146,7 +146,7 @@ def test_a_licence_that_the_citation_file_format_does_not_know_is_given_by_its_a
     newer = LEAST.model_copy(update={"license": "CC-BY-3.0-IGO"})
     cff = yaml.safe_load(citation_cff(newer, COMMIT))
     assert "license" not in cff and cff["license-url"] == "https://spdx.org/licenses/CC-BY-3.0-IGO.html"
-    assert validated(written(tmp_path / "deposit", newer), "cffconvert").returncode == 0
+    assert validated(sealed(written(tmp_path / "deposit", newer)), "cffconvert").returncode == 0
 
 
 def test_who_publishes_is_not_made_up():

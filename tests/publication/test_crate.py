@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
-from outside_validators import validated
+from outside_validators import sealed, validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import Author
@@ -246,8 +246,12 @@ def test_jobs_that_make_no_sense_are_refused(deposit):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLICATIONS)
 def test_it_is_a_provenance_run_crate_and_can_be_read(name, deposit, tmp_path):
-    folder = deposit if name == "all" else written(tmp_path, PUBLICATIONS[name])
-    done = validated(folder, "roc-validator", "runcrate")
+    folder = tmp_path / "tiny"
+    if name == "all":
+        shutil.copytree(deposit, folder)
+    else:
+        written(folder, PUBLICATIONS[name])
+    done = validated(sealed(folder), "roc-validator", "runcrate")
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"^roc-validator: passed; \d{2,} checks of provenance-run-crate-0.5, 0 problems", done.stdout)
     assert f"runcrate: passed; {len(JOBS) + 1} actions" in done.stdout
@@ -260,7 +264,7 @@ def test_a_crate_that_lacks_something_is_refused(deposit, tmp_path):
     content["@graph"] = [entity for entity in content["@graph"] if entity["@id"] != "source/Snakefile#run"]
     (folder / METADATA).write_text(json.dumps(content))
     (folder / "dataset/mine.nc").unlink()
-    done = validated(folder, "roc-validator")
+    done = validated(sealed(folder), "roc-validator")
     assert done.returncode == 1, done.stdout + done.stderr
     assert "A ControlAction must reference a HowToStep instance" in done.stdout
     assert "dataset/mine.nc" in done.stdout

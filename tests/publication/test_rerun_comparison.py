@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import h5py
 import netCDF4
 import numpy as np
 import pytest
@@ -269,3 +270,15 @@ def test_the_same_difference_in_many_files_is_one_line(tmp_path):
     assert written["files"][2]["path"] == path and written["files"][2]["verdict"] == DIFFERENT
     values = {each["name"]: each for each in written["files"][2]["variables"]}
     assert values["/pressure"]["deviation"] == 0.5 and values["/area"]["verdict"] == IDENTICAL
+
+
+def test_values_that_a_deposit_has_elsewhere_are_not_read(folders, tmp_path):
+    deposit, rerun = folders
+    write(rerun / FILE)
+    (tmp_path / "secret").write_bytes(np.arange(5.0).tobytes())
+    with h5py.File(deposit / FILE, "a") as file:
+        del file["gap"]
+        file.create_dataset("gap", (5,), "f8", external=[(str(tmp_path / "secret"), 0, 40)])
+    (found,) = compare_folders(deposit, rerun).files
+    assert found.verdict == DIFFERENT and "'gap' has its data elsewhere" in found.detail and not found.items
+    assert "4.0" not in table(compare_folders(deposit, rerun))

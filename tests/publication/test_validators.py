@@ -6,7 +6,7 @@ import zipfile
 
 import netCDF4
 import pytest
-from outside_validators import REPOSITORY, python_of_validators, validated
+from outside_validators import REPOSITORY, python_of_validators, sealed, validated
 
 pytestmark = pytest.mark.slow
 
@@ -28,14 +28,6 @@ def deposit(folder, unit="Pa", where="study"):
         load[:] = [1.0, 2.0, 3.0]
         data["study"].createVariable("study", "f8", ()).setncatts({"long_name": "number of the study", "units": "1"})
     return sealed(folder)
-
-
-def sealed(folder):
-    """The folder with the checksums of its files."""
-    names = sorted(file.name for file in folder.iterdir() if file.name != "SHA256SUMS")
-    sums = subprocess.run(["sha256sum", *names], cwd=folder, capture_output=True, check=True).stdout
-    (folder / "SHA256SUMS").write_bytes(sums)
-    return folder
 
 
 def failed(done):
