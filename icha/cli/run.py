@@ -207,16 +207,17 @@ def _rehearse(command: list[str], workflow: Path, campaign, asked: list[str]) ->
 
 
 def _planned(said: str) -> str:
-    """What Snakemake would do, by its table of jobs."""
+    """What Snakemake would do, by its table of jobs, and by what the Snakefile would have made again besides."""
+    again = re.findall(r"^(?:.+, )?to be made again: .+$", said, re.MULTILINE)
     table = said.partition("Job stats:")[2].partition("\ntotal")[0]
     rows = re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)
     counts = {rule.replace("_", " "): int(number) for rule, number in rows if rule not in TARGETS}
     if not counts:
-        return "Nothing would run: everything that was asked for is there and up to date."
+        nothing = "Nothing would run: everything that was asked for is there and up to date."
+        return "\n".join([*again, "and what is made from it"]) if again else nothing
     listed = ", ".join(f"{number} {rule}" for rule, number in counts.items())
-    return (
-        f"{counted(sum(counts.values()), 'job')} would run, those included that a changed program makes anew: {listed}"
-    )
+    would = "would run, those included that a changed program makes anew"
+    return "\n".join([*again, f"{counted(sum(counts.values()), 'job')} {would}: {listed}"])
 
 
 def _refuse_unknown(said: str, asked: list[str], campaign) -> None:
