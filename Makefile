@@ -33,7 +33,7 @@ help:
 	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
 	@echo "make short-range  hold boundary elements in the limit of short range against what is known (an hour); docs/short_range.md"
-	@echo "make faults  kill, damage and starve a small campaign (most of an hour, as root); docs/faults.md"
+	@echo "make faults  kill, damage and starve a small campaign (an hour or two, as root); docs/faults.md"
 	@echo "make slurm-environment  install Snakemake with its executor for Slurm in .venv-slurm; docs/howto/cluster.md"
 	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  put a deposit to the validators of others, without network"
 	@echo "make clean   remove results, Snakemake's records and the built documentation (not the environment)"

@@ -80,11 +80,11 @@ Two calls of one campaign in one folder, the second after a random pause; and ca
 
 TAIL = """## How
 
-`make faults` makes all trials, from the committed state of the program, and writes this page. It takes most of an hour
-on two cores and needs Linux and the right to mount disks (root, or user namespaces). The parts can be run one by one,
-as was done here: `make faults OPTIONS='--parts kill'`. Moments and bits are drawn at random with seed {seed}. Power
-cuts are those of a file system that is told to stop, not of a machine: what a disk loses that has said that it has
-written is not among the trials.
+`make faults` makes all trials, from the committed state of the program, and writes this page. It takes an hour or two
+on two cores and needs Linux and the right to mount disks (root; without power cuts, user namespaces). The parts can be
+run one by one, as was done here: `make faults OPTIONS='--parts kill'`. Moments and bits are drawn at random with seed
+{seed}. Power cuts are those of a file system that is told to stop, not of a machine: what a disk loses that has said
+that it has written is not among the trials.{untried}
 """
 
 
@@ -109,7 +109,9 @@ def page(kept: dict) -> str:
         violations = [f"- {row['fault']}: {violation}" for row in own for violation in row["violations"]]
         if violations:
             text += "\nWhat was wrong:\n\n" + "\n".join(violations) + "\n"
-    return text + "\n" + TAIL.format(seed=kept["seed"])
+    untried = ", ".join(part for part in PARTS if not any(row["part"] == part for row in rows))
+    untried = f" Not tried by the version that wrote this page: {untried}." if untried else ""
+    return text + "\n" + TAIL.format(seed=kept["seed"], untried=untried)
 
 
 def _whole(message):
