@@ -16,12 +16,13 @@ def check_picture(path: Path | None) -> None:
         raise Mistake(f"--plot {path}: ends in {path.suffix!r}; allowed: {', '.join(PICTURES)}")
 
 
-def about_scan(name: str, scan, *, to_scale: bool = True) -> Iterator[str]:
+def about_scan(name: str, scan, *, to_scale: bool = True, by_patches: bool = False) -> Iterator[str]:
     """Lines about the `icha.surfaces.measured.resolution.ScanResolution` of a surface of some name.
 
-    to_scale : whether the units of its heights and of its size are known.
+    to_scale : whether the units of its heights and of its size are known. by_patches : whether boundary elements press
+    it.
     """
-    from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, slope_left
+    from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS, slope_left
 
     used = scan.used
     points = in_words.counted(scan.filled, "point")
@@ -34,6 +35,12 @@ def about_scan(name: str, scan, *, to_scale: bool = True) -> Iterator[str]:
         f"{name}: {nodes}{scale} {in_words.counted(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} nodes for each"
         f"{few}{LEAST_CELLS_OF_SUMMIT}, with which summits are resolved"
     )
+    if by_patches and scan.cells_per_short_wave < RESOLVED_CELLS:
+        yield (
+            f"{name}: boundary elements have about {scan.cells_per_short_wave:.2g} nodes for its shortest waves, with "
+            f"which areas are off by a few per cent; recommended: {RESOLVED_CELLS}, by a longer `cutoff` or a finer "
+            "`grid`"
+        )
     if not to_scale:
         return
     noise = scan.noise

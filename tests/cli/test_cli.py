@@ -241,11 +241,22 @@ def test_scans_that_cannot_be_used_get_no_campaign(project):
         assert not Path(f"config/campaigns/{name}.yaml").exists()
 
 
+def test_points_that_were_filled_are_told(project):
+    heights = rough_heights(noise=0)
+    heights[3:5, 7] = np.nan
+    write_scan("scan.txt", heights, ("10 um", "10 um"))
+    assert (
+        "scan: read as matrix, 2 points had no height and were filled"
+        in icha("new", "m", "--measured", "scan.txt").output
+    )
+
+
 def test_a_scan_is_looked_at_before_anything_is_computed(project):
     write_scan("scan.txt", rough_heights(noise=20e-9), ("10 um", "10 um"))
     written = icha("new", "mine", "--measured", "scan.txt", "--plot", "scan.png", "--boundary-elements")
     lines = written.output.splitlines()
     assert Path("scan.png").read_bytes()[:4] == b"\x89PNG"
+    assert "scan: read as matrix, no point is missing" in lines
     noise = next(line for line in lines if "noise floor" in line)
     rms, wavelength = re.search(r"noise floor of (\S+) nm rms; waves shorter than (\S+) um are", noise).groups()
     assert float(rms) == pytest.approx(20, rel=0.1) and 0.5 < float(wavelength) < 2
@@ -262,11 +273,16 @@ def test_a_scan_is_looked_at_before_anything_is_computed(project):
         and "<svg" in Path("mine.svg").read_text()
     )
     summits = [int(re.search(r"(\d+) summits?, ", each.output)[1]) for each in (written, told)]
+    few = r"scan: boundary elements have about (\S+) nodes for its shortest waves, .* recommended: 8, by a longer"
+    assert 1 < float(re.search(few, told.output)[1]) < 8
     # What is advised is taken by taking the sign of a remark away; the noise is seen as before, its summits are not.
     file.write_text(text.replace("# cutoff: ", "cutoff: "))
     filtered = icha("describe", "mine")
-    assert "noise floor of " + rms in filtered.output and "`cutoff" not in filtered.output
+    assert "noise floor of " + rms in filtered.output and "advisable" not in filtered.output
     assert int(re.search(r"(\d+) summits?, ", filtered.output)[1]) < min(summits) / 2
+    # Shorter waves than twice its length have next to nothing left by a filter of sixteen pixels.
+    file.write_text(re.sub(r"# cutoff: \S+ um", "cutoff: 2.5 um", text))
+    assert "boundary elements have" not in icha("describe", "mine").output
     assert icha("describe", "smoke", "--plot", "none.png").exit_code == 2
     assert icha("describe", "mine", "--plot", "scan.bmp").exit_code == 2
 

@@ -67,6 +67,11 @@ class ScanResolution:
         """Nodes of the prepared surface for every summit."""
         return self.used.grid**2 / max(self.summits, 1)
 
+    @property
+    def cells_per_short_wave(self) -> float:
+        """Nodes of the prepared surface along its shortest waves, as the number of its summits tells it."""
+        return RESOLVED_CELLS / 2 * math.sqrt(self.cells_per_summit / LEAST_CELLS_OF_SUMMIT)
+
     @cached_property
     def noise(self) -> NoiseFloor | None:
         """Floor of the scan's spectrum, None if it falls to its end."""

@@ -73,8 +73,8 @@ def read_scan(path: Path, how: Preparation) -> Scan:
     if size is None:
         raise UnfitTopography("size", "is missing, and the file does not say it; allowed: a length, such as '90 um'")
     rows, columns = found.heights.shape
-    format_ = f"{name} ({found.format})" if found.format else name
-    said = f"{format_}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
+    said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
+    format_ = f"{name} ({found.format})" if name == "instrument" else name
     scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit, format_)
     if not all(np.isfinite(each) and each > 0 for each in size):
         raise UnfitTopography(
