@@ -100,9 +100,10 @@ class BoundaryElements:
         return 1.0
 
     def untouched(self) -> CellState:
-        """The state at which the first summit is about to make contact."""
-        reach = self.summits.reach * self.spacing if self.adhesive else 0.0
-        separation = float(np.max(self.asperities.height + reach)) if self.adhesive else float(self.heights.max())
+        """The state at which the first summit, or a plateau without any, is about to make contact."""
+        separation = float(self.heights.max())
+        if self.adhesive:
+            separation = max(separation, float(np.max(self.asperities.height + self.summits.reach * self.spacing)))
         nothing = np.zeros(0)
         return CellState(separation, nothing.astype(int), nothing, nothing, nothing)
 

@@ -10,7 +10,7 @@ from icha.boundary_elements.newton import FRONT_TOLERANCE
 from icha.boundary_elements.states import CellState
 from icha.contact.events import Events
 from icha.contact.failures import NotConverged
-from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control
+from icha.contact.model import AREA_FRACTION, HELD_CELLS, PRESSURE, ContactModel, Control
 
 # Relative error of a held load or area.
 _HELD = 5e-10
@@ -22,9 +22,8 @@ _SAME = 1e-13
 # error so small, relatively, that slopes are the same.
 _FIRST, _TRIAL = 1e-2, 1e-3
 _SAME_SLOPES = 1e-4
-# What a load of zero is held to over E*, at least (else over the load before); and an area without adhesion, in cells.
+# What a load of zero is held to over E*, at least (else over the load before).
 _NO_LOAD = 1e-6
-_CELLS = 2.0
 
 
 def under_control(
@@ -48,10 +47,9 @@ def under_control(
     """
     value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
     scale = abs(control.target) or max(abs(value(state)), _NO_LOAD * contact.contact_modulus)
-    # Without adhesion the area changes by whole cells.
     enough = _HELD * scale
     if control.quantity == AREA_FRACTION and not contact.adhesive:
-        enough = max(enough, _CELLS * contact.spacing**2 / contact.area)
+        enough = max(enough, HELD_CELLS * contact.spacing**2 / contact.area)
     sign = np.sign(control.target - value(state)) or 1.0
     short, far = state, None
     before, start, exact, same = state, state, False, False

@@ -280,9 +280,11 @@ class Linearised:
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
         """Changes of fraction and pressure, (k,), for given right-hand sides, to a relative accuracy."""
         size = (len(self.cells), len(self.cells))
+        # Of order one, or squares of what is left at last would be nothing in single precision on flat surfaces.
+        scale = 2.0 ** np.frexp(np.abs(right).max(initial=0.0))[1]
         solution, _ = gmres(
             LinearOperator(size, self._displaced, dtype=np.float32),
-            right.astype(np.float32),
+            (right / scale).astype(np.float32),
             M=LinearOperator(size, self._nearly_inverse, dtype=np.float32),
             rtol=accuracy,
             restart=_MAX_KRYLOV,
@@ -290,8 +292,8 @@ class Linearised:
         )
         pressure, _, _ = self._spread(solution)
         fraction = np.zeros(len(solution))
-        fraction[self.at_front] = solution[self.at_front] / (self.front.strength or 1.0)
-        return fraction, pressure.astype(float)
+        fraction[self.at_front] = scale * (solution[self.at_front] / (self.front.strength or 1.0))
+        return fraction, scale * pressure.astype(float)
 
     def _spread(self, unknowns):
         """Changes of pressure; of strength and of tension at the front."""

@@ -68,6 +68,17 @@ def test_attraction_of_shorter_and_shorter_range_tends_to_the_limit():
         assert near < far
 
 
+def test_contacts_of_flat_surfaces_are_those_of_steep_ones():
+    """Heights in any unit, with energy and range of the attraction that go along."""
+    steep, found = rough(48, 6), []
+    for factor in (1.0, 1e-12):
+        surface = icha.Surface(steep.heights * factor, steep.period)
+        material = icha.Material(25e6, 0.05 * factor**2, 2e-9 * factor)
+        run = icha.simulate(surface, material, icha.Path([1e-2]), model="boundary_elements")
+        found.append([float(run[name][0]) for name in ("contact_area_fraction", "reduced_separation")])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-7)
+
+
 def test_threads_change_no_byte():
     digests = set()
     for threads in ("1", "2"):
