@@ -1,0 +1,195 @@
+"""What must change nothing, of both models, on random contacts: units, place and direction, range, steps, threads."""
+
+import hashlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.path.resolution import UNRESOLVED_LOSS
+
+PERIOD, MODULUS = 100e-6, 25e6
+# Grid and shortest waves along its side: some fifty asperities, and eight cells for each wave.
+SIZE = {ASPERITIES: (64, 16), BOUNDARY_ELEMENTS: (32, 4)}
+# By how much two equilibria may differ, relatively, and in h_rms. Asperities rest to 1e-9 h_rms, fronts of boundary
+# elements to 1e-9 of sqrt(G/dgamma); loads and areas change by up to a hundred times themselves per h_rms, and next to
+# a jump by more.
+SAME = {ASPERITIES: 1e-7, BOUNDARY_ELEMENTS: 1e-5}
+# Unions of asperities remember where they happened, which steps decide: by so much (docs/howto/vary.md).
+STEPS_WITH_UNIONS = 1e-2
+# A largest tension is known to 1e-3, and what has been lost with every jump to UNRESOLVED_LOSS.
+SAME_TENSION = 2e-3
+COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count", "split_count")
+# Powers of ten of the energy of adhesion, in units of what it takes to press the summits flat; None: no adhesion.
+NONE, ADHERING = st.none(), st.floats(-4, -1.5)
+ANY = st.one_of(NONE, ADHERING)
+BOTH = pytest.mark.parametrize("model", [ASPERITIES, BOUNDARY_ELEMENTS])
+
+
+# Of the random cases of other tests one in so many: each of these computes two runs and more.
+OFTEN, SELDOM = 10, 20
+
+
+def some(part):
+    """One in so many random cases."""
+    return settings(max_examples=max(settings.default.max_examples // part, 2))
+
+
+@st.composite
+def contacts(draw, model, adhesion=ANY):
+    """A surface and a material."""
+    grid, waves = SIZE[model]
+    hurst, slope = draw(st.floats(0.3, 1.0)), 10 ** draw(st.floats(-2, 0))
+    spectrum = SelfAffineSpectrum(PERIOD, PERIOD / draw(st.floats(1, waves / 2)), PERIOD / waves, hurst, slope)
+    surface = spectrum.realise(grid, draw(st.integers(0, 10**6)))
+    return surface, adhering(surface, draw(adhesion), draw(st.floats(1, 5)))
+
+
+def adhering(surface, power, tabor=2.0):
+    """A material, with a power of ten of the energy that it takes to press the summits flat."""
+    if power is None:
+        return Material(MODULUS, 0.0, 1e-9)
+    energy = 10**power * MODULUS * surface.rms_height**1.5 * surface.rms_curvature**0.5
+    return Material(MODULUS, energy, np.cbrt((energy / MODULUS) ** 2 / surface.rms_curvature) / tabor)
+
+
+def pressed(surface, material, model, **path):
+    """The run; of one that ends early what it reached."""
+    try:
+        return simulate(surface, material, Path(**({"reduced_pressures": [3e-3, 2e-2]} | path)), model=model)
+    except ConvergenceError as error:
+        return error.dataset
+
+
+def assert_same(one, other, bound, counts=COUNTS):
+    """Whether two runs are the same without their units, as accurately as their equilibria are known."""
+    assert one.sizes["step"] == other.sizes["step"], (one.attrs.get("incomplete"), other.attrs.get("incomplete"))
+    for name in ("contact_area_fraction", "reduced_pressure"):
+        np.testing.assert_allclose(other[name], one[name], rtol=bound, err_msg=name)
+    np.testing.assert_allclose(other["reduced_separation"], one["reduced_separation"], atol=bound)
+    for name in counts:
+        np.testing.assert_array_equal(other[name], one[name], err_msg=name)
+
+
+def digest(run, without=()):
+    """All bytes of a run's values."""
+    total = hashlib.sha256()
+    for name, variable in run.drop_vars(without).variables.items():
+        values = variable.values
+        total.update(name.encode())
+        total.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
+    return total.hexdigest()
+
+
+@BOTH
+@some(OFTEN)
+@given(st.data(), st.floats(-4, 4), st.floats(-3, 3))
+def test_units_drop_out(model, data, lengths, pressures):
+    """All lengths by one factor, the modulus by another, the energy by both."""
+    surface, material = data.draw(contacts(model))
+    length, stress = 10**lengths, 10**pressures
+    larger = Surface(surface.heights * length, PERIOD * length)
+    scaled = Material(MODULUS * stress, material.surface_energy * stress * length, material.interaction_range * length)
+    one, other = (pressed(*contact, model) for contact in ((surface, material), (larger, scaled)))
+    assert_same(one, other, SAME[model])
+    np.testing.assert_allclose(
+        other["contact_stiffness"], stress / length * one["contact_stiffness"], rtol=100 * SAME[model]
+    )
+
+
+@pytest.mark.slow
+@settings(max_examples=5)
+@given(contacts(ASPERITIES, ADHERING), st.floats(-4, 4), st.floats(-3, 3))
+def test_units_drop_out_of_a_loop(contact, lengths, pressures):
+    surface, material = contact
+    length, stress = 10**lengths, 10**pressures
+    larger = Surface(surface.heights * length, PERIOD * length)
+    scaled = Material(MODULUS * stress, material.surface_energy * stress * length, material.interaction_range * length)
+    way = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
+    one, other = (pressed(*each, ASPERITIES, **way) for each in ((surface, material), (larger, scaled)))
+    assert ("hysteresis_loss" in one) == ("hysteresis_loss" in other)
+    if "hysteresis_loss" in one:
+        jumps = int(one["jump_in_count"][-1] + one["jump_off_count"][-1])
+        for name, unit, bound in (
+            ("hysteresis_loss", stress * length, jumps * UNRESOLVED_LOSS),
+            ("pull_off_pressure", stress, SAME_TENSION),
+        ):
+            np.testing.assert_allclose(float(other[name]), unit * float(one[name]), rtol=bound, err_msg=name)
+
+
+@BOTH
+@some(OFTEN)
+@given(st.data(), st.tuples(st.integers(0, 63), st.integers(0, 63)), st.integers(0, 3), st.booleans())
+def test_place_and_direction_of_the_surface_change_nothing(model, data, shift, turns, mirrored):
+    surface, material = data.draw(contacts(model))
+    heights = np.rot90(np.roll(surface.heights, shift, axis=(0, 1)), turns)
+    moved = Surface(heights.T if mirrored else heights, PERIOD)
+    assert_same(pressed(surface, material, model), pressed(moved, material, model), SAME[model])
+
+
+@BOTH
+@some(SELDOM)
+@given(st.data(), st.floats(-6, 6))
+def test_without_adhesion_the_range_changes_no_bit(model, data, power):
+    surface, material = data.draw(contacts(model, NONE))
+    other = Material(MODULUS, 0.0, material.interaction_range * 10**power)
+    without = ["interaction_range", "tabor_parameter"]
+    assert digest(pressed(surface, material, model), without) == digest(pressed(surface, other, model), without)
+
+
+@BOTH
+@some(SELDOM)
+@given(st.data(), st.floats(-6, 0))
+def test_heights_scale_apart_from_lengths(model, data, power):
+    """With heights scale approaches and pressures; the adhesive part of an approach does if the energy is squared."""
+    surface, material = data.draw(contacts(model))
+    factor = 10**power
+    flatter = Surface(surface.heights * factor, PERIOD)
+    scaled = Material(MODULUS, material.surface_energy * factor**2, material.interaction_range * factor)
+    assert_same(pressed(surface, material, model), pressed(flatter, scaled, model), SAME[model])
+
+
+@some(SELDOM)
+@given(contacts(ASPERITIES, NONE))
+def test_adhesion_vanishes_with_its_energy(contact):
+    """An approach is less than Hertz's by sqrt(2 pi a dgamma/E*): what it changes falls with the root of the energy."""
+    surface, bare = contact
+    expected = pressed(surface, bare, ASPERITIES)
+    error = []
+    for power in (-8, -12):
+        faint = pressed(surface, adhering(surface, power), ASPERITIES)
+        error.append(np.abs(faint["contact_area_fraction"] / expected["contact_area_fraction"] - 1).max())
+    assert error[0] <= 1e-2 and error[1] <= 0.1 * error[0] + SAME[ASPERITIES]
+
+
+@BOTH
+@some(SELDOM)
+@given(st.data())
+def test_steps_change_nothing_but_unions(model, data):
+    surface, material = data.draw(contacts(model))
+    long, short = (pressed(surface, material, model, max_step=step) for step in (0.5, 0.05))
+    assert long.sizes["step"] == short.sizes["step"]
+    united = model == ASPERITIES and int(short["coalescence_count"].max()) > 0
+    if not united:
+        # Patches that meet within a step count as one.
+        assert_same(long, short, SAME[model], counts=["spot_count"])
+    np.testing.assert_allclose(
+        long["contact_area_fraction"], short["contact_area_fraction"], rtol=STEPS_WITH_UNIONS, err_msg="area"
+    )
+
+
+@BOTH
+@some(SELDOM)
+@given(st.data())
+def test_threads_change_no_bit(model, data):
+    surface, material = data.draw(contacts(model))
+    found = set()
+    with pytest.MonkeyPatch.context() as patch:
+        for threads in ("1", "3"):
+            patch.setenv("OMP_NUM_THREADS", threads)
+            again = Surface(surface.heights, PERIOD)
+            found.add(digest(pressed(again, material, model)))
+    assert len(found) == 1
