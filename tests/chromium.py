@@ -9,6 +9,8 @@ import shutil
 import signal
 import time
 
+import pytest
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
 OPTIONS = (
@@ -20,6 +22,14 @@ OPTIONS = (
     "--hide-scrollbars",
 )
 OPTIONS += ("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions")
+# Of tests that need it.
+WANTED = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        CHROMIUM is None and os.environ.get("ICHA_REQUIRE_CHROMIUM") != "1",
+        reason=f"no Chromium on the path, under none of {', '.join(NAMES)}",
+    ),
+]
 # Key, its code, the number that Windows gives it.
 KEYS = {
     "Tab": 9, "Enter": 13, "End": 35, "Home": 36, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40,

@@ -111,7 +111,7 @@ class JKR:
         """
         if self.material.surface_energy == 0:
             return np.zeros(np.shape(R))
-        wu = (1 - 2.641 * self.material.tabor_parameter(R) ** (3 / 7)) * self.material.interaction_range
+        wu = (1 - wu_gap(self.material.tabor_parameter(R))) * self.material.interaction_range
         return np.clip(wu, self.jump_off_approach(R), 0.0)
 
     def is_jump_in_verified(self, R):
@@ -221,3 +221,8 @@ class JKR:
     def union(self, a_i, R_i, a_j, R_j):
         """Contact radius and radius of curvature of the one that two become, and where between them its centre lies."""
         return united_paraboloids(a_i, R_i, a_j, R_j)
+
+
+def wu_gap(tabor_parameter: np.ndarray | float) -> np.ndarray | float:
+    """Wu's distance of the jump into contact over the range of attraction, 2.641 mu^(3/7): the gap of eq. (3)."""
+    return 2.641 * tabor_parameter ** (3 / 7)

@@ -13,6 +13,8 @@ from functools import cache
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from icha.asperity.jkr import wu_gap
+
 # Nodes along the radius, and of each of the two quadratures.
 _NODES, _QUADRATURE = 60, 80
 # Gaps at the axis at which equilibria are sought, over Wu's distance, until the undeformed gap grows again. At gaps
@@ -48,11 +50,6 @@ def jump_in_gap(tabor_parameter: float) -> float:
                 options={"xatol": 1e-6 * scale},
             ).fun
     raise ValueError(f"tabor_parameter: {tabor_parameter!r}: such a paraboloid does not jump into contact")
-
-
-def wu_gap(tabor_parameter: float) -> float:
-    """Wu's distance of the jump into contact over the range, 2.641 mu^(3/7): the gap of eq. (3)."""
-    return 2.641 * tabor_parameter ** (3 / 7)
 
 
 class _Problem:

@@ -2,24 +2,17 @@
 
 import io
 import json
-import os
 import re
 
 import numpy as np
 import pytest
-from chromium import CHROMIUM, NAMES, chromium
+from chromium import WANTED, chromium
 from explorer_results import write_results
 from PIL import Image
 
 from icha.report.explorer import write_explorer
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(
-        CHROMIUM is None and os.environ.get("ICHA_REQUIRE_CHROMIUM") != "1",
-        reason=f"no Chromium on the path, under none of {', '.join(NAMES)}",
-    ),
-]
+pytestmark = WANTED
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import html
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import small_campaign as small
+from chromium import CHROMIUM, OPTIONS, WANTED
 
 from icha.analysis.checks import check_campaign
 from icha.analysis.common_loads import compare_campaign
@@ -21,15 +21,7 @@ from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, write_times_page
 from icha.report.surfaces import read_surface_statistics
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
-CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(
-        CHROMIUM is None and os.environ.get("ICHA_REQUIRE_CHROMIUM") != "1",
-        reason=f"no Chromium on the path, under none of {', '.join(NAMES)}",
-    ),
-]
+pytestmark = WANTED
 
 
 @pytest.fixture(scope="module")
@@ -76,14 +68,13 @@ def browse(page, script="", *options):
         text = text.replace("</body>", runs)
     opened = page.with_name(f"{page.stem}.opened.html")
     opened.write_text(text, encoding="utf-8")
-    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"]
-    command += [
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--disable-extensions",
+    command = [
+        CHROMIUM,
+        *OPTIONS,
+        f"--user-data-dir={scratch / 'profile'}",
+        "--enable-logging=stderr",
+        "--virtual-time-budget=8000",
     ]
-    command += [f"--user-data-dir={scratch / 'profile'}", "--enable-logging=stderr", "--virtual-time-budget=8000"]
     command += [f"--log-net-log={scratch / 'net.json'}", "--window-size=1300,900", *options]
     done = subprocess.run(
         [*command, "--dump-dom", opened.as_uri()], capture_output=True, text=True, timeout=120, check=True

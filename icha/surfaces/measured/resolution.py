@@ -97,7 +97,7 @@ class ScanResolution:
 def slope_left(surface: Surface, cutoff: float) -> float:
     """Part of a surface's rms slope that the Gaussian filter of a nesting index (m) leaves, by the radial spectrum."""
     q, power = radial_power_spectrum(surface)
-    slopes = power * q**2 * np.diff(ring_edges(surface) ** 2)
+    slopes = _squared_slopes(surface, q, power)
     transmission = 2.0 ** -((cutoff * q / (2 * np.pi)) ** 2)
     return math.sqrt(float(np.sum(slopes * transmission**2) / np.sum(slopes)))
 
@@ -134,13 +134,18 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     if len(above) and k + 1 < len(q):
         way = np.log(power[k] / (2 * floor)) / np.log(power[k] / power[k + 1])
         there = q[k] * (q[k + 1] / q[k]) ** min(max(way, 0.0), 1.0)
-    slopes = power * q**2 * np.diff(ring_edges(surface) ** 2)
+    slopes = _squared_slopes(surface, q, power)
     return NoiseFloor(
         power=floor,
         wavelength=float(2 * np.pi / there),
         rms=math.sqrt(floor) * 2 * math.pi / surface.spacing,
         slope_share=float(np.sum(slopes[q > there]) / np.sum(slopes)),
     )
+
+
+def _squared_slopes(surface, q, power):
+    """What each ring of wave numbers adds to the mean square slope, but for a common factor."""
+    return power * q**2 * np.diff(ring_edges(surface) ** 2)
 
 
 def _rounded_up(length: float) -> float:
