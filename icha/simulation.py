@@ -1,6 +1,7 @@
 """One sweep of one surface and one material, loading and unloading, as a labelled dataset."""
 
 import importlib
+import pathlib
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -64,6 +65,7 @@ def simulate(
     model: str = ASPERITIES,
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
+    kept: pathlib.Path | None = None,
 ) -> xr.Dataset:
     """Press a surface against the half-space along a path, and pull it off again if the path does.
 
@@ -76,6 +78,8 @@ def simulate(
         a periodic surface.
     seed : recorded in the dataset; -1 for a surface without one.
     progress : called with a line of text at every stop.
+    kept : a folder in which equilibria are kept as they are found, and in which those are that a call with the same
+        arguments found before it was stopped (`icha.contact.kept`); of boundary elements.
 
     Returns
     -------
@@ -97,7 +101,8 @@ def simulate(
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
         observables = chosen.observables(surface, material, path)
-        met = _followed(observables, path, material.contact_modulus * surface.rms_slope, progress)
+        contact = observables.contact if kept is None else chosen.kept(observables.contact, kept)
+        met = _followed(contact, observables, path, material.contact_modulus * surface.rms_slope, progress)
         dataset = _dataset(surface, material, path, model, seed, met, observables.of_contact())
     if met.failure:
         raise ConvergenceError(met.failure, dataset) from None
@@ -172,8 +177,7 @@ class _Met(NamedTuple):
     failure: str
 
 
-def _followed(observables, path, pressure_unit, progress) -> _Met:
-    contact = observables.contact
+def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
     steps, snapshots, events, failure = [], [], [], ""
     before = pulled = None
 

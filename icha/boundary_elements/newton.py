@@ -37,8 +37,9 @@ _MAX_KRYLOV = 60
 COARSE, FINE = 5e-2, 1e-4
 # The rows of the front, in the preconditioner: what is left of a bond beside the half-space.
 _NET = 0.6
-# A deviation of sqrt(G/dgamma) that keeps the whole front waiting, and of how much of it.
-_RESTLESS, _FEW = 0.03, 0.05
+# A deviation of sqrt(G/dgamma) that keeps the whole front waiting, and of how much of it. Least damping of bonds where
+# it is larger: fronts run there, and a whole step would lead up.
+_RESTLESS, _FEW, _RUNNING = 0.03, 0.05, 0.2
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
 # Damping of the first step of a front of which more than this part is restless: without, it would lead far up.
 _FAR_DAMPING, _MANY = 0.2, 0.5
@@ -162,8 +163,7 @@ def front_at_rest(
             if state.off > enough * given.reach:
                 # Or tensions of pressures that are not good enough say so.
                 state = given.at(state, max(enough, _FINER * state.off / given.reach))
-            else:
-                damping = _more(damping)
+            damping = _more(damping)
             continue
         off = max(enough, min(most_off, error * min(_GAP_TO_FRONT, max(error, FINE))))
         smallest = _SMALLEST_STEP if most_off <= _NEAR else 1.0
@@ -173,11 +173,11 @@ def front_at_rest(
             if part == 1.0:
                 damping = damping / 4 if damping > 0.01 else 0.0
             most_off, all_moved = coarse, True
-        elif most_off > _NEAR:
-            # Energies of coarse pressures are not to be trusted that far.
-            most_off = _NEAR
-            state = given.at(state, max(enough, most_off))
         else:
+            if most_off > _NEAR:
+                # Energies of coarse pressures are not to be trusted that far.
+                most_off = _NEAR
+                state = given.at(state, max(enough, most_off))
             damping = _more(4 * damping)
     if most_steps:
         return state
@@ -244,7 +244,8 @@ def _down(space, front, now, damping, accuracy):
 
 def _step(space, front, now, damping, accuracy):
     """Newton's step: changes of fraction and pressure, (k,)."""
-    linear = Linearised(space, front, now.cells, now.front, now.fraction, now.around, damping)
+    local = np.where(np.abs(now.tension - 1) > _RESTLESS, max(damping, _RUNNING), damping)
+    linear = Linearised(space, front, now.cells, now.front, now.fraction, now.around, local)
     # To the tension that the law wants at the present fraction, and from there with the law.
     strengths = front.strengths(now.around)
     missing = np.where(now.front, strengths * now.fraction + now.pressure, 0.0)
@@ -258,7 +259,7 @@ def tangent(
     space: HalfSpace, front: Front, cells: np.ndarray, fraction: np.ndarray, around: np.ndarray, accuracy: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Changes of fraction and of pressure, (k,), with the mean separation: per cell, and in E* per cell."""
-    linear = Linearised(space, front, cells, fraction < 1, fraction, around, 0.0)
+    linear = Linearised(space, front, cells, fraction < 1, fraction, around, np.zeros(len(cells)))
     return linear.solve(np.full(len(cells), -1.0), accuracy)
 
 
@@ -269,12 +270,12 @@ class Linearised:
     """
 
     def __init__(self, space, front, cells, at_front, fraction, around, damping):
-        """Cells (k,), whether they are at the front, fractions of contact there and around; damping: softer bonds."""
+        """Cells; whether they are at the front, fractions of contact there and around, damping: softer bonds. (k,)."""
         self.space, self.front, self.cells = space, front, cells
         self.closed, self.at_front = ~at_front, np.flatnonzero(at_front)
         self.own = front.strengths(around[self.at_front]).astype(np.float32)
         self.fraction = fraction[self.at_front].astype(np.float32)
-        self.soft = np.float32(1 + damping)
+        self.soft = (1 + damping[self.at_front]).astype(np.float32)
         self.weights = neighbour_weights(cells[self.at_front], space.shape)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:

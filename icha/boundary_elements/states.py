@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -34,3 +34,19 @@ class CellState:
     gap_residual: float = 0.0
     pending: int = 0
     history: tuple[Events, ...] = ()
+
+
+def packed(state: CellState) -> dict[str, np.ndarray]:
+    """The arrays that a state is made of, with the events since the one before."""
+    arrays = {each.name: getattr(state, each.name) for each in fields(state) if each.name not in ("rates", "history")}
+    arrays |= {f"rates_{k}": rate for k, rate in enumerate(state.rates or ())}
+    return arrays | {f"event_{name}": getattr(state.history[-1], name) for name in Events.__match_args__}
+
+
+def unpacked(arrays: dict[str, np.ndarray], before: CellState) -> CellState:
+    """The state that is `packed` in arrays and followed from another one."""
+    own = {each.name: arrays[each.name] for each in fields(CellState) if each.name in arrays}
+    own = {name: value if value.ndim else value.item() for name, value in own.items()}
+    rates = (arrays["rates_0"], arrays["rates_1"]) if "rates_0" in arrays else None
+    events = Events(*(arrays[f"event_{name}"] for name in Events.__match_args__))
+    return CellState(**own, rates=rates, history=(*before.history, events))

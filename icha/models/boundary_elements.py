@@ -1,8 +1,12 @@
 """Boundary elements in the limit of a short range of attraction: fronts of contact obey Griffith's criterion."""
 
+import pathlib
+
 from icha.asperity.material import Material
 from icha.boundary_elements.contact import BoundaryElements
 from icha.boundary_elements.observables import PatchObservables
+from icha.boundary_elements.states import packed, unpacked
+from icha.contact.kept import Kept
 from icha.contact.observables import Observables
 from icha.models.model import Model
 from icha.path.targets import Path
@@ -11,6 +15,10 @@ from icha.surfaces.surface import Surface
 
 def _observables(surface: Surface, material: Material, path: Path) -> Observables:
     return PatchObservables(BoundaryElements.of(surface, material), surface)
+
+
+def _kept(contact: BoundaryElements, folder: pathlib.Path) -> Kept:
+    return Kept(contact, folder, packed, unpacked)
 
 
 MODEL = Model(
@@ -23,4 +31,5 @@ MODEL = Model(
     ),
     united_by_rule=False,
     observables=_observables,
+    kept=_kept,
 )

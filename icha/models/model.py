@@ -1,9 +1,11 @@
 """What a run needs to know of a model of contact."""
 
+import pathlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from icha.asperity.material import Material
+from icha.contact.model import ContactModel
 from icha.contact.observables import Observables
 from icha.path.targets import Path
 from icha.surfaces.surface import Surface
@@ -19,6 +21,7 @@ class Model:
     references : publications of its methods.
     united_by_rule : whether the path's `united_until` means something to it.
     observables : of the contact of a surface and a material, for a path; ValueError if it cannot be computed.
+    kept : its contact with equilibria kept in a folder; None if it has none that take long.
     """
 
     title: str
@@ -26,3 +29,4 @@ class Model:
     references: str
     united_by_rule: bool
     observables: Callable[[Surface, Material, Path], Observables]
+    kept: Callable[[ContactModel, pathlib.Path], ContactModel] | None = None

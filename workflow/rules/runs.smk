@@ -42,6 +42,8 @@ rule run:
             "config_sha256": SHA256_OF_RUN(case_of(wildcards)),
         },
         code=by_case(lambda case: CODE_OF_RUN[case.model]),
+        # What takes hours can be gone on with.
+        keeps=by_case(lambda case: case.model == BOUNDARY_ELEMENTS and run_threads(CAMPAIGN, case) > 1),
     message:
         "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
         "{wildcards.model_folder}{wildcards.material}"

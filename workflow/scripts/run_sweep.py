@@ -1,21 +1,27 @@
 """Press one surface against one material along a loading path."""
 
+import pathlib
+import shutil
 import traceback
 
+import numpy as np
+import scipy
 from job import attributes, guarded
 
 from icha.asperity.material import Material
+from icha.contact.kept import prepared
 from icha.contact.models import ASPERITIES
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
 from icha.simulation import ConvergenceError, simulate, unfollowed
+from icha.support.checksums import sha256_of
 
 # What this machine lacks says nothing of the run: its job fails, and the next call tries again.
 OF_THE_MACHINE = (OSError, MemoryError, ImportError)
 
 
-def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, progress, model=ASPERITIES):
+def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, progress, kept, model=ASPERITIES):
     """Load the surface of the file `surface`, scaled to `rms_slope`, and write the run dataset to `output`.
 
     Of a run that fails the file holds the stops that were reached, and says why there are no more: the campaign goes
@@ -24,7 +30,7 @@ def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, p
     """
     pressed = read_surface(surface).scaled_to_rms_slope(rms_slope), Material(**material), Path(**path)
     try:
-        dataset = simulate(*pressed, model=model, seed=seed, progress=progress)
+        dataset = simulate(*pressed, model=model, seed=seed, progress=progress, kept=kept)
     except ConvergenceError as error:
         dataset = error.dataset
     except OF_THE_MACHINE:
@@ -40,12 +46,25 @@ def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, p
     write_dataset(dataset.assign_attrs(attributes), output)
 
 
+def _kept(snakemake):
+    """The folder in which equilibria are kept, if they are, with nothing in it from another surface, path or code."""
+    if not snakemake.params.keeps:
+        return None
+    asked = [snakemake.params.attributes["config_sha256"], snakemake.params.code, np.__version__, scipy.__version__]
+    asked.append(sha256_of(pathlib.Path(snakemake.input.surface)))
+    return prepared(pathlib.Path(snakemake.output[0]).with_suffix(".kept"), " ".join(asked))
+
+
 if "snakemake" in globals():
     with guarded(snakemake):
+        kept = _kept(snakemake)
         run_sweep(
             snakemake.input.surface,
             snakemake.output[0],
             **snakemake.params.settings,
             attributes=attributes(snakemake),
             progress=lambda line: print(line, flush=True),
+            kept=kept,
         )
+        if kept is not None:
+            shutil.rmtree(kept)

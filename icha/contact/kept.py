@@ -1,0 +1,78 @@
+"""A contact whose equilibria are kept as they are found: a path that takes hours can be gone on with.
+
+What is kept is what the contact was asked for, in turn. So the same path, begun again, finds it there as far as it had
+come, and has the same states to the last bit.
+"""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from icha.contact.failures import FullContact, NotConverged
+from icha.contact.model import ContactModel, Control, S
+from icha.support.atomic_files import whole_file
+
+_FAILURES = {kind.__name__: kind for kind in (NotConverged, FullContact)}
+# What the kept equilibria are of.
+_OF = "of.txt"
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """A `ContactModel` that looks for an equilibrium only if its folder does not have it yet.
+
+    contact : the model. folder : of its equilibria, one file each, in the order in which they were asked for. packed :
+    arrays, by name, that a state that followed from another one is made of. unpacked : that state from these.
+    """
+
+    contact: ContactModel[S]
+    folder: Path
+    packed: Callable[[S], dict[str, np.ndarray]]
+    unpacked: Callable[[dict[str, np.ndarray], S], S]
+    _numbers: Iterator[int] = field(default_factory=itertools.count)
+
+    def equilibrium(self, state: S, separation: float, control: Control | None = None, *, let_go: int = 0) -> S:
+        """As of the contact."""
+        file = self.folder / f"{next(self._numbers):05d}.npz"
+        if file.exists():
+            with np.load(file) as arrays:
+                found = dict(arrays)
+            if "failure" in found:
+                raise _FAILURES[str(found["failure"])](str(found["message"]))
+            return self.unpacked(found, state)
+        try:
+            new = self.contact.equilibrium(state, separation, control, let_go=let_go)
+        except NotConverged as failure:
+            _write(file, {"failure": type(failure).__name__, "message": str(failure)})
+            raise
+        _write(file, self.packed(new))
+        return new
+
+    def __getattr__(self, name: str) -> Any:
+        """All else is the contact's."""
+        return getattr(self.contact, name)
+
+
+def prepared(folder: Path, of: str) -> Path:
+    """The folder, with nothing in it that was kept of something else.
+
+    of : what tells the surface, the material, the path and the code apart from all others.
+    """
+    written = folder / _OF
+    if not written.exists() or written.read_text(encoding="utf-8") != of:
+        shutil.rmtree(folder, ignore_errors=True)
+        with whole_file(written) as file:
+            file.write_text(of, encoding="utf-8")
+    return folder
+
+
+def _write(file, arrays):
+    with whole_file(file) as part, part.open("wb") as stream:
+        np.savez(stream, **arrays)

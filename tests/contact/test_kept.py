@@ -1,0 +1,55 @@
+"""Paths that are gone on with after they were stopped."""
+
+import pytest
+from xarray.testing import assert_identical
+
+from icha import Material, Path, SelfAffineSpectrum, simulate
+from icha.boundary_elements.contact import BoundaryElements
+from icha.contact.kept import prepared
+from icha.simulation import ConvergenceError
+
+SURFACE = SelfAffineSpectrum(1e-6, 1e-6, 0.25e-6, 0.8).realise(32, 1).scaled_to_rms_slope(0.3)
+PATHS = {
+    "both ways": (Material(1e6, 1e-4, 1e-9), Path(reduced_pressures=[0.01, 0.02], unload=True)),
+    "areas": (Material(1e6, 0.01, 1e-8), Path(area_fractions=[0.05, 0.1])),
+    # No equilibrium at so little contact can be held.
+    "a failure": (Material(1e6, 0.5, 1e-8), Path(area_fractions=[1e-4, 0.2])),
+}
+
+
+def followed(monkeypatch, case, folder, most):
+    """What a simulation finds, or how it fails, and how often it sought an equilibrium; it is stopped after `most`."""
+    found, count = BoundaryElements.equilibrium, 0
+
+    def equilibrium(*args, **options):
+        nonlocal count
+        if count == most:
+            raise KeyboardInterrupt
+        count += 1
+        return found(*args, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(BoundaryElements, "equilibrium", equilibrium)
+        material, path = PATHS[case]
+        try:
+            dataset = simulate(SURFACE, material, path, model="boundary_elements", kept=folder)
+        except ConvergenceError as failure:
+            dataset = failure.dataset
+        except KeyboardInterrupt:
+            dataset = None
+    return dataset, count
+
+
+@pytest.mark.parametrize("case", PATHS)
+def test_a_path_that_was_stopped_goes_on_to_the_same_last_bit(monkeypatch, case, tmp_path):
+    whole, needed = followed(monkeypatch, case, None, None)
+    assert ("incomplete" in whole.attrs) == (case == "a failure") and needed > 3
+    folder = prepared(tmp_path / "kept", "this path")
+    half = needed // 2
+    assert followed(monkeypatch, case, folder, half) == (None, half)
+    again, further = followed(monkeypatch, case, folder, None)
+    assert_identical(again, whole)
+    # What was being looked for when it was stopped is looked for again, nothing else.
+    assert further == needed - half
+    assert followed(monkeypatch, case, prepared(folder, "this path"), None)[1] == 0
+    assert followed(monkeypatch, case, prepared(folder, "another"), None)[1] == needed
