@@ -8,9 +8,9 @@ from icha.boundary_elements.contact import BoundaryElements
 from icha.contact.kept import prepared
 from icha.simulation import ConvergenceError
 
-SURFACE = SelfAffineSpectrum(1e-6, 1e-6, 0.25e-6, 0.8).realise(32, 1).scaled_to_rms_slope(0.3)
+SURFACE = SelfAffineSpectrum(1e-6, 1e-6, 0.5e-6, 0.8).realise(16, 1).scaled_to_rms_slope(0.3)
 PATHS = {
-    "both ways": (Material(1e6, 1e-4, 1e-9), Path(reduced_pressures=[0.01, 0.02], unload=True)),
+    "both ways": (Material(1e6, 1e-4, 1e-9), Path(reduced_pressures=[0.01], unload=True)),
     "areas": (Material(1e6, 0.01, 1e-8), Path(area_fractions=[0.05, 0.1])),
     # No equilibrium at so little contact can be held.
     "a failure": (Material(1e6, 0.5, 1e-8), Path(area_fractions=[1e-4, 0.2])),
