@@ -100,6 +100,8 @@ def _data_files(file: Path) -> list[Path]:
     found = set()
     for name in syntax_of(file).names:
         place = file.parent / name
+        if Path(name).is_absolute():
+            continue  # a file of the system, such as one in /proc that says something else every time
         if place.is_file() and place.suffix != ".py":
             found.add(place)
         elif place.is_dir() and place.parent == file.parent and not name.startswith((".", "_")):

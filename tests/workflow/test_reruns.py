@@ -363,3 +363,13 @@ def test_what_cannot_be_kept_of_modules_is_read_all_the_same(tmp_path, syntax, m
     monkeypatch.setattr(syntax(), "_KEPT", tmp_path / "file/syntax.json")
     assert syntax().syntax_of(module).imports == [(0, "os", None)]
     sys.modules["syntax"]._keep()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a file of the system that says something else every time")
+def test_files_of_the_system_that_a_module_names_are_not_part_of_it(fingerprint, tmp_path):
+    script = tmp_path / "ask.py"
+    script.write_text("UPTIME = '/proc/uptime'\n")
+    first, before = fingerprint.code_fingerprint(script), Path("/proc/uptime").read_text()
+    while Path("/proc/uptime").read_text() == before:
+        time.sleep(0.01)
+    assert fingerprint.code_fingerprint(script) == first
