@@ -86,6 +86,11 @@ class Search:
         rows = ((kind, *row) for row in zip(position, *others, strict=True))
         return replace(self, log=(*self.log, *rows))
 
+    @property
+    def jumped_in(self) -> list[int]:
+        """Asperities that have jumped into contact so far."""
+        return [row[4] for row in self.log if row[0] == JUMP_IN]
+
     def forgetting_jumps_in(self, asperity) -> Search:
         """Without the jumps into contact of asperities."""
         taken_back = set(asperity.tolist())

@@ -5,7 +5,7 @@ point. It stops at the separations of the way in, so that both can be compared; 
 steps become short enough that the work lost in it is known, whatever the longest step.
 """
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -37,8 +37,10 @@ class Position:
 
 def cycle(
     contact: ContactModel, path: Path, stop_at: Callable[[Target], Stop], longest: float, course: Course
-) -> Iterator[Waypoint]:
+) -> Generator[Waypoint, Stop | None, None]:
     """All equilibria of a path that goes on after the first loading, without their balances.
+
+    A stop that is sent in answer to one of them is met, too, if it comes before the others, as one that is no target.
 
     Parameters
     ----------
@@ -88,9 +90,11 @@ class _Leg:
         """That of the separation."""
         return -1 if self.loading else 1
 
-    def follow(self, here: Position, stops: list[Stop], apart: bool = False) -> Generator[Waypoint, None, Position]:
+    def follow(
+        self, here: Position, stops: list[Stop], apart: bool = False
+    ) -> Generator[Waypoint, Stop | None, Position]:
         """The equilibria until all stops are met or, `apart`, nothing touches any more; returns where that is."""
-        waiting, visited = list(stops), [here.state.separation]
+        waiting, sent, visited = list(stops), None, [here.state.separation]
         here = replace(here, stride=Stride(here.stride.length))
         while waiting or apart:
             if not self.loading and self._is_apart(here.state):
@@ -99,8 +103,11 @@ class _Leg:
                 raise self._ended(here, NotConverged(_never_so_far(waiting[0], here.account)))
             beyond, step, here = self._one_step(here)
             try:
-                stop, met = first_passed(waiting, here.state, beyond, self.direction)
+                stop, met = first_passed([*waiting, *([sent] if sent else [])], here.state, beyond, self.direction)
             except InsideJump as jump:
+                if jump.stop is sent:
+                    sent = None
+                    continue
                 waiting.remove(jump.stop)
                 if not apart:
                     here = replace(here, course=here.course.without(jump))
@@ -112,17 +119,18 @@ class _Leg:
                 continue
             if met is not beyond:
                 step = Step.between(self.contact, here.state, met)
-            here.course.require_covered(here.state, met, stop, waiting, self.loading)
+            here.course.require_covered(here.state, met, None if stop is sent else stop, waiting, self.loading)
             here = self._arrived(here, met, step, first=self.number == 0 and len(visited) == 1)
             if self._is_worth_a_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if stop is None:
-                yield between_stops(met, self.number)
+                sent = yield between_stops(met, self.number)
                 continue
-            waiting.remove(stop)
-            if self.number == 0:
-                here = replace(here, course=here.course.met(stop.target, met))
-            yield Waypoint(stop.target, met, self.number)
+            if stop is not sent:
+                waiting.remove(stop)
+                if self.number == 0:
+                    here = replace(here, course=here.course.met(stop.target, met))
+            sent = yield Waypoint(stop.target, met, self.number)
         return _with_stations(here, visited) if self.loading else here
 
     def _one_step(self, here):

@@ -47,7 +47,9 @@ def follow(
     if not path.cyclic:
         return first_loading(contact, [stop_at(target) for target in path.targets], longest, course)
     waypoints = cycle(contact, path, stop_at, longest, course)
-    return under_load(contact, waypoints) if path.control == LOAD_CONTROL else _balanced(contact, waypoints)
+    if path.control == LOAD_CONTROL:
+        return under_load(contact, waypoints, pressure_unit)
+    return _balanced(contact, waypoints)
 
 
 def _balanced(contact, waypoints):

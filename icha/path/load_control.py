@@ -1,53 +1,50 @@
 """Load control: which states of a path are visited when the load is imposed."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 
 from icha.contact.model import ContactModel
-from icha.path.bracketing import InsideJump, reach
 from icha.path.energy_balance import EnergyBalance, Step
 from icha.path.stops import Stop
 from icha.path.targets import REDUCED_PRESSURE, Target
 from icha.path.waypoints import Waypoint, between_stops
 
 
-def under_load(contact: ContactModel, waypoints: Iterable[Waypoint]) -> Iterator[Waypoint]:
+def under_load(
+    contact: ContactModel, cycle: Generator[Waypoint, Stop | None, None], pressure_unit: float
+) -> Iterator[Waypoint]:
     """Those states of a path under separation control that load control visits, with their balances.
 
     Where the pressure would have to go back, the state jumps at constant pressure to where the curve goes on; with the
-    last contact, to where nothing touches any more.
+    last contact, to where nothing touches any more. The path is told to meet that pressure again, and goes on from
+    there: the events of a state are then those of the states before it, and its own. pressure_unit: of reduced
+    pressures, Pa.
     """
-    visited = hidden = None
+    visited = hidden = again = None
     balance = EnergyBalance()
     level = 0.0
-    for waypoint in waypoints:
+    while True:
+        try:
+            waypoint = cycle.send(again)
+        except StopIteration:
+            break
         state = waypoint.state
         pressure = contact.pressure(state)
         ahead = pressure >= level if waypoint.loading else pressure <= level
+        landed = again is not None and waypoint.target is again.target
         # The turning point itself begins the next leg; without contact there is nothing yet to jump from.
-        if visited is not None and not ahead:
+        if visited is not None and not ahead and not landed:
             hidden = waypoint
+            again = again or Stop(Target(REDUCED_PRESSURE, level / pressure_unit), contact, pressure_unit)
             continue
         if hidden is not None:
-            landed = state if pressure == level else _landed(contact, hidden.state, state, level)
-            balance = _after_jump(contact, balance, visited, landed, level)
-            if landed is not state:
-                yield replace(between_stops(landed, waypoint.leg), balance=balance)
-            visited, hidden = landed, None
-        if visited is not None and visited is not state:
+            balance = _after_jump(contact, balance, visited, state, level)
+        elif visited is not None:
             balance = balance.after(contact, Step.between(contact, visited, state))
-        yield replace(waypoint, balance=balance)
-        visited, level = state, pressure
+        yield replace(between_stops(state, waypoint.leg) if landed else waypoint, balance=balance)
+        visited, hidden, again, level = state, None, None, pressure
     if hidden is not None:
         yield replace(hidden, balance=_after_jump(contact, balance, visited, hidden.state, level))
-
-
-def _landed(contact, hidden, state, level):
-    """The state at a pressure (Pa) between a hidden state and the one after it; the latter where it is in a jump."""
-    try:
-        return reach(Stop(Target(REDUCED_PRESSURE, level), contact, 1.0), hidden, state)
-    except InsideJump:
-        return state
 
 
 def _after_jump(contact, balance, before, after, pressure):

@@ -39,7 +39,7 @@ from half_space import periodic_point_load
 from scipy.optimize import brentq
 
 import icha
-from icha import Path
+from icha import Material, Path
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
 from icha.contact.failures import NotConverged
 from icha.path.follow import follow
@@ -228,6 +228,35 @@ def test_loading_again_goes_on_beyond_the_old_maximum():
     last = [w for w in once if w.leg == 0][-1]
     assert last.state.separation == pytest.approx(waypoints[-1].state.separation, abs=1e-7)
     assert last.balance.work == pytest.approx(waypoints[-1].balance.work, rel=1e-4)
+
+
+# --- only what happened is recorded -------------------------------------------------------------------------
+
+
+def scattered(count, seed):
+    """Asperities anywhere in a cell, of random heights, that feel each other and their images."""
+    rng, side = np.random.default_rng(seed), np.sqrt(count)
+    heights = HEIGHT - 3 * np.abs(rng.normal(size=count))
+    return contact_of(heights, 10 * side * (rng.random((count, 2)) - 0.5), period=13 * side, until="overlap")
+
+
+@pytest.mark.parametrize("control", ["separation", "load"])
+def test_every_state_has_the_history_of_the_states_before_it(control):
+    waypoints = travelled(scattered(4, 0), [0.02], unload=True, control=control)
+    for before, after in pairwise(waypoints):
+        assert after.state.history[: len(before.state.history)] == before.state.history
+    counts = [history(waypoints).count(kind) for kind in (JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT)]
+    end = closed_again(waypoints)
+    assert counts == [end.jump_ins, end.jump_offs, end.coalescences, end.splits]
+
+
+def test_contact_without_an_equilibrium_was_never_made():
+    """The images of an asperity that jumps in draw it off again at once: at its jump-in there is no equilibrium."""
+    contact = contact_of([HEIGHT], period=20.0, material=Material(1.0, 1.0, 1 / 1.1))
+    start = contact.untouched()
+    state = contact.equilibrium(start, start.separation - 1e-6)
+    assert (state.pending, len(state.spots)) == (1, 0)
+    assert (state.jump_ins, state.jump_offs, state.history) == (0, 0, ())
 
 
 # --- united spots -------------------------------------------------------------------------------------------

@@ -39,10 +39,14 @@ def let_go(search: Search, separation: float, count: int) -> Search:
 
 def _broken(search, off):
     """Without the contact of spots (n,). Asperities of united ones fall back, if they have not done so here before;
-    the others may not come back at this separation."""
-    sites, law, spots = search.sites, search.problem.law, np.flatnonzero(off)
+    the others may not come back at this separation. Who has jumped in on the way here has not: there is no such
+    equilibrium."""
+    sites, law = search.sites, search.problem.law
+    came = np.isin(sites.asperity, search.jumped_in) & off
+    spots = np.flatnonzero(off & ~came)
     R = sites.radius_of_curvature[spots]
     energy = law.energy(law.jump_off_radius(R), R)
+    search = search.forgetting_jumps_in(sites.asperity[came])
     search = search.noting(JUMP_OFF, sites.position[spots], sites.members[spots], energy)
     # A holder -1 looks up the last.
     freed, united = np.append(off, False)[search.holder], np.append(off & (sites.asperity < 0), False)
