@@ -32,6 +32,7 @@ from icha.report.explorer_data import (
 from icha.report.template import template
 from icha.support.atomic_files import whole_file
 from icha.support.in_words import counted
+from icha.support.printable import printable_lines
 
 # What one chooses a contact by, in this order.
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
@@ -175,12 +176,21 @@ def _library() -> str:
     return get_plotlyjs()
 
 
+def _printable(data):
+    """The same data; their texts are fit for a page."""
+    if isinstance(data, dict):
+        return {name: _printable(value) for name, value in data.items()}
+    if isinstance(data, list):
+        return [_printable(value) for value in data]
+    return printable_lines(data) if isinstance(data, str) else data
+
+
 def _filled(campaign, data, *, library, largest, left_out=0, without_steps=0) -> str:
     """The page as text."""
     return template("explorer.html").render(
         title=campaign.attrs.get("title", "Rough contact campaign"),
         campaign=campaign.attrs.get("campaign", ""),
-        data=data,
+        data=_printable(data),
         library=library,
         colour=f"rgb{CONTACT_COLOUR}",
         choices=CHOICES,

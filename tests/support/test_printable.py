@@ -2,6 +2,7 @@
 
 import sys
 import unicodedata
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -11,6 +12,7 @@ from icha.cli import app
 from icha.cli.events import Job, last_line, reason_of
 from icha.cli.project import Mistake, told
 from icha.cli.terminal import markup, say
+from icha.report.explorer import _filled
 from icha.report.template import template
 from icha.support.printable import is_printable, printable, printable_lines
 
@@ -76,3 +78,9 @@ def test_pages_hold_no_overrides_and_no_control_characters():
     text = page.render(title=EVIL + "<b>", n=3, safe="<i>\u200d</i>")
     assert not set("\x1b\x9b\r\b\u202e\u2028") & set(text)
     assert text.count(r"\u202e") == 2 and "<b>" not in text and text.endswith("3 <i>\u200d</i>")
+
+
+def test_what_the_page_of_paths_is_told_is_printable():
+    campaign = SimpleNamespace(attrs={"title": EVIL, "campaign": EVIL})
+    page = _filled(campaign, {"contacts": [{"study": EVIL, "steps": [1.0, 2]}]}, library="", largest=1)
+    assert not set("\x1b\x9b\b\u202e\u2028") & set(page) and page.count(r"\\u202e") == 1 and "[1.0, 2]" in page
