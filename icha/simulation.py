@@ -24,7 +24,7 @@ from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
 from icha.models.model import Model
 from icha.path.follow import follow
 from icha.path.hysteresis import hysteresis
-from icha.path.limits import MAX_REDUCED_PRESSURE
+from icha.path.limits import LEAST_PRESSURE, MAX_REDUCED_PRESSURE
 from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
 from icha.path.waypoints import Waypoint
 from icha.support.rules import Integer
@@ -156,11 +156,15 @@ def _check_arguments(surface, material, path):
         if not isinstance(value, kind):
             raise ValueError(f"{name}: a {type(value).__name__} is not an icha.{kind.__name__}")
     for target in (*path.targets, *path.turning_points):
-        if target.kind == RELATIVE_LOAD and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
-            raise ValueError(
-                f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} lies "
-                f"beyond what the model covers (a reduced pressure of at most {MAX_REDUCED_PRESSURE})"
-            )
+        if target.kind == RELATIVE_LOAD:
+            asked = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
+            if target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
+                beyond = f"lies beyond what the model covers (a reduced pressure of at most {MAX_REDUCED_PRESSURE})"
+                raise ValueError(f"{asked} {beyond}")
+            if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
+                raise ValueError(
+                    f"{asked} is next to no load; allowed: a reduced pressure of at least {LEAST_PRESSURE}"
+                )
         if target.snapshot and target.kind == MEAN_SEPARATION and target.value > _HIGHEST_SNAPSHOT * surface.rms_height:
             raise ValueError(
                 f"path: a snapshot at a mean separation of {target.value!r} m lies more than {_HIGHEST_SNAPSHOT:g} rms "

@@ -5,10 +5,11 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.analysis.checks import check_run
 
 PERIOD = 100e-6
 REASONS = (
@@ -96,6 +97,58 @@ def test_every_sweep_ends_converged_or_marked(case):
                 kind, target = str(run.step_kind[step].item()), float(run.step_target[step])
                 assert float(reached[kind][step]) == pytest.approx(target, rel=1e-9)
     assert_sound(run)
+
+
+@st.composite
+def loops(draw):
+    """There and back without adhesion on very small squares, periodic or free."""
+    grid = draw(st.sampled_from([8, 10, 12, 16]))
+    waves = draw(st.floats(1.2, grid / 4))
+    spectrum = SelfAffineSpectrum(
+        PERIOD, PERIOD, PERIOD / waves, draw(st.floats(0.1, 1.0)), 10 ** draw(st.floats(-2, 0))
+    )
+    heights = spectrum.realise(grid, draw(st.integers(0, 10**6)), draw(st.sampled_from(["fixed", "gaussian"]))).heights
+    surface = Surface(heights, PERIOD, draw(st.sampled_from(["periodic", "free"])))
+    kind = draw(st.sampled_from(["reduced_pressures", "area_fractions", "mean_separations"]))
+    if kind == "mean_separations":
+        stops = [surface.rms_height * draw(st.floats(2.5, 5)), surface.rms_height * draw(st.floats(0.5, 2.4))]
+    else:
+        stops = [10 ** draw(st.floats(-4, -1))]
+    return surface, Path(**{kind: stops}, unload=True, max_step=draw(st.sampled_from([0.05, 0.15, 0.5])))
+
+
+def assert_loop_is_sound(case):
+    surface, path = case
+    try:
+        run = simulate(surface, Material(1e6, 0.0, 1e-9), path)
+    except ValueError as error:
+        assert "summits" in str(error)
+    except ConvergenceError as error:
+        assert any(reason in str(error) for reason in REASONS), str(error)
+    else:
+        assert not [check for check in check_run(run) if not check.passed]
+
+
+@given(loops())
+def test_loops_without_adhesion_pass_their_checks(case):
+    assert_loop_is_sound(case)
+
+
+@pytest.mark.slow
+@settings(max_examples=1000)
+@given(loops())
+def test_a_thousand_loops_without_adhesion_pass_their_checks(case):
+    assert_loop_is_sound(case)
+
+
+def test_a_cycle_begins_at_its_highest_stop():
+    surface = SelfAffineSpectrum(PERIOD, PERIOD / 2, PERIOD / 5, 0.8, 0.2).realise(32, 1)
+    stops = [surface.rms_height * height for height in (4.5, 4.0, 2.0)]
+    for energy in (0.0, 2e-3):
+        run = simulate(surface, Material(0.24e6, energy, 2e-9), Path(mean_separations=stops, unload=True))
+        assert [float(u) for u in run.mean_separation[:2]] == stops[:2]
+        assert np.all(np.diff(run.mean_separation[run.leg == 0]) < 0)
+        assert not [check for check in check_run(run) if not check.passed]
 
 
 @pytest.mark.parametrize("strength", [1.0, 3.0, 10.0])

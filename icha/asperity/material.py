@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.support.rules import CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
+from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
 
 # From this Tabor parameter on Wu's distance of the jump into contact is within 0.5 % of the exact one, which
 # icha.references.jump_in computes.
@@ -17,9 +17,10 @@ class Material:
 
     Parameters
     ----------
-    contact_modulus : E*, composite elastic modulus, Pa; positive.
-    surface_energy : energy of adhesion per unit area, J/m^2; zero is adhesionless contact.
-    interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m; positive.
+    contact_modulus : E*, composite elastic modulus, Pa, in [1e-9, 1e15].
+    surface_energy : energy of adhesion per unit area, J/m^2; zero, which is adhesionless contact, or in (0, 1e24] and,
+        over the modulus, in [1e-30, 1e9] m.
+    interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-15, 1e9].
 
     Raises
     ------
@@ -36,6 +37,8 @@ class Material:
         object.__setattr__(self, "contact_modulus", CONTACT_MODULUS.checked("contact_modulus", self.contact_modulus))
         object.__setattr__(self, "surface_energy", SURFACE_ENERGY.checked("surface_energy", self.surface_energy))
         object.__setattr__(self, "interaction_range", LENGTH.checked("interaction_range", self.interaction_range))
+        if self.surface_energy:
+            ADHESION_LENGTH.checked("surface_energy over contact_modulus", self.adhesion_length)
 
     @property
     def adhesion_length(self) -> float:

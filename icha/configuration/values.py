@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
+from icha.support.rules import SLOPE
 from icha.support.units import to_number
 from icha.support.values import distinct
 
@@ -17,13 +18,13 @@ def _slope(value: Any) -> float | str:
     except ValueError as error:
         if value == MEASURED:
             return value
-        raise ValueError(f"{error}; allowed: numbers greater than 0, or {MEASURED}") from None
-    if slope <= 0:
-        raise ValueError(f"is out of range; allowed: a number greater than 0, or {MEASURED}")
+        raise ValueError(f"{error}; allowed: {SLOPE.allowed}, or {MEASURED}") from None
+    if not SLOPE.holds(slope):
+        raise ValueError(f"is out of range; allowed: {SLOPE.allowed}, or {MEASURED}")
     return slope
 
 
-_ONE_SLOPE = {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": MEASURED}]}
+_ONE_SLOPE = {"anyOf": [{"type": "number", "minimum": SLOPE.least, "maximum": SLOPE.most}, {"const": MEASURED}]}
 Slope = Annotated[Any, BeforeValidator(_slope), WithJsonSchema(_ONE_SLOPE)]
 Slopes = Annotated[
     list[Slope],

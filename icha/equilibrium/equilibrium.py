@@ -35,6 +35,8 @@ _EVENT_MARGIN = 10.0
 # needed, the step of the path is too long.
 _MAX_NEWTON_STEPS = 60
 _MAX_EXACT_STEPS = 4
+# Rounds of jumps and unions in all: they end, but may be many where many summits are alike.
+_MAX_ROUNDS = 1000
 # Contact area fraction at which the spots have lost all meaning.
 _FULL_CONTACT = 0.5
 
@@ -57,7 +59,7 @@ def equilibrium(
     if spots_let_go:
         search = let_go(search, separation, spots_let_go)
     point = Equations(problem, search.sites, control).at(search.sites.approach, separation)
-    steps, exact_steps, quiet = 0, 0, False
+    steps, exact_steps, rounds, quiet = 0, 0, 0, False
     while True:
         search, point = _without_swallowed(search, point, control)
         equations = Equations(problem, search.sites, control)
@@ -86,7 +88,9 @@ def equilibrium(
             search = _united_for_descent(search, point, margin, size)
         equations = Equations(problem, search.sites, control)
         search, point = settled(search, equations.at(search.sites.approach, point.separation, point.interaction))
-        steps, quiet = 0, False
+        steps, quiet, rounds = 0, False, rounds + 1
+        if rounds > _MAX_ROUNDS:
+            raise NotConverged(f"no equilibrium after {rounds} rounds of jumps and unions")
 
 
 def happen(search: Search, point: Point, margin: float) -> tuple[Search, bool]:

@@ -5,29 +5,49 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel, State
 from icha.path.bracketing import InsideJump
-from icha.path.stops import Stop
+from icha.path.stops import Queue, Stop
 from icha.path.targets import Target
 
 # A step that does not converge is halved down to this fraction of the longest one.
 _SMALLEST_STEP = 2.0**-14
+# So many equilibria within a longest step, without a stop, and a path does not get on.
+_MOST_EQUILIBRIA = 2000
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Stops met so far, of how many; those that were missed, as they lie inside jumps."""
+    """Stops met so far, of how many; those that were missed, as they lie inside jumps.
+
+    longest: step of the separation, m. idle: equilibria since the last stop or since the separation `mark`, m, from
+    which the path has not come a longest step yet.
+    """
 
     contact: ContactModel
     total: int
+    longest: float
     progress: Callable[[str], None] | None = None
     reached: int = 0
     missed: tuple[InsideJump, ...] = ()
+    mark: float = np.inf
+    idle: int = 0
+
+    def after(self, state: State, loading: bool) -> Course:
+        """After one more equilibrium; refuses to go on where the path does not get on."""
+        if abs(state.separation - self.mark) >= self.longest:
+            return replace(self, mark=state.separation, idle=0)
+        if self.idle == _MOST_EQUILIBRIA:
+            within = f"{self.longest / self.contact.rms_height:.3g} h_rms"
+            raise self.ended(state, loading, NotConverged(f"no progress: {self.idle} equilibria within {within}"))
+        return replace(self, idle=self.idle + 1)
 
     def met(self, target: Target, state: State) -> Course:
         """After one more stop."""
-        after = replace(self, reached=self.reached + 1)
+        after = replace(self, reached=self.reached + 1, idle=0)
         after.tell(f"stop {after.reached} of {self.total}: {target.named(6)}", state)
         return after
 
@@ -44,12 +64,10 @@ class Course:
                 f"A/A0 {contact.area_fraction(state):.4e}, {contact.spot_count(state)} spots"
             )
 
-    def require_covered(
-        self, before: State, after: State, stop: Stop | None, waiting: list[Stop], loading: bool
-    ) -> None:
+    def require_covered(self, before: State, after: State, stop: Stop | None, waiting: Queue, loading: bool) -> None:
         """Refuse a state that the model does not cover, at a stop or before stops that are still to come."""
         contact = self.contact
-        what = (stop or waiting[0]).target.named() if stop or waiting else "separation"
+        what = (stop or waiting.foremost[0]).target.named() if stop or waiting else "separation"
         area = contact.area_fraction(after)
         if area > contact.largest_area_fraction:
             reason = f"the contact area runs to {area:.2f} of the nominal one, beyond what the model covers,"

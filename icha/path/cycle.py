@@ -16,9 +16,12 @@ from icha.path.bracketing import SAME_SEPARATION, InsideJump, first_passed
 from icha.path.course import Course, halved
 from icha.path.energy_balance import Step
 from icha.path.resolution import SHARP, Account, Stride, resolved
-from icha.path.stops import SAME_EXCESS, Stop
-from icha.path.targets import LOADS, Path, Target
+from icha.path.stops import SAME_EXCESS, Queue, Stop
+from icha.path.targets import LOADS, MEAN_SEPARATION, Path, Target
 from icha.path.waypoints import Waypoint, between_stops
+
+# So far above first contact a way back without adhesion ends, in h_rms: beyond the error of an equilibrium.
+_ABOVE_CONTACT = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +55,18 @@ def cycle(
     NotConverged
         As `icha.path.follow.follow`.
     """
-    start = contact.untouched()
-    here = Position(start, Stride(SHARP * contact.rms_height if contact.adhesive else longest), course)
+    start, stops = contact.untouched(), [stop_at(target) for target in path.targets]
+    for stop in _above(start, stops):  # nothing touches up there
+        state = contact.equilibrium(start, stop.target.value)
+        stops.remove(stop)
+        course = course.met(stop.target, state)
+        yield Waypoint(stop.target, state, 0)
+    # Without adhesion nothing touches as high up as contact was made first, but for the error of an equilibrium.
+    top = () if contact.adhesive else (start.separation + _ABOVE_CONTACT * contact.rms_height,)
+    stride = Stride(SHARP * contact.rms_height if contact.adhesive else longest)
+    here = Position(start, stride, course, stations=top)
     yield between_stops(start, 0)
-    here = yield from _Leg(contact, 0, longest).follow(here, [stop_at(target) for target in path.targets])
+    here = yield from _Leg(contact, 0, longest).follow(here, stops)
     if here.course.missed:
         raise here.course.ended(here.state, True)
     for leg, turn in enumerate(path.turning_points, start=1):
@@ -71,6 +82,12 @@ def cycle(
         passed = [stop for stop in stops if stop.excess(here.state) > SAME_EXCESS]
         here = yield from _Leg(contact, leg, longest).follow(here, passed, apart=True)
         here.course.tell("apart", here.state)
+
+
+def _above(start, stops):
+    """Those of the stops that are mean separations above first contact, from the highest down."""
+    above = [s for s in stops if s.target.kind == MEAN_SEPARATION and s.target.value > start.separation]
+    return sorted(above, key=lambda stop: -stop.target.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,16 +111,17 @@ class _Leg:
         self, here: Position, stops: list[Stop], apart: bool = False
     ) -> Generator[Waypoint, Stop | None, Position]:
         """The equilibria until all stops are met or, `apart`, nothing touches any more; returns where that is."""
-        waiting, sent, visited = list(stops), None, [here.state.separation]
+        waiting, sent, visited = Queue(stops, self.direction), None, [here.state.separation]
         here = replace(here, stride=Stride(here.stride.length))
         while waiting or apart:
             if not self.loading and self._is_apart(here.state):
                 if apart:
                     return here
-                raise self._ended(here, NotConverged(_never_so_far(waiting[0], here.account)))
+                raise self._ended(here, NotConverged(_never_so_far(waiting.foremost[0], here.account)))
             beyond, step, here = self._one_step(here)
             try:
-                stop, met = first_passed([*waiting, *([sent] if sent else [])], here.state, beyond, self.direction)
+                ahead = [*waiting.foremost, sent] if sent else waiting.foremost
+                stop, met = first_passed(ahead, here.state, beyond, self.direction)
             except InsideJump as jump:
                 if jump.stop is sent:
                     sent = None
@@ -154,8 +172,8 @@ class _Leg:
     def _arrived(self, here, state, step, first):
         """Where the path is after a step, and how far it may go next; after the very `first`, as far as ever."""
         length = self.longest if first else min(self.longest, 2 * here.stride.length)
-        account = here.account.after(self.contact, step, state)
-        return replace(here, state=state, stride=replace(here.stride, length=length), account=account)
+        account, course = here.account.after(self.contact, step, state), here.course.after(state, self.loading)
+        return replace(here, state=state, stride=replace(here.stride, length=length), account=account, course=course)
 
     def _is_apart(self, state):
         """Whether nothing touches, as high up as where contact was about to be made first."""

@@ -43,7 +43,7 @@ def follow(
         return Stop(target, contact, scale.get(target.kind, 1.0))
 
     longest = path.max_step * contact.rms_height
-    course = Course(contact, len(path.targets), progress)
+    course = Course(contact, len(path.targets), longest, progress)
     if not path.cyclic:
         return first_loading(contact, [stop_at(target) for target in path.targets], longest, course)
     waypoints = cycle(contact, path, stop_at, longest, course)

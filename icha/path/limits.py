@@ -6,6 +6,8 @@ from icha.support.rules import LENGTH, POSITIVE, Real
 # adhesion meet.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
+# Loads and areas below, but for no load at all, are met as well as equilibria are found no more.
+LEAST_PRESSURE = LEAST_AREA = 1e-9
 # Shortest and longest step of the mean separation, in h_rms, that may be asked for, and the one taken if none is. With
 # the shortest a path has some ten thousand equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
@@ -13,9 +15,9 @@ DEFAULT_STEP = 0.15
 
 # By the kind of quantity.
 STATES = {
-    "reduced_pressure": Real(above=0, most=MAX_REDUCED_PRESSURE, model_ends=True),
+    "reduced_pressure": Real(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True),
     "relative_load": POSITIVE,
-    "area_fraction": Real(above=0, most=MAX_AREA_FRACTION, model_ends=True),
+    "area_fraction": Real(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True),
     "mean_separation": LENGTH,
 }
 STEP = Real("h_rms", least=MIN_STEP, most=MAX_STEP)

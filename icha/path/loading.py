@@ -6,7 +6,7 @@ from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel, State
 from icha.path.bracketing import SAME_SEPARATION, InsideJump, first_passed
 from icha.path.course import Course, halved
-from icha.path.stops import SAME_EXCESS, Stop
+from icha.path.stops import SAME_EXCESS, Queue, Stop
 from icha.path.waypoints import Waypoint
 
 # How often a stop is gone to straight; and how much of a way that was too long is gone first, so that less is left, if
@@ -25,15 +25,15 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
         As `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
-    waiting, step, missed, found = list(stops), longest, 0, 0
+    waiting, step, missed, found = Queue(stops, -1), longest, 0, 0
     while waiting:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
             state = first_contact  # nothing happens on the way there
-        nearest, expected = _nearest(waiting, state)
+        nearest, expected = _nearest(waiting.foremost, state)
         way = state.separation - expected
         try:
             if way <= step and missed < _TRIALS:
-                stop, beyond = nearest, _straight(nearest, expected, waiting, state, step)
+                stop, beyond = nearest, _straight(nearest, expected, waiting.foremost, state, step)
                 if beyond is None:
                     # A shorter way helps; if it does not, the stop is looked for between two states.
                     missed = missed + 1 if way > _LONG * longest else _TRIALS
@@ -42,7 +42,7 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
                     continue
             else:
                 beyond = contact.equilibrium(state, state.separation - step)
-                stop, beyond = first_passed(waiting, state, beyond, -1)
+                stop, beyond = first_passed(waiting.foremost, state, beyond, -1)
         except InsideJump as jump:
             waiting.remove(jump.stop)
             course, state, missed = course.without(jump), jump.before, 0
@@ -56,7 +56,7 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
         found += 1
         step = min(longest, 2 * step) if found >= _PATIENCE else step
         course.require_covered(state, beyond, stop, waiting, True)
-        state = beyond
+        state, course = beyond, course.after(beyond, True)
         if stop is None:
             continue
         waiting.remove(stop)

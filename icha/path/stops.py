@@ -1,5 +1,6 @@
 """A target as a function of the state of the contact, and the equilibrium that meets it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,3 +53,30 @@ class Stop:
     def meet(self, state: State, separation: float) -> State:
         """The equilibrium at the target, from a state not far away; the separation is a first guess."""
         return self.contact.equilibrium(state, separation, self.control)
+
+
+class Queue:
+    """Stops that are still to be met, of each kind in the order in which they are; empty is false."""
+
+    def __init__(self, stops: Iterable[Stop], direction: int):
+        """Sort them for a direction of the separation: -1 on loading, 1 on unloading."""
+        self._by_kind: dict[str, list[Stop]] = {}
+        for stop in sorted(stops, key=lambda stop: stop.target.value):
+            self._by_kind.setdefault(stop.target.kind, []).append(stop)
+        for kind, waiting in self._by_kind.items():
+            # The next one is the last.
+            if (kind == MEAN_SEPARATION) != (direction < 0):
+                waiting.reverse()
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return any(self._by_kind.values())
+
+    @property
+    def foremost(self) -> list[Stop]:
+        """The next of every kind."""
+        return [waiting[-1] for waiting in self._by_kind.values() if waiting]
+
+    def remove(self, stop: Stop) -> None:
+        """Without one of the foremost."""
+        self._by_kind[stop.target.kind].pop()

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from icha.contact.unions import OVERLAP, UNITED_UNTIL
-from icha.path.limits import DEFAULT_STEP, STATES, STEP
+from icha.path.limits import DEFAULT_STEP, LEAST_PRESSURE, STATES, STEP
 from icha.support.rules import NUMBER
 
 REDUCED_PRESSURE = "reduced_pressure"
@@ -49,9 +49,9 @@ class Path:
 
     Parameters
     ----------
-    reduced_pressures : p/(E* h'_rms), increasing, in (0, 0.15].
-    area_fractions : A/A0, increasing, in (0, 0.25].
-    mean_separations : u in m, decreasing, positive. Exactly one of these three lists is given.
+    reduced_pressures : p/(E* h'_rms), increasing, in [1e-9, 0.15].
+    area_fractions : A/A0, increasing, in [1e-9, 0.25].
+    mean_separations : u in m, decreasing, in [1e-15, 1e9]. Exactly one of these three lists is given.
     snapshots : pairs (kind, value), in any order, of states whose fields and spots are kept, with kind one of
         "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" and "mean_separation" (m). A snapshot is a stop
         of its own, unless the list holds the same kind and value; the dataset has them in the order in which they are
@@ -180,6 +180,8 @@ def _turns(turning_points, last):
     for k, (label, kind, value) in enumerate(_pairs("turning_points", turning_points)):
         tensile = kind in LOADS and k % 2 == 0
         value = (NUMBER if tensile else STATES[kind]).checked(label, value)
+        if tensile and 0 < abs(value) < LEAST_PRESSURE and kind == REDUCED_PRESSURE:
+            raise ValueError(f"{label}: {value!r} is next to no load; allowed: 0, or at least {LEAST_PRESSURE:g} of it")
         if kind == before.kind:
             opened = value > before.value if kind == MEAN_SEPARATION else value < before.value
             if value == before.value or opened != (k % 2 == 0):

@@ -59,7 +59,7 @@ class Real:
             return value
         if self.model_ends and value > self.most:
             raise ValueError(f"{name}: {value!r} lies beyond what the model covers (at most {self.most})")
-        if self.most is not None and not self.model_ends:
+        if self.most is not None:
             raise ValueError(f"{name}: {value!r} must lie in {self.interval}{'' if self.unit == '1' else unit}")
         raise ValueError(
             f"{name}: {value!r} must {'be greater than 0' if self.least is None else 'not be negative'}{unit}"
@@ -67,8 +67,9 @@ class Real:
 
 
 def _short(bound: float) -> str:
-    """A bound as people write it: `0`, `0.15`, `1e-4`."""
-    return f"{bound:.0e}".replace("e-0", "e-") if 0 < bound < 1e-3 else f"{bound:g}"
+    """A bound as people write it: `0`, `0.15`, `1e-4`, `1e9`."""
+    text = f"{bound:.0e}" if 0 < bound < 1e-3 else f"{bound:g}"
+    return text.replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
 
 
 @dataclass(frozen=True)
@@ -94,16 +95,20 @@ class Integer:
 
 NUMBER = Real()
 POSITIVE = Real(above=0)
-LENGTH = Real("m", above=0)
+# Ranges far wider than anything physical, in which no product of powers overflows or vanishes.
+LENGTH = Real("m", least=1e-15, most=1e9)
 
 # Surfaces.
 HURST = Real(above=0, most=1)
+SLOPE = Real(least=1e-9, most=1e6)
 GRID = Integer(8, 32768)
 SEED = Integer(0)
 
 # Materials.
-CONTACT_MODULUS = Real("Pa", above=0)
-SURFACE_ENERGY = Real("J/m^2", least=0)
+CONTACT_MODULUS = Real("Pa", least=1e-9, most=1e15)
+SURFACE_ENERGY = Real("J/m^2", least=0, most=1e24)
+# Surface energy over contact modulus, where there is adhesion.
+ADHESION_LENGTH = Real("m", least=1e-30, most=1e9)
 
 # Boundary elements.
 TOLERANCE = Real(least=1e-12, most=1e-4)

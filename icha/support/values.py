@@ -23,7 +23,8 @@ ROUNDING = 1e-9
 def quantity(rule: Real, example: str):
     """Type of a value that is written with its unit and kept as a float in that of `rule`."""
     allowed = f"{PHYSICAL_NAMES[rule.unit]} with its unit"
-    allowed += f", {'greater than 0' if rule.least is None else '0 or greater'}, such as {example!r}"
+    bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
+    allowed += f", {bounds}, such as {example!r}"
 
     def read(value: Any) -> float:
         try:
@@ -31,7 +32,7 @@ def quantity(rule: Real, example: str):
         except ValueError as error:
             raise ValueError(f"{error}; allowed: {allowed}") from None
         if not rule.holds(result):
-            raise ValueError(f"is too small; allowed: {allowed}")
+            raise ValueError(f"is out of range; allowed: {allowed}")
         return result
 
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}

@@ -10,6 +10,6 @@ def flaw_of_heights(heights: np.ndarray) -> str | None:
     bad = int(np.count_nonzero(~np.isfinite(heights)))
     if bad:
         return f"{bad} of {heights.size} heights that are not finite"
-    if np.ptp(heights) == 0:
+    if heights.max() == heights.min():
         return "heights that are all the same"
     return None

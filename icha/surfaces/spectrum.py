@@ -14,7 +14,7 @@ import numpy as np
 import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
-from icha.support.rules import GRID, HURST, LENGTH, POSITIVE, SEED
+from icha.support.rules import GRID, HURST, LENGTH, SEED, SLOPE
 from icha.surfaces.surface import Surface
 
 # Wave numbers are compared in units of 2 pi / L; this keeps |k| = 64 out of a band that ends at L/lambda_s = 64
@@ -33,11 +33,11 @@ class SelfAffineSpectrum:
 
     Parameters
     ----------
-    period : L, side of the periodic cell, m.
+    period : L, side of the periodic cell, m; lengths are in [1e-15, 1e9] m.
     rolloff_wavelength : 2 pi / q_0, m; at most the period.
     short_wavelength : 2 pi / q_1, the short cut-off, m; less than the roll-off wavelength.
     hurst : H, in (0, 1].
-    rms_slope : h'_rms; the sum of q^2 |h_q|^2 over the lattice of the cell equals its square exactly.
+    rms_slope : h'_rms, in [1e-9, 1e6]; the sum of q^2 |h_q|^2 over the lattice of the cell equals its square exactly.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class SelfAffineSpectrum:
         """Check the values."""
         for name in ("period", "rolloff_wavelength", "short_wavelength"):
             object.__setattr__(self, name, LENGTH.checked(name, getattr(self, name)))
-        object.__setattr__(self, "rms_slope", POSITIVE.checked("rms_slope", self.rms_slope))
+        object.__setattr__(self, "rms_slope", SLOPE.checked("rms_slope", self.rms_slope))
         object.__setattr__(self, "hurst", HURST.checked("hurst", self.hurst))
         if self.rolloff_wavelength > self.period * (1 + _ROUNDING):
             raise ValueError(

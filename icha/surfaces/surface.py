@@ -13,13 +13,15 @@ import numpy as np
 import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
-from icha.support.rules import LENGTH, POSITIVE, Integer
+from icha.support.rules import LENGTH, SLOPE, Integer, Real
 from icha.surfaces.heights import flaw_of_heights
 
 # What lies beyond the square: the same square again and again, or nothing but the half-space.
 PERIODIC, FREE = "periodic", "free"
 BOUNDARIES = (PERIODIC, FREE)
 
+# Heights from the lowest to the highest, over the period.
+_STEEPNESS = Real(least=1e-12, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
 
@@ -31,14 +33,14 @@ class Surface:
     Parameters
     ----------
     heights : (n, n) array, metres. Its mean is removed; the array is copied and made read-only.
-    period : side of the square in metres; of a periodic surface its period.
+    period : side of the square in metres, in [1e-15, 1e9]; of a periodic surface its period.
     boundary : "periodic" in both directions, or "free": one square on a half-space that goes on beyond it.
 
     Raises
     ------
     ValueError
-        If the heights are not a square array of at least 8 x 8 finite numbers, or all the same, or the period
-        is not a positive number, or the boundary is neither of the two.
+        If the heights are not a square array of at least 8 x 8 finite numbers, or all the same, or their range over
+        the period is not in [1e-12, 1e9], or the period is out of range, or the boundary is neither of the two.
     """
 
     heights: np.ndarray
@@ -58,10 +60,12 @@ class Surface:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
         if flaw := flaw_of_heights(heights):
             raise ValueError(f"heights: {flaw}")
+        object.__setattr__(self, "period", LENGTH.checked("period", self.period))
+        with np.errstate(over="ignore"):
+            _STEEPNESS.checked("heights: their range over the period", np.ptp(heights) / self.period)
         heights -= heights.mean()
         heights.flags.writeable = False
         object.__setattr__(self, "heights", heights)
-        object.__setattr__(self, "period", LENGTH.checked("period", self.period))
         if self.boundary not in BOUNDARIES:
             raise ValueError(f"boundary: {self.boundary!r} must be one of {', '.join(BOUNDARIES)}")
 
@@ -150,7 +154,7 @@ class Surface:
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """The same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
-        rms_slope = POSITIVE.checked("rms_slope", rms_slope)
+        rms_slope = SLOPE.checked("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
         # Known already; `cached_property` keeps its values there.

@@ -45,7 +45,7 @@ def test_a_crop_is_called_by_its_lengths():
         ({"size": "90"}, ["the unit is missing", "allowed"]),
         ({"size": ["90 um"] * 3}, ["3 entries", "allowed"]),
         ({"size": "-1 um"}, ["greater than 0"]),
-        ({"crop": {"x": "0 um", "y": "0 um", "side": "0 um"}}, ["too small"]),
+        ({"crop": {"x": "0 um", "y": "0 um", "side": "0 um"}}, ["out of range"]),
         ({"boundary": "periodic", "detrend": "tilt"}, ["detrend", "periodicity", "allowed"]),
         ({"boundary": "periodic", "crop": {"x": "0 um", "y": "0 um", "side": "9 um"}}, ["crop", "not periodic"]),
         ({"taper": 0.2}, ["taper", "window", "allowed"]),

@@ -41,9 +41,13 @@ BAD = {
         "in decreasing order",
     ),
     "separation without unit": ("studies.one.targets", {"mean_separations": [1e-6]}, "the unit is missing"),
-    "negative separation": ("studies.one.targets", {"mean_separations": ["-1 um"]}, "greater than 0"),
-    "pressure beyond the model": ("studies.one.targets.reduced_pressures", [0.3], "(0, 0.15], which the model covers"),
-    "area beyond the model": ("studies.one.targets", {"area_fractions": [0.5]}, "(0, 0.25], which the model covers"),
+    "negative separation": ("studies.one.targets", {"mean_separations": ["-1 um"]}, "in [1e-15, 1e9] m"),
+    "pressure beyond the model": (
+        "studies.one.targets.reduced_pressures",
+        [0.3],
+        "[1e-9, 0.15], which the model covers",
+    ),
+    "area beyond the model": ("studies.one.targets", {"area_fractions": [0.5]}, "[1e-9, 0.25], which the model covers"),
     "zero target": ("studies.one.targets.reduced_pressures", [0, 0.1], "is out of range"),
     "unknown snapshot": ("studies.one.snapshots", [{"area": 0.1}], "studies.one.snapshots[0].area: unknown key"),
     "snapshot of two kinds": (

@@ -280,7 +280,7 @@ def test_a_failed_check_stops_the_campaign_and_is_named(smoke, tmp_path, monkeyp
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("25 MPa", "-25 MPa", "materials.cmc.contact_modulus: '-25 MPa' is too small"),
+        ("25 MPa", "-25 MPa", "materials.cmc.contact_modulus: '-25 MPa' is out of range"),
         ("25 MPa", "25 mPa", "materials.cmc.contact_modulus: '25 mPa' is unusual; usual: 1 kPa to 2000 GPa"),
         ("25 MPa", "25", "the unit is missing"),
         ("hurst: 0.8", "hurst: 0.8\n    hurst: 0.9", "key 'hurst' is given twice"),

@@ -1,0 +1,87 @@
+"""Numbers far from anything physical are refused by name; what is allowed ends, finite, or says why it does not."""
+
+import numpy as np
+import pytest
+from few_asperities import HEIGHT, contact_of
+
+from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.analysis.checks import check_run
+from icha.contact.failures import NotConverged
+from icha.path import course
+from icha.path.course import Course
+from icha.path.follow import follow
+from icha.path.stops import Stop
+
+WAVES = np.add.outer(*[np.cos(np.linspace(0, 2 * np.pi, 16, endpoint=False))] * 2)
+
+
+@pytest.mark.parametrize(
+    ("make", "named"),
+    [
+        (lambda: Path([1e-80]), r"^reduced_pressures\[0\]: 1e-80 must lie in \[1e-9, 0.15\]"),
+        (lambda: Path(area_fractions=[5e-324]), r"^area_fractions\[0\]: 5e-324 must lie in \[1e-9, 0.25\]"),
+        (lambda: Path(mean_separations=[1e100]), r"^mean_separations\[0\]: 1e\+100 must lie in \[1e-15, 1e9\]"),
+        (lambda: Path([1e-2], max_step=5e-324), r"^max_step: 5e-324 must lie in \[1e-4, 0.5\]"),
+        (lambda: Path([1e-2], turning_points=[("reduced_pressure", -1e-80)]), r"^turning_points\[0\]: -1e-80"),
+        (lambda: Surface(1e-6 * WAVES, 1e100), r"^period: 1e\+100 must lie in \[1e-15, 1e9\]"),
+        (lambda: Surface(1e100 * WAVES, 1e-4), r"^heights: their range over the period: .*\[1e-12, 1e9\]"),
+        (lambda: Surface(1e-100 * WAVES, 1e-4), r"^heights: their range over the period: .*\[1e-12, 1e9\]"),
+        (lambda: Surface(8e307 * WAVES, 1e-4), r"^heights: their range over the period: "),
+        (lambda: SelfAffineSpectrum(1e-4, 2e-5, 1e-5, 0.8, rms_slope=1e-100), r"^rms_slope: 1e-100 must lie in"),
+        (lambda: Material(1e100, 0.0, 1e-9), r"^contact_modulus: 1e\+100 must lie in \[1e-9, 1e15\]"),
+        (lambda: Material(1e6, 1e-300, 1e-9), r"^surface_energy over contact_modulus: 1e-306 must lie in"),
+        (lambda: Material(1e6, 0.1, 1e-100), r"^interaction_range: 1e-100 must lie in"),
+    ],
+)
+def test_numbers_out_of_range_are_refused_by_name_and_range(make, named):
+    with np.errstate(all="raise"), pytest.raises(ValueError, match=named):
+        make()
+
+
+def test_next_to_no_load_is_refused_in_units_of_the_slope():
+    surface = Surface(1e-6 * WAVES, 1e-4)
+    path = Path([1e-3], snapshots=[("relative_load", 1e-80)])
+    with pytest.raises(
+        ValueError, match=r"^path: relative_load = 1e-80 .* allowed: a reduced pressure of at least 1e-09"
+    ):
+        simulate(surface, Material(1e6, 0.0, 1e-9), path)
+
+
+@pytest.mark.parametrize("strength", [0.0, 1e-2])
+@pytest.mark.parametrize("modulus", [1e-6, 1e12])
+@pytest.mark.parametrize(("height", "period"), [(1e-14, 1e-12), (1e-6, 1e-12), (1.0, 1e8), (1e8, 1e8)])
+def test_at_the_ends_of_the_ranges_runs_are_finite_and_pass_their_checks(height, period, modulus, strength):
+    surface = Surface(height * WAVES, period)
+    energy = strength * modulus * surface.rms_height**1.5 * surface.rms_curvature**0.5
+    with np.errstate(over="raise", invalid="raise", divide="raise"):
+        for path in (Path([1e-9, 1e-2], unload=True), Path(area_fractions=[1e-9, 1e-2])):
+            try:
+                run = simulate(surface, Material(modulus, energy, 1e-2 * max(height, 1e-13)), path)
+            except ConvergenceError as error:
+                run = error.dataset
+            assert [check.name for check in check_run(run) if not check.passed] in ([], ["steps"])
+
+
+def test_a_path_that_does_not_get_on_ends_and_says_so(monkeypatch):
+    monkeypatch.setattr(course, "_MOST_EQUILIBRIA", 10)
+    contact = contact_of([HEIGHT])
+    state, here = contact.untouched(), Course(contact, 1, longest=1.0)
+    for _ in range(11):
+        here = here.after(state, loading=True)
+    with pytest.raises(NotConverged, match=r"no progress: 10 equilibria within 0\.1 h_rms"):
+        here.after(state, loading=True)
+    # A stop is progress, and so is a longest step.
+    assert here.met(Path([1e-2]).targets[0], state).after(state, True).idle == 1
+
+
+@pytest.mark.parametrize("unload", [False, True])
+def test_the_work_for_each_of_many_stops_does_not_grow_with_their_number(monkeypatch, unload):
+    contact, calls = contact_of([HEIGHT]), []
+    excess = Stop.excess
+    monkeypatch.setattr(Stop, "excess", lambda stop, state: calls.append(stop) or excess(stop, state))
+    per_stop = []
+    for count in (20, 100):
+        calls.clear()
+        list(follow(contact, Path(np.linspace(1e-3, 1e-2, count), unload=unload), 1e3 / contact.area))
+        per_stop.append(len(calls) / count)
+    assert per_stop[1] <= per_stop[0]
