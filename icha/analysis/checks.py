@@ -35,6 +35,8 @@ LOAD_LIMIT = 1e-3
 # Where spots unite, the same load or area may need the surfaces further apart by a little, in units of h_rms. Where
 # they jump in, by as much as the jump gives: that has no limit.
 SEPARATION_RISE_LIMIT = 1e-2
+# Of what a load is made up of, the part below which it counts as none when its error is measured.
+_SMALLEST_LOAD = 1e-4
 # To so much of h_rms equilibria are found, and to this part their stiffness.
 RESIDUAL_TOLERANCE = 1e-9
 STIFFNESS_TOLERANCE = 1e-6
@@ -219,7 +221,12 @@ def _miss(run):
         miss = np.where(of_area, np.maximum(miss - HELD_CELLS / float(run["grid"]) ** 2, 0.0), miss)
     # A path may turn back at no load, of which no part can be taken: then it is one of the run's largest load.
     whole = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
-    return np.max(miss / np.where(target != 0, np.abs(target), whole))
+    # With adhesion a load may be next to nothing beside the attraction and repulsion of which it is made up, which are
+    # about the stiffness times h_rms: it is met as well as they are.
+    gross = np.abs(run["contact_stiffness"]) * float(run["rms_height"]) * (float(run["surface_energy"]) > 0)
+    unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale}
+    least = np.array([_SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
+    return np.max(miss / np.where(target != 0, np.maximum(np.abs(target), least), whole))
 
 
 def _identities(run):

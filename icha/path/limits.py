@@ -6,8 +6,8 @@ from icha.support.rules import LENGTH, POSITIVE, Real
 # adhesion meet.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
-# Loads and areas below, but for no load at all, are met as well as equilibria are found no more.
-LEAST_PRESSURE = LEAST_AREA = 1e-9
+# Smaller loads, but for none at all, and areas are less than the errors of the equilibria that have them.
+LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
 # Shortest and longest step of the mean separation, in h_rms, that may be asked for, and the one taken if none is. With
 # the shortest a path has some ten thousand equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5

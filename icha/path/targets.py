@@ -49,7 +49,7 @@ class Path:
 
     Parameters
     ----------
-    reduced_pressures : p/(E* h'_rms), increasing, in [1e-9, 0.15].
+    reduced_pressures : p/(E* h'_rms), increasing, in [1e-12, 0.15].
     area_fractions : A/A0, increasing, in [1e-9, 0.25].
     mean_separations : u in m, decreasing, in [1e-15, 1e9]. Exactly one of these three lists is given.
     snapshots : pairs (kind, value), in any order, of states whose fields and spots are kept, with kind one of

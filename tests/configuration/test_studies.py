@@ -45,7 +45,7 @@ BAD = {
     "pressure beyond the model": (
         "studies.one.targets.reduced_pressures",
         [0.3],
-        "[1e-9, 0.15], which the model covers",
+        "[1e-12, 0.15], which the model covers",
     ),
     "area beyond the model": ("studies.one.targets", {"area_fractions": [0.5]}, "[1e-9, 0.25], which the model covers"),
     "zero target": ("studies.one.targets.reduced_pressures", [0, 0.1], "is out of range"),

@@ -18,7 +18,7 @@ WAVES = np.add.outer(*[np.cos(np.linspace(0, 2 * np.pi, 16, endpoint=False))] * 
 @pytest.mark.parametrize(
     ("make", "named"),
     [
-        (lambda: Path([1e-80]), r"^reduced_pressures\[0\]: 1e-80 must lie in \[1e-9, 0.15\]"),
+        (lambda: Path([1e-80]), r"^reduced_pressures\[0\]: 1e-80 must lie in \[1e-12, 0.15\]"),
         (lambda: Path(area_fractions=[5e-324]), r"^area_fractions\[0\]: 5e-324 must lie in \[1e-9, 0.25\]"),
         (lambda: Path(mean_separations=[1e100]), r"^mean_separations\[0\]: 1e\+100 must lie in \[1e-15, 1e9\]"),
         (lambda: Path([1e-2], max_step=5e-324), r"^max_step: 5e-324 must lie in \[1e-4, 0.5\]"),
@@ -42,7 +42,7 @@ def test_next_to_no_load_is_refused_in_units_of_the_slope():
     surface = Surface(1e-6 * WAVES, 1e-4)
     path = Path([1e-3], snapshots=[("relative_load", 1e-80)])
     with pytest.raises(
-        ValueError, match=r"^path: relative_load = 1e-80 .* allowed: a reduced pressure of at least 1e-09"
+        ValueError, match=r"^path: relative_load = 1e-80 .* allowed: a reduced pressure of at least 1e-12"
     ):
         simulate(surface, Material(1e6, 0.0, 1e-9), path)
 
@@ -54,7 +54,7 @@ def test_at_the_ends_of_the_ranges_runs_are_finite_and_pass_their_checks(height,
     surface = Surface(height * WAVES, period)
     energy = strength * modulus * surface.rms_height**1.5 * surface.rms_curvature**0.5
     with np.errstate(over="raise", invalid="raise", divide="raise"):
-        for path in (Path([1e-9, 1e-2], unload=True), Path(area_fractions=[1e-9, 1e-2])):
+        for path in (Path([1e-12, 1e-2], unload=True), Path(area_fractions=[1e-9, 1e-2])):
             try:
                 run = simulate(surface, Material(modulus, energy, 1e-2 * max(height, 1e-13)), path)
             except ConvergenceError as error:
