@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from icha.support import in_words
-from icha.support.rules import GRID, Real
+from icha.support.rules import GRID, LENGTH, Real
 from icha.support.units import PATTERN, conversion_factor, to_si
 from icha.support.values import File, Length, Section, Text, integer, number, quantity
 
@@ -21,8 +21,8 @@ def _unit_of_length(value: Any) -> float:
         )
     except ValueError as error:
         raise ValueError(f"{error}; {allowed}") from None
-    if metres <= 0:
-        raise ValueError(f"is not greater than 0; {allowed}")
+    if not LENGTH.holds(metres):
+        raise ValueError(f"is out of range; {allowed}")
     return metres
 
 
@@ -45,8 +45,8 @@ def _sides(value: Any) -> tuple[float, float]:
             raise ValueError(
                 f"{error}; allowed: one length, such as '90 um', or a list of two: along x and y"
             ) from None
-        if metres[-1] <= 0:
-            raise ValueError("is not greater than 0; allowed: one length, such as '90 um', or two: along x and y")
+        if not LENGTH.holds(metres[-1]):
+            raise ValueError("is out of range; allowed: one length, such as '90 um', or two: along x and y")
     return tuple(metres)
 
 

@@ -198,6 +198,18 @@ def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
     assert len(many.campaign.solved(many.campaign.boundary_elements["b0"])) == 20_000
 
 
+@pytest.mark.parametrize("unit", ["1e-300 m", "1e300 m", "yottam*yottam/m", "nm"])
+@pytest.mark.parametrize("size", ["1e-300 m", "1e300 m", ["1 um", "1e6 m"], "64 um"])
+def test_scans_of_absurd_units_and_sizes_are_refused(unit, size, load):
+    surface = measured_surface(height_unit=unit, size=size)
+    changes = {"surfaces.rough": surface, "studies.one.seeds": [1], "studies.one.rms_slopes": "measured"}
+    if (unit, size) == ("nm", "64 um"):
+        assert load(changes).campaign.period("rough") == pytest.approx(64e-6)
+        return
+    with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.(height_unit|size|path): .*; allowed: "):
+        load(changes)
+
+
 # What hypothesis puts in the place of values of configurations that come with ICHA.
 _NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([0, -1, 2**31, 1e300, -1e-300, 5e-324]))
 _TEXTS = st.one_of(

@@ -33,7 +33,12 @@ def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
         raise UnfitTopography("path", f"holds {flaw}; allowed: a rough surface")
     free = how.boundary == FREE
     said.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
-    return Surface(heights, side, FREE if free else PERIODIC), said
+    try:
+        return Surface(heights, side, FREE if free else PERIODIC), said
+    except ValueError as error:  # heights out of any range, over the side
+        raise UnfitTopography(
+            "height_unit", f"gives a surface that cannot be pressed ({error}); allowed: another"
+        ) from None
 
 
 def _require_room_for(grid):

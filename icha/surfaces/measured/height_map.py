@@ -6,6 +6,7 @@ import numpy as np
 
 from icha.support.hdf5 import refuse_data_elsewhere
 from icha.support.input_files import bounded_memory, flaw_of_path
+from icha.support.rules import LENGTH
 from icha.surfaces.heights import flaw_of_heights
 from icha.surfaces.measured.array_files import whole_npy, whole_variable
 
@@ -38,7 +39,10 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
         raise ValueError(f"holds {heights.dtype}, not real numbers; {_ALLOWED}")
     if flaw := flaw_of_heights(heights):
         raise ValueError(f"holds {flaw}; {_ALLOWED}")
-    return heights.astype(float) * metres_per_unit
+    heights = heights.astype(float) * metres_per_unit
+    if not LENGTH.holds(float(np.ptp(heights))):
+        raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {_ALLOWED}, and another unit")
+    return heights
 
 
 def _heights(path: Path) -> np.ndarray:

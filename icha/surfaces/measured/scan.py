@@ -8,6 +8,7 @@ import numpy as np
 from icha.support import in_words
 from icha.support.hdf5 import refuse_data_elsewhere
 from icha.support.input_files import TooLarge, bounded_memory
+from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import read_hdf5, read_netcdf, read_npy
 from icha.surfaces.measured.fourier_files import read_fourier
 from icha.surfaces.measured.instrument_files import read_instrument
@@ -76,7 +77,7 @@ def read_scan(path: Path, how: Preparation) -> Scan:
     said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit, format_)
-    if not all(np.isfinite(each) and each > 0 for each in size):
+    if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
         raise UnfitTopography(
             "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; allowed: give it here"
         )
