@@ -22,7 +22,7 @@ def _unit_of_length(value: Any) -> float:
     except ValueError as error:
         raise ValueError(f"{error}; {allowed}") from None
     if not LENGTH.holds(metres):
-        raise ValueError(f"is out of range; {allowed}")
+        raise ValueError(f"is not in {LENGTH.interval} m; {allowed}")
     return metres
 
 
@@ -46,7 +46,9 @@ def _sides(value: Any) -> tuple[float, float]:
                 f"{error}; allowed: one length, such as '90 um', or a list of two: along x and y"
             ) from None
         if not LENGTH.holds(metres[-1]):
-            raise ValueError("is out of range; allowed: one length, such as '90 um', or two: along x and y")
+            raise ValueError(
+                f"is not in {LENGTH.interval} m; allowed: one length, such as '90 um', or two: along x and y"
+            )
     return tuple(metres)
 
 
