@@ -47,7 +47,7 @@ def _sides(value: Any) -> tuple[float, float]:
             ) from None
         if not LENGTH.holds(metres[-1]):
             raise ValueError(
-                f"is not in {LENGTH.interval} m; allowed: one length, such as '90 um', or two: along x and y"
+                f"is not in {LENGTH.interval} m; allowed: one length, such as '90 um', or two"
             )
     return tuple(metres)
 
