@@ -3,6 +3,8 @@
 PYTHON ?= python3
 CORES ?= 2
 CONFIG ?=
+# Of the random cases of tests/test_every_case_ends.py, a hundred each.
+SERIES ?= 1
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 export UV_PYTHON_DOWNLOADS := never
@@ -13,7 +15,7 @@ export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 .DEFAULT_GOAL := help
-.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all audit wheel lint format schema docs linkcheck benchmarks benchmarks-page short-range faults validators-environment validate clean
+.PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all random-cases audit wheel lint format schema docs linkcheck benchmarks benchmarks-page short-range faults validators-environment validate clean
 
 help:
 	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
@@ -23,6 +25,7 @@ help:
 	@echo "make tamaas  install Tamaas as well, for boundary elements at finite ranges (campaign validation, tests)"
 	@echo "make test    run the tests that one waits for (four minutes): physics, every rule, wrong input"
 	@echo "make test-all  run them and all others: thousands of random cases, kills, resumption, Slurm, browser, deposits"
+	@echo "make random-cases  two thousand random runs, of which make test-all has a hundred (another one: SERIES=7)"
 	@echo "make audit   ask whether vulnerabilities of the locked packages are known (part of test-all; needs network)"
 	@echo "make wheel   build the sdist, and from it the wheel, in dist/"
 	@echo "make lint    check style of Python code and workflow"
@@ -83,7 +86,11 @@ test: tamaas
 
 # Tests of random cases are run again, with more of them.
 test-all: test audit
-	pytest -n $(CORES) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough
+	pytest -n $(CORES) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough --series $(SERIES)
+
+random-cases: SERIES = 1-20
+random-cases: environment
+	pytest -n $(CORES) --dist worksteal --hypothesis-profile thorough --series $(SERIES) tests/test_every_case_ends.py
 
 # Known vulnerabilities of the locked packages, by the database OSV; skipped, with the reason, where it cannot be asked.
 audit: environment

@@ -30,6 +30,17 @@ settings.load_profile("fast")
 LONG = ("every_case_ends", "slurm", "reruns", "faults", "workflow", "finite_range", "deposit", "energy_balance")
 
 
+def _numbers(text):
+    """What `3` or `1-20` stands for."""
+    first, _, last = text.partition("-")
+    return list(range(int(first), int(last or first) + 1))
+
+
+def pytest_addoption(parser):
+    """Which of the random cases of test_every_case_ends.py are computed."""
+    parser.addoption("--series", type=_numbers, default="1", help="series of random cases: 3, or 1-20 (default: 1)")
+
+
 def pytest_collection_modifyitems(items):
     """Begin with the files that take longest."""
     rank = {f"test_{name}.py": number for number, name in enumerate(LONG)}

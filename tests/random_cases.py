@@ -1,0 +1,205 @@
+"""Contacts at random, from ordinary to odd: surfaces, materials and paths of both models, and what may come of them."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import strategies as st
+
+import icha
+from icha.analysis.checks import check_run, told
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.datasets.format import RUN, flaws
+
+# What an error of an argument begins with: the argument's name.
+_ARGUMENTS = "heights|period|boundary|contact_modulus|surface_energy|interaction_range|path|reduced_pressures"
+_ARGUMENTS += "|area_fractions|mean_separations|snapshots|turning_points|max_step"
+NAMED = re.compile(rf"({_ARGUMENTS})(\[\d+\])?: ")
+
+
+def _waves(rng, grid, exponent, kx=1.0, ky=1.0):
+    """A periodic self-affine field of unit variance, of waves up to a quarter of the grid's; longer along an axis."""
+    qx, qy = np.fft.rfftfreq(grid, 1 / grid), np.fft.fftfreq(grid, 1 / grid)[:, None]
+    q = np.hypot(kx * qx, ky * qy)
+    power = np.where((q > 0) & (q <= grid / 4), np.maximum(q, 2.0) ** -exponent, 0.0)
+    field = np.fft.irfft2(power * np.exp(2j * np.pi * rng.random(power.shape)), s=(grid, grid))
+    return field / field.std()
+
+
+def _rough(rng, grid, size):
+    return _waves(rng, grid, 1 + size)
+
+
+def _noise(rng, grid, size):
+    return rng.normal(size=(grid, grid))
+
+
+def _anisotropic(rng, grid, size):
+    return _waves(rng, grid, 2.0, kx=1 + 5 * size, ky=1.0)
+
+
+def _plateau(rng, grid, size):
+    """Summits cut off at the same height."""
+    return np.minimum(_waves(rng, grid, 1.8), 1.5 - 2 * size)
+
+
+def _undulation(rng, grid, size):
+    """Roughness on a wave that is much higher than it."""
+    x = 2 * np.pi * np.arange(grid) / grid
+    return _waves(rng, grid, 1.8) + 30 * size * (np.cos(x)[:, None] + np.cos(x))
+
+
+def _pit(rng, grid, size):
+    heights = _waves(rng, grid, 1.8)
+    heights[tuple(rng.integers(grid, size=2))] -= 100 * size
+    return heights
+
+
+def _spike(rng, grid, size):
+    heights = _waves(rng, grid, 1.8)
+    heights[tuple(rng.integers(grid, size=2))] += 100 * size
+    return heights
+
+
+def _step(rng, grid, size):
+    heights = _waves(rng, grid, 1.8)
+    heights[: grid // 2] += 20 * size
+    return heights
+
+
+def _lattice(rng, grid, size):
+    """Equal summits in equal distances: everything happens to all of them at once."""
+    x = 2 * np.pi * np.arange(grid) / grid * int(1 + 3 * size)
+    return np.cos(x)[:, None] + np.cos(x)
+
+
+def _ridges(rng, grid, size):
+    """No summits."""
+    return np.cos(2 * np.pi * np.arange(grid) / grid)[:, None] * np.ones(grid)
+
+
+def _bump(rng, grid, size):
+    """A single bump, and nothing else."""
+    x = (np.arange(grid) - grid // 2 + size) / grid
+    return np.maximum(0.1 - x[:, None] ** 2 - x**2, 0.0)
+
+
+_ALL = (_rough, _noise, _anisotropic, _plateau, _undulation, _pit, _spike, _step, _lattice, _bump, _ridges)
+SHAPES = {function.__name__.strip("_"): function for function in _ALL}
+
+
+@dataclass(frozen=True)
+class Topography:
+    """A surface, by what it is made of; lengths in m. What it prints makes it again."""
+
+    shape: str
+    grid: int
+    size: float
+    seed: int
+    period: float
+    height: float
+    boundary: str
+
+    @property
+    def heights(self) -> np.ndarray:
+        """Of rms height `height`."""
+        heights = SHAPES[self.shape](np.random.default_rng(self.seed), self.grid, self.size)
+        return heights * (self.height / heights.std())
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run, by its arguments. What it prints makes it again."""
+
+    topography: Topography
+    material: tuple[float, float, float]
+    path: dict
+    model: str
+
+    def run(self):
+        """What comes of it."""
+        of = self.topography
+        surface = icha.Surface(of.heights, of.period, of.boundary)
+        return icha.simulate(surface, icha.Material(*self.material), icha.Path(**self.path), model=self.model)
+
+
+@st.composite
+def _topographies(draw):
+    """From mirrors to hedgehogs, by the rms height over the period."""
+    period = 1e-4 * 10.0 ** draw(st.sampled_from([0, 0, 0, 3, -3]))
+    return Topography(
+        shape=draw(st.sampled_from(list(SHAPES))),
+        grid=draw(st.sampled_from([24, 16, 32, 12, 9, 8])),
+        size=draw(st.integers(0, 20)) / 20,
+        seed=draw(st.integers(0, 10**6)),
+        period=period,
+        height=period * 10.0 ** draw(st.sampled_from([-2, -2, -2, -1, -4, -8])),
+        boundary=draw(st.sampled_from(["periodic"] * 4 + ["free"])),
+    )
+
+
+@st.composite
+def _materials(draw, topography):
+    """Modulus, energy and range: the energy in units of what it takes to press the summits flat."""
+    modulus = 10.0 ** draw(st.sampled_from([6, 6, 3, 11]))
+    power = draw(st.one_of(st.none(), st.integers(-24, 2)))
+    heights, height, period = topography.heights, topography.height, topography.period
+    spacing = period / topography.grid
+    curvature = max(np.abs(np.diff(heights, 2, axis=0)).max() / spacing**2, height / period**2)
+    energy = 0.0 if power is None else 10.0 ** (power / 4) * modulus * height**1.5 * curvature**0.5
+    tabor = 10.0 ** (draw(st.integers(-4, 8)) / 4)
+    return modulus, float(energy), float(np.cbrt((energy / modulus) ** 2 / curvature) / tabor) if energy else 1e-9
+
+
+_TURNS = st.sampled_from([("reduced_pressure", 0.0), ("reduced_pressure", -1e-3), ("area_fraction", 1e-3)])
+
+
+@st.composite
+def _paths(draw, height):
+    """Arguments of a path."""
+    kind = draw(st.sampled_from(["reduced_pressures", "area_fractions", "mean_separations"]))
+    numbers = draw(st.lists(st.integers(0, 400), min_size=1, max_size=3, unique=True).map(sorted))
+    if kind == "mean_separations":
+        stops = [height * (4 - 0.0099 * n) for n in numbers]
+    else:
+        stops = [10 ** (-4.5 + 3.6 * n / 400) for n in numbers]
+    path = {kind: stops, "max_step": draw(st.sampled_from([0.5, 0.15, 0.5, 0.05]))}
+    path["snapshots"] = draw(st.sampled_from([None, [], [("area_fraction", 0.02)], [("reduced_pressure", 3e-3)]]))
+    way = draw(st.sampled_from(["in"] * 5 + ["there and back", "cycle", "under load"]))
+    if way == "in":
+        return path
+    path["unload"] = True
+    path["united_until"] = draw(st.sampled_from(["overlap", "detachment"]))
+    if way == "cycle":
+        path["turning_points"] = [draw(_TURNS), (kind.removesuffix("s"), stops[-1])]
+    if way == "under load" and kind == "reduced_pressures" and path["snapshots"] != [("area_fraction", 0.02)]:
+        path["control"] = "load"
+    return path
+
+
+@st.composite
+def cases(draw):
+    """Runs of every kind; one in three by boundary elements."""
+    topography = draw(_topographies())
+    return Case(
+        topography,
+        draw(_materials(topography)),
+        draw(_paths(topography.height)),
+        draw(st.sampled_from([ASPERITIES, ASPERITIES, BOUNDARY_ELEMENTS])),
+    )
+
+
+def refused(error: ValueError) -> bool:
+    """Whether it names an argument."""
+    return NAMED.match(str(error)) is not None
+
+
+# What holds for every step by itself, and so for those that a run reached before it failed.
+_OF_STEPS = ("finite", "residual", "front", "gap", "converged", "targets")
+
+
+def wrong(run) -> list[str]:
+    """What of a run's dataset is not as it should be; of one that ended early, of the stops that it reached."""
+    ended = "incomplete" in run.attrs
+    found = [check for check in check_run(run) if not check.passed and not (ended and check.name not in _OF_STEPS)]
+    return [told(check) for check in found] + flaws(RUN, run)
