@@ -409,8 +409,17 @@ def power(folder: Path, image: Path) -> Iterator[tuple[Callable[[], None], Calla
     try:
         yield cut, mount
     finally:
-        subprocess.run(["umount", str(folder)], check=True)
+        unmount(folder)
         image.unlink()
+
+
+def unmount(folder: Path) -> None:
+    """Unmount a disk, once what was killed has let go of it."""
+    until = time.monotonic() + LONGEST
+    while subprocess.run(["umount", str(folder)], stderr=subprocess.DEVNULL).returncode:
+        if time.monotonic() > until:
+            raise SystemExit(f"{folder} cannot be unmounted")
+        time.sleep(0.1)
 
 
 def power_cut(reference: Reference, moment: float, way: str) -> Trial:
@@ -424,7 +433,7 @@ def power_cut(reference: Reference, moment: float, way: str) -> Trial:
             os.killpg(process.pid, signal.SIGKILL)
         place.end(process)
         wrong = [f"{line} is left running" for line in place.left_behind()]
-        subprocess.run(["umount", str(place.folder)], check=True)
+        unmount(place.folder)
         mount()
         wrong += reference.half_written(place)
         wrong += reference.goes_on(place, way)

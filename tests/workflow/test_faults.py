@@ -93,7 +93,7 @@ def test_what_is_complete_is_still_there_after_a_power_cut(tmp_path):
             (disk / "runs/.other").write_bytes(contents["runs/0.nc"])
             os.replace(disk / "runs/.other", disk / "runs/other")
             cut()
-            subprocess.run(["umount", str(disk)], check=True)
+            faults.unmount(disk)
             mount()
             assert {path: (disk / path).read_bytes() for path in contents} == contents
             assert damaged(disk, thorough=True) == lost(disk) == []
