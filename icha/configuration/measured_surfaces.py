@@ -46,9 +46,7 @@ def _sides(value: Any) -> tuple[float, float]:
                 f"{error}; allowed: one length, such as '90 um', or a list of two: along x and y"
             ) from None
         if not LENGTH.holds(metres[-1]):
-            raise ValueError(
-                f"is not in {LENGTH.interval} m; allowed: one length, such as '90 um', or two"
-            )
+            raise ValueError(f"is not in {LENGTH.interval} m; allowed: one length, such as '90 um', or two")
     return tuple(metres)
 
 
