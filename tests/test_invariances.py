@@ -48,7 +48,7 @@ def contacts(draw, model, adhesion=ANY):
     return surface, adhering(surface, draw(adhesion), draw(st.floats(1, 5)))
 
 
-def adhering(surface, power, tabor=2.0):
+def adhering(surface, power, tabor):
     """A material, with a power of ten of the energy that it takes to press the summits flat."""
     if power is None:
         return Material(MODULUS, 0.0, 1e-9)
@@ -157,12 +157,12 @@ def test_heights_scale_apart_from_lengths(model, data, power):
 def test_adhesion_vanishes_with_its_energy(contact):
     """An approach is less than Hertz's by sqrt(2 pi a dgamma/E*): what it changes falls with the root of the energy."""
     surface, bare = contact
-    expected = pressed(surface, bare, ASPERITIES)
-    error = []
-    for power in (-8, -12):
-        faint = pressed(surface, adhering(surface, power), ASPERITIES)
-        error.append(np.abs(faint["contact_area_fraction"] / expected["contact_area_fraction"] - 1).max())
-    assert error[0] <= 1e-2 and error[1] <= 0.2 * error[0] + SAME[ASPERITIES]
+    expected, unit = pressed(surface, bare, ASPERITIES), surface.rms_height**1.5 * surface.rms_curvature**0.5
+    faint = [pressed(surface, Material(MODULUS, part * MODULUS * unit, 1e-9), ASPERITIES) for part in (1e-8, 1e-12)]
+    error = [float(np.abs(run["contact_area_fraction"] / expected["contact_area_fraction"] - 1).max()) for run in faint]
+    if expected["coalescence_count"].max() == 0:
+        assert error[0] <= 1e-2 and error[1] <= 0.2 * error[0] + SAME[ASPERITIES]
+    assert error[1] <= STEPS_WITH_UNIONS
 
 
 @BOTH

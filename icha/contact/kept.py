@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import shutil
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,9 +42,8 @@ class Kept:
     def equilibrium(self, state: S, separation: float, control: Control | None = None, *, let_go: int = 0) -> S:
         """As of the contact."""
         file = self.folder / f"{next(self._numbers):05d}.npz"
-        if file.exists():
-            with np.load(file) as arrays:
-                found = dict(arrays)
+        found = _read(file)
+        if found is not None:
             if "failure" in found:
                 raise _FAILURES[str(found["failure"])](str(found["message"]))
             return self.unpacked(found, state)
@@ -71,6 +71,15 @@ def prepared(folder: Path, of: str) -> Path:
         with whole_file(written) as file:
             file.write_text(of, encoding="utf-8")
     return folder
+
+
+def _read(file):
+    """The arrays of a file; None without one, or of one that is damaged, whose equilibrium is looked for again."""
+    try:
+        with np.load(file) as arrays:
+            return dict(arrays)
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        return None
 
 
 def _write(file, arrays):

@@ -53,3 +53,14 @@ def test_a_path_that_was_stopped_goes_on_to_the_same_last_bit(monkeypatch, case,
     assert further == needed - half
     assert followed(monkeypatch, case, prepared(folder, "this path"), None)[1] == 0
     assert followed(monkeypatch, case, prepared(folder, "another"), None)[1] == needed
+
+
+def test_what_is_damaged_is_looked_for_again(monkeypatch, tmp_path):
+    folder = prepared(tmp_path / "kept", "this path")
+    whole, _ = followed(monkeypatch, "areas", folder, None)
+    first, second, *_ = sorted(folder.glob("*.npz"))
+    first.write_bytes(first.read_bytes()[:100])
+    second.write_bytes(b"")
+    again, needed = followed(monkeypatch, "areas", folder, None)
+    assert needed == 2
+    assert_identical(again, whole)

@@ -21,7 +21,7 @@ from icha.support.checksums import sha256_of
 OF_THE_MACHINE = (OSError, MemoryError, ImportError)
 
 
-def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, progress, kept, model=ASPERITIES):
+def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, progress, model=ASPERITIES, kept=None):
     """Load the surface of the file `surface`, scaled to `rms_slope`, and write the run dataset to `output`.
 
     Of a run that fails the file holds the stops that were reached, and says why there are no more: the campaign goes
