@@ -102,7 +102,7 @@ def assert_loop_is_sound(case):
     try:
         run = simulate(surface, Material(1e6, 0.0, 1e-9), path)
     except ValueError as error:
-        assert "summits" in str(error)
+        assert "summit" in str(error)
     except ConvergenceError as error:
         assert ENDED.search(str(error)), error
     else:
