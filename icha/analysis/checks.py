@@ -20,6 +20,7 @@ from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.datasets.variables.run import PATCHES
+from icha.path.resolution import UNRESOLVED_LOSS
 from icha.path.targets import AREA_FRACTION, BETWEEN
 from icha.support.atomic_files import whole_file
 
@@ -297,12 +298,13 @@ def _cycle(run) -> Iterator[Finding]:
         0,
         "number of events that are counted and not logged, or logged only",
     )
-    # A single jump into contact may be a little uphill: Wu's distance is that of a lone asperity, its images are not.
-    jumps = float(run["dissipated_by_jump_in"][-1] + run["dissipated_by_jump_off"][-1])
+    # A jump into contact may be uphill, as far as the jump off it is downhill: where the range is so long that Wu's
+    # distance would lie below jump-off. Then both cancel, as well as it is known where they happened.
+    jumps = [float(run[f"dissipated_by_{name}"][-1]) for name in ("jump_in", "jump_off")]
     yield (
         "jumps lose energy",
-        -min(jumps, 0.0) / scale,
-        IDENTITY_LIMIT,
+        -min(sum(jumps), 0.0) / scale,
+        IDENTITY_LIMIT + UNRESOLVED_LOSS * sum(map(abs, jumps)) / scale,
         "energy gained in jumps into and out of contact together, over the largest work",
     )
 
