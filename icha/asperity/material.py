@@ -19,8 +19,8 @@ class Material:
     ----------
     contact_modulus : E*, composite elastic modulus, Pa, in [1e-9, 1e15].
     surface_energy : energy of adhesion per unit area, J/m^2; zero, which is adhesionless contact, or in (0, 1e24] and,
-        over the modulus, in [1e-30, 1e9] m.
-    interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-15, 1e9].
+        over the modulus, in [1e-40, 1e9] m.
+    interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-24, 1e9].
 
     Raises
     ------

@@ -51,7 +51,7 @@ class Path:
     ----------
     reduced_pressures : p/(E* h'_rms), increasing, in [1e-12, 0.15].
     area_fractions : A/A0, increasing, in [1e-9, 0.25].
-    mean_separations : u in m, decreasing, in [1e-15, 1e9]. Exactly one of these three lists is given.
+    mean_separations : u in m, decreasing, in [1e-24, 1e9]. Exactly one of these three lists is given.
     snapshots : pairs (kind, value), in any order, of states whose fields and spots are kept, with kind one of
         "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" and "mean_separation" (m). A snapshot is a stop
         of its own, unless the list holds the same kind and value; the dataset has them in the order in which they are

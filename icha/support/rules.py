@@ -96,7 +96,7 @@ class Integer:
 NUMBER = Real()
 POSITIVE = Real(above=0)
 # Ranges far wider than anything physical, in which no product of powers overflows or vanishes.
-LENGTH = Real("m", least=1e-15, most=1e9)
+LENGTH = Real("m", least=1e-24, most=1e9)
 
 # Surfaces.
 HURST = Real(above=0, most=1)
@@ -108,7 +108,7 @@ SEED = Integer(0)
 CONTACT_MODULUS = Real("Pa", least=1e-9, most=1e15)
 SURFACE_ENERGY = Real("J/m^2", least=0, most=1e24)
 # Surface energy over contact modulus, where there is adhesion.
-ADHESION_LENGTH = Real("m", least=1e-30, most=1e9)
+ADHESION_LENGTH = Real("m", least=1e-40, most=1e9)
 
 # Boundary elements.
 TOLERANCE = Real(least=1e-12, most=1e-4)

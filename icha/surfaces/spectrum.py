@@ -33,7 +33,7 @@ class SelfAffineSpectrum:
 
     Parameters
     ----------
-    period : L, side of the periodic cell, m; lengths are in [1e-15, 1e9] m.
+    period : L, side of the periodic cell, m; lengths are in [1e-24, 1e9] m.
     rolloff_wavelength : 2 pi / q_0, m; at most the period.
     short_wavelength : 2 pi / q_1, the short cut-off, m; less than the roll-off wavelength.
     hurst : H, in (0, 1].

@@ -21,7 +21,7 @@ PERIODIC, FREE = "periodic", "free"
 BOUNDARIES = (PERIODIC, FREE)
 
 # Heights from the lowest to the highest, over the period.
-_STEEPNESS = Real(least=1e-12, most=1e9)
+_STEEPNESS = Real(least=1e-24, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
 
@@ -33,14 +33,14 @@ class Surface:
     Parameters
     ----------
     heights : (n, n) array, metres. Its mean is removed; the array is copied and made read-only.
-    period : side of the square in metres, in [1e-15, 1e9]; of a periodic surface its period.
+    period : side of the square in metres, in [1e-24, 1e9]; of a periodic surface its period.
     boundary : "periodic" in both directions, or "free": one square on a half-space that goes on beyond it.
 
     Raises
     ------
     ValueError
         If the heights are not a square array of at least 8 x 8 finite numbers, or all the same, or their range over
-        the period is not in [1e-12, 1e9], or the period is out of range, or the boundary is neither of the two.
+        the period is not in [1e-24, 1e9], or the period is out of range, or the boundary is neither of the two.
     """
 
     heights: np.ndarray

@@ -311,7 +311,7 @@ def test_a_scan_is_looked_at_before_anything_is_computed(project):
             "allowed: another value, or, if it is meant, this one with --co",
         ),
         (["simulate", "run.nc", "--rms-slope", "1e3"], "--rms-slope: 1000.0 is unusual; usual: 1e-4 to 5"),
-        (["simulate", "run.nc", "--short", "0 m", "--confirmed"], "--short: 0.0 must lie in [1e-15, 1e9] (in m)"),
+        (["simulate", "run.nc", "--short", "0 m", "--confirmed"], "--short: 0.0 must lie in [1e-24, 1e9] (in m)"),
         (["simulate", "\udcff.nc", "--grid", "16"], "holds bytes that are no UTF-8; allowed: text"),
         (["simulate", "run.nc", "--surface", "/dev/zero"], "/dev/zero: is a device; allowed: a file"),
         (["check", "/dev/zero"], "/dev/zero: is a device; allowed: a file"),

@@ -11,7 +11,7 @@ BAD = {
     "negative modulus": ("materials.soft.contact_modulus", "-25 MPa", "'-25 MPa' is out of range"),
     "zero modulus": ("materials.soft.contact_modulus", "0 MPa", "in [1e-9, 1e15] Pa"),
     "negative surface energy": ("materials.soft.surface_energy", "-1 mJ/m^2", "in [0, 1e24] J/m^2"),
-    "zero range": ("materials.soft.interaction_range", "0 nm", "in [1e-15, 1e9] m"),
+    "zero range": ("materials.soft.interaction_range", "0 nm", "in [1e-24, 1e9] m"),
     "name of a material": ("materials.Soft", {}, "materials.Soft: 'Soft' is not a name"),
 }
 

@@ -41,10 +41,10 @@ def test_a_crop_is_called_by_its_lengths():
     [
         ({"height_unit": "volt"}, ["'volt' is not a unit of length", "allowed", "0.1 mm"]),
         ({"height_unit": 3}, ["is not a unit"]),
-        ({"height_unit": "0 mm"}, ["is not in [1e-15, 1e9] m; allowed"]),
+        ({"height_unit": "0 mm"}, ["is not in [1e-24, 1e9] m; allowed"]),
         ({"size": "90"}, ["the unit is missing", "allowed"]),
         ({"size": ["90 um"] * 3}, ["3 entries", "allowed"]),
-        ({"size": "-1 um"}, ["is not in [1e-15, 1e9] m; allowed"]),
+        ({"size": "-1 um"}, ["is not in [1e-24, 1e9] m; allowed"]),
         ({"crop": {"x": "0 um", "y": "0 um", "side": "0 um"}}, ["out of range"]),
         ({"boundary": "periodic", "detrend": "tilt"}, ["detrend", "periodicity", "allowed"]),
         ({"boundary": "periodic", "crop": {"x": "0 um", "y": "0 um", "side": "9 um"}}, ["crop", "not periodic"]),

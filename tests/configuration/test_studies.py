@@ -41,7 +41,7 @@ BAD = {
         "in decreasing order",
     ),
     "separation without unit": ("studies.one.targets", {"mean_separations": [1e-6]}, "the unit is missing"),
-    "negative separation": ("studies.one.targets", {"mean_separations": ["-1 um"]}, "in [1e-15, 1e9] m"),
+    "negative separation": ("studies.one.targets", {"mean_separations": ["-1 um"]}, "in [1e-24, 1e9] m"),
     "pressure beyond the model": (
         "studies.one.targets.reduced_pressures",
         [0.3],

@@ -18,7 +18,7 @@ OUTSIDE = [
         "a number in [1e-9, 0.25], which the model covers",
     ),
     (STATES["reduced_pressure"], 0.0, "must lie in [1e-12, 0.15]", "a number in [1e-12, 0.15], which the model covers"),
-    (rules.LENGTH, 1e100, "must lie in [1e-15, 1e9] (in m)", "a number in [1e-15, 1e9]"),
+    (rules.LENGTH, 1e100, "must lie in [1e-24, 1e9] (in m)", "a number in [1e-24, 1e9]"),
     (rules.POSITIVE, True, "is not a number", "a number greater than 0"),
 ]
 
