@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
-from icha.path.resolution import UNRESOLVED_LOSS
+from icha.path.limits import UNRESOLVED_LOSS
 
 PERIOD, MODULUS = 100e-6, 25e6
 # Grid and shortest waves along its side: some fifty asperities, and eight cells for each wave.

@@ -20,7 +20,7 @@ from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.datasets.variables.run import PATCHES
-from icha.path.resolution import UNRESOLVED_LOSS
+from icha.path.limits import UNRESOLVED_LOSS
 from icha.path.targets import AREA_FRACTION, BETWEEN
 from icha.support.atomic_files import whole_file
 

@@ -12,6 +12,9 @@ LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
 # the shortest a path has some ten thousand equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
+# Of the energy that jumps have set free so far, the part that may be unknown after a step for not knowing where in it
+# its events happened.
+UNRESOLVED_LOSS = 5e-4
 
 # By the kind of quantity.
 STATES = {

@@ -11,10 +11,9 @@ from icha.contact.model import ContactModel, State
 from icha.path.bracketing import CLOSE_TO_A_JUMP
 from icha.path.course import halved
 from icha.path.energy_balance import Step
+from icha.path.limits import UNRESOLVED_LOSS
 
-# Of the energy that jumps have set free so far, the part that may be unknown after a step for not knowing where in it
-# its events happened; where nothing jumps, of the work so far.
-UNRESOLVED_LOSS = 5e-4
+# Where nothing jumps, the part of the work so far that may be unknown after a step.
 UNRESOLVED_WORK = 2e-4
 # Unions and their undoing are found within this part of the longest step.
 UNITING_STEP = 1 / 16
