@@ -1,7 +1,7 @@
 """Every run ends: with results that pass their checks, with an argument refused by its name, or with its reason.
 
-Two thousand random cases in twenty series: `make random-cases` computes them all. Otherwise one series is (--series,
-the first if it is left out), of which `make test` takes the beginning.
+Two thousand random cases, and as many loops without adhesion, in twenty series: `make random-cases` computes them all.
+Otherwise one series is (--series, the first if it is left out), of which `make test` takes the beginning.
 """
 
 import re
@@ -109,16 +109,15 @@ def assert_loop_is_sound(case):
         assert not [check for check in check_run(run) if not check.passed]
 
 
-@given(loops())
-def test_loops_without_adhesion_pass_their_checks(case):
-    assert_loop_is_sound(case)
+@pytest.mark.hypothesis
+def test_loops_without_adhesion_pass_their_checks(series):
+    @seed(series)
+    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 2), derandomize=False)
+    @given(loops())
+    def are_sound(case):
+        assert_loop_is_sound(case)
 
-
-@pytest.mark.slow
-@settings(max_examples=1000)
-@given(loops())
-def test_a_thousand_loops_without_adhesion_pass_their_checks(case):
-    assert_loop_is_sound(case)
+    are_sound()
 
 
 def test_a_cycle_begins_at_its_highest_stop():
