@@ -141,14 +141,19 @@ def test_it_goes_on_after_it_was_stopped(project):
     assert process.returncode == 1
     assert "Stopped before the end. The same command goes on from here." in rest and "Traceback" not in rest
     assert "failed:" not in rest
-    for _ in range(50):  # nothing is left running
+    assert not left_running(project)
+    done = run(project, "runs")
+    assert done.returncode == 0, done.stdout
+
+
+def left_running(project):
+    """What of a call is still running after five seconds."""
+    for _ in range(50):
         left = subprocess.run(["pgrep", "-f", f"snakemake.*{project}"], capture_output=True, text=True).stdout
         if not left:
             break
         time.sleep(0.1)
-    assert not left
-    done = run(project, "runs")
-    assert done.returncode == 0, done.stdout
+    return left
 
 
 @pytest.mark.slow
@@ -159,12 +164,7 @@ def test_nothing_goes_on_after_it_was_killed(project):
     at_work(process)
     process.kill()
     process.communicate()
-    for _ in range(50):
-        left = subprocess.run(["pgrep", "-f", f"snakemake.*{project}"], capture_output=True, text=True).stdout
-        if not left:
-            break
-        time.sleep(0.1)
-    assert not left
+    assert not left_running(project)
     # And nothing is in the way of the next call.
     done = run(project, "runs")
     assert done.returncode == 0, done.stdout

@@ -2,6 +2,7 @@
 
 import pytest
 import small_campaign as small
+from bare_campaign import CAMPAIGN
 
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
@@ -11,18 +12,6 @@ from icha.planning.results import campaign_files
 from icha.publication.consistency import refuse_mixed
 from icha.support.checksums import asked_of, sha256_as_written, write_checksum
 
-CAMPAIGN = """
-name: small
-title: Small
-summary: For tests.
-license: CC0-1.0
-surfaces:
-  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 50 um, short_wavelength: 20 um, hurst: 0.8, grid: 32}
-materials:
-  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
-studies:
-  load: {surfaces: [rough], seeds: [1, 2], rms_slopes: [1.0], materials: [bare], targets: {reduced_pressures: [1.0e-3]}}
-"""
 ASKED = asked_of(["0"])
 
 

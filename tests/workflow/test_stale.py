@@ -5,28 +5,12 @@ from base64 import urlsafe_b64encode
 
 import pytest
 import xarray as xr
+from bare_campaign import CAMPAIGN
 from conftest import REPOSITORY, copy_project, snakemake
 
 from icha.support.checksums import damaged
 
 CONFIGURATION = "config/campaigns/small.yaml"
-CAMPAIGN = """
-name: small
-title: Small
-summary: For tests.
-license: CC0-1.0
-surfaces:
-  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 50 um, short_wavelength: 20 um, hurst: 0.8, grid: 32}
-materials:
-  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
-studies:
-  load:
-    surfaces: [rough]
-    seeds: [1, 2]
-    rms_slopes: [1.0]
-    materials: [bare]
-    targets: {reduced_pressures: [1.0e-3]}
-"""
 RUNS = [f"runs/load/rough/seed{seed}/slope1/bare.nc" for seed in (1, 2)]
 NOTHING = "Nothing to be done"
 
