@@ -97,6 +97,8 @@ def simulate(
     """
     _check_arguments(surface, material, path)
     chosen = _model(model)
+    if kept is not None and chosen.kept is None:
+        raise ValueError(f"kept: equilibria of the model {model} cannot be kept; allowed: None")
     seed = Integer(-1).checked("seed", seed)
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
@@ -163,7 +165,8 @@ def _check_arguments(surface, material, path):
                 raise ValueError(f"{asked} {beyond}")
             if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
                 raise ValueError(
-                    f"{asked} is next to no load; allowed: a reduced pressure of at least {LEAST_PRESSURE}"
+                    f"{asked} is next to no load; allowed: a reduced pressure of at least {LEAST_PRESSURE} in absolute "
+                    "value, or 0 at a turning point that ends unloading"
                 )
         if target.snapshot and target.kind == MEAN_SEPARATION and target.value > _HIGHEST_SNAPSHOT * surface.rms_height:
             raise ValueError(
@@ -193,10 +196,10 @@ def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
         for waypoint in follow(contact, path, pressure_unit, progress):
             state = waypoint.state
             steps.append(_finite(_step(contact, waypoint, pressure_unit) | observables.of_step(state)))
-            if waypoint.target.snapshot:
-                keep_snapshot(waypoint.target, state, len(steps) - 1)
             events.append(Events.joined(()) if before is None else contact.events_between(before, state))
             before = state
+            if waypoint.target.snapshot:
+                keep_snapshot(waypoint.target, state, len(steps) - 1)
             # The largest tension of the last leg.
             tension = waypoint.leg, -steps[-1]["nominal_pressure"]
             if pulled is None or tension > pulled[0]:

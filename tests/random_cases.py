@@ -194,6 +194,13 @@ def refused(error: ValueError) -> bool:
     return NAMED.match(str(error)) is not None
 
 
+def lacking(case: Case, run) -> set[tuple[str, float]]:
+    """Kinds and values of stops and snapshots that a run to the end should have met on its first leg, and has not."""
+    first = run["leg"].values == 0
+    met = zip(run["step_kind"].values[first], run["step_target"].values[first], strict=True)
+    return {(stop.kind, stop.value) for stop in icha.Path(**case.path).targets} - {(str(k), float(v)) for k, v in met}
+
+
 # What holds for every step by itself, and so for those that a run reached before it failed.
 _OF_STEPS = ("finite", "residual", "front", "gap", "converged", "targets")
 

@@ -4,10 +4,11 @@ import hashlib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.boundary_elements import kernel
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.path.limits import UNRESOLVED_LOSS
 
@@ -57,11 +58,13 @@ def adhering(surface, power, tabor):
 
 
 def pressed(surface, material, model, **path):
-    """The run; of one that ends early what it reached."""
+    """The run; of one that ends early what it reached, which must be something."""
     try:
-        return simulate(surface, material, Path(**({"reduced_pressures": [3e-3, 2e-2]} | path)), model=model)
+        run = simulate(surface, material, Path(**({"reduced_pressures": [3e-3, 2e-2]} | path)), model=model)
     except ConvergenceError as error:
-        return error.dataset
+        run = error.dataset
+    assume(run.sizes["step"])
+    return run
 
 
 def assert_same(one, other, bound, counts=COUNTS):
@@ -101,7 +104,7 @@ def test_units_drop_out(model, data, lengths, pressures):
 
 
 @pytest.mark.slow
-@settings(max_examples=2)
+@settings(max_examples=4)
 @given(contacts(ASPERITIES, ADHERING), st.floats(-4, 4), st.floats(-3, 3))
 def test_units_drop_out_of_a_loop(contact, lengths, pressures):
     surface, material = contact
@@ -111,13 +114,13 @@ def test_units_drop_out_of_a_loop(contact, lengths, pressures):
     way = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
     one, other = (pressed(*each, ASPERITIES, **way) for each in ((surface, material), (larger, scaled)))
     assert ("hysteresis_loss" in one) == ("hysteresis_loss" in other)
-    if "hysteresis_loss" in one:
-        jumps = int(one["jump_in_count"][-1] + one["jump_off_count"][-1])
-        for name, unit, bound in (
-            ("hysteresis_loss", stress * length, jumps * UNRESOLVED_LOSS),
-            ("pull_off_pressure", stress, SAME_TENSION),
-        ):
-            np.testing.assert_allclose(float(other[name]), unit * float(one[name]), rtol=bound, err_msg=name)
+    assume("hysteresis_loss" in one)
+    jumps = int(one["jump_in_count"][-1] + one["jump_off_count"][-1])
+    for name, unit, bound in (
+        ("hysteresis_loss", stress * length, jumps * UNRESOLVED_LOSS),
+        ("pull_off_pressure", stress, SAME_TENSION),
+    ):
+        np.testing.assert_allclose(float(other[name]), unit * float(one[name]), rtol=bound, err_msg=name)
 
 
 @BOTH
@@ -142,7 +145,7 @@ def test_without_adhesion_the_range_changes_no_bit(model, data, power):
 
 @BOTH
 @some(SELDOM)
-@given(st.data(), st.floats(-6, 0))
+@given(st.data(), st.floats(-12, 0))
 def test_heights_scale_apart_from_lengths(model, data, power):
     """With heights scale approaches and pressures; the adhesive part of an approach does if the energy is squared."""
     surface, material = data.draw(contacts(model))
@@ -188,6 +191,9 @@ def test_threads_change_no_bit(model, data):
     surface, material = data.draw(contacts(model))
     found = set()
     with pytest.MonkeyPatch.context() as patch:
+        # Boundary elements work on small grids by blocks and threads, as on large ones.
+        patch.setattr(kernel, "_CACHE", 1000)
+        patch.setattr(kernel, "_LARGE", 0)
         for threads in ("1", "3"):
             patch.setenv("OMP_NUM_THREADS", threads)
             again = Surface(surface.heights, PERIOD)

@@ -20,7 +20,6 @@ PERIOD, MODULUS, ENERGY, RANGE = 100e-6, 25e6, 0.05, 2.071e-9
 ADHESIVE, BARE = Material(MODULUS, ENERGY, RANGE), Material(MODULUS, 0.0, RANGE)
 PRESSURES = [1e-3, 5e-3, 2e-2]
 BOTH = pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
-DIMENSIONLESS = ("contact_area_fraction", "reduced_pressure", "reduced_separation", "spot_count", "coalescence_count")
 
 
 def rough(grid=64, seed=1, ratio=16, period=PERIOD, slope=1.0):
@@ -167,21 +166,6 @@ def test_statistics_in_the_dataset_are_those_of_the_surface(run):
 # --- physics that has to come out ---------------------------------------------------------------------------
 
 
-@BOTH
-def test_common_units_drop_out(material):
-    # Heights, lengths and range by one factor, E* by another, surface energy by both.
-    length, stress = 1000.0, 0.037
-    small = rough()
-    large = Surface(small.heights * length, PERIOD * length)
-    scaled = Material(MODULUS * stress, material.surface_energy * stress * length, material.interaction_range * length)
-    one, other = run_of(small, material), run_of(large, scaled)
-    for name in DIMENSIONLESS:
-        np.testing.assert_allclose(other[name], one[name], rtol=1e-8, err_msg=name)
-    np.testing.assert_allclose(other.mean_separation, length * one.mean_separation, rtol=1e-8)
-    np.testing.assert_allclose(other.contact_stiffness, stress / length * one.contact_stiffness, rtol=1e-8)
-    np.testing.assert_allclose(other.gap_density * length, one.gap_density, rtol=1e-6, atol=1e-6 / 1e-6)
-
-
 def test_adhesion_enlarges_the_area_at_a_given_load():
     surface = rough()
     areas = [
@@ -298,6 +282,17 @@ def test_nothing_reached_is_an_empty_dataset_not_a_wrong_one(monkeypatch):
     assert caught.value.dataset.sizes["step"] == 0
     assert caught.value.dataset.sizes["spot"] == 0
     assert float(caught.value.dataset.contact_modulus) == MODULUS
+
+
+def test_a_snapshot_that_is_not_finite_ends_a_cycle_with_what_was_reached(monkeypatch):
+    from icha.equilibrium.observables import AsperityObservables
+
+    monkeypatch.setattr(AsperityObservables, "of_snapshot", lambda self, state: {"gap_density": np.array([np.nan])})
+    with pytest.raises(ConvergenceError, match="with values of gap_density that are not finite") as caught:
+        simulate(rough(), BARE, Path([1e-3], unload=True))
+    reached = caught.value.dataset
+    assert float(reached.reduced_pressure[-1]) == pytest.approx(1e-3) and reached.sizes["snapshot"] == 0
+    assert int(reached.jump_in_count[-1]) == np.count_nonzero(reached.event_kind == 0) > 0
 
 
 @pytest.mark.parametrize(

@@ -14,13 +14,13 @@ import numpy as np
 import xarray as xr
 
 from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
-from icha.contact.model import HELD_CELLS
-from icha.contact.models import BOUNDARY_ELEMENTS
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.tolerances import HELD_CELLS, HELD_PART, RESIDUAL_TOLERANCE, SMALLEST_LOAD, STIFFNESS_TOLERANCE
 from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.datasets.variables.run import PATCHES
-from icha.path.limits import UNRESOLVED_LOSS
+from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS
 from icha.path.targets import AREA_FRACTION, BETWEEN
 from icha.support.atomic_files import whole_file
 
@@ -36,13 +36,6 @@ LOAD_LIMIT = 1e-3
 # Where spots unite, the same load or area may need the surfaces further apart by a little, in units of h_rms. Where
 # they jump in, by as much as the jump gives: that has no limit.
 SEPARATION_RISE_LIMIT = 1e-2
-# Of what a load is made up of, the part below which it counts as none when its error is measured.
-_SMALLEST_LOAD = 1e-4
-# To so much of h_rms equilibria are found, and to this part their stiffness.
-RESIDUAL_TOLERANCE = 1e-9
-STIFFNESS_TOLERANCE = 1e-6
-# Of the work, the part by which a step may miss the balance of energy.
-UNBALANCED_WORK = 3e-6
 # The check of every run of a campaign that it reached its end.
 COMPLETED = "completed"
 
@@ -221,14 +214,15 @@ def _miss(run):
     miss = np.abs(value - target)
     if run.attrs.get("contact_model") == BOUNDARY_ELEMENTS and float(run["surface_energy"]) == 0:
         of_area = np.array([kind == AREA_FRACTION for kind in kinds])
-        miss = np.where(of_area, np.maximum(miss - HELD_CELLS / float(run["grid"]) ** 2, 0.0), miss)
+        cells = np.minimum(HELD_CELLS / float(run["grid"]) ** 2, HELD_PART * np.abs(target))
+        miss = np.where(of_area, np.maximum(miss - cells, 0.0), miss)
     # A path may turn back at no load, of which no part can be taken: then it is one of the run's largest load.
     whole = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
     # With adhesion a load may be next to nothing beside the attraction and repulsion of which it is made up, which are
     # about the stiffness times h_rms: it is met as well as they are.
     gross = np.abs(run["contact_stiffness"]) * float(run["rms_height"]) * (float(run["surface_energy"]) > 0)
     unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale}
-    least = np.array([_SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
+    least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
     return np.max(miss / np.where(target != 0, np.maximum(np.abs(target), least), whole))
 
 
@@ -288,8 +282,7 @@ def _largest_work(run):
 
 
 def _cycle(run) -> Iterator[Finding]:
-    """Findings on the events and jumps of a run that goes on after its first loading."""
-    scale = _largest_work(run)
+    """Findings on the events of a run that goes on after its first loading."""
     logged = np.bincount(run["event_kind"], minlength=len(EVENT_COUNTS))
     counted = np.array([int(run[name][-1]) for name in EVENT_COUNTS])
     yield (
@@ -297,15 +290,6 @@ def _cycle(run) -> Iterator[Finding]:
         np.abs(logged - counted).sum(),
         0,
         "number of events that are counted and not logged, or logged only",
-    )
-    # A jump into contact may be uphill, as far as the jump off it is downhill: where the range is so long that Wu's
-    # distance would lie below jump-off. Then both cancel, as well as it is known where they happened.
-    jumps = [float(run[f"dissipated_by_{name}"][-1]) for name in ("jump_in", "jump_off")]
-    yield (
-        "jumps lose energy",
-        -min(sum(jumps), 0.0) / scale,
-        IDENTITY_LIMIT + UNRESOLVED_LOSS * sum(map(abs, jumps)) / scale,
-        "energy gained in jumps into and out of contact together, over the largest work",
     )
 
 
@@ -325,6 +309,15 @@ def _loop(run) -> Iterator[Finding]:
         abs(loss - float(run["work"][-1])) / scale,
         IDENTITY_LIMIT,
         "hysteresis loss against the work done up to complete separation, over the largest work",
+    )
+    # A jump into contact may be uphill, as far as the jump off it is downhill: where the range is so long that Wu's
+    # distance would lie below jump-off. Then both cancel, as well as it is known where they happened.
+    jumps = [float(run[f"dissipated_by_{name}"][-1]) for name in ("jump_in", "jump_off")]
+    yield (
+        "jumps lose energy",
+        -min(sum(jumps), 0.0) / scale,
+        IDENTITY_LIMIT + UNRESOLVED_LOSS * sum(map(abs, jumps)) / scale,
+        "energy gained in jumps into and out of contact together, over the largest work",
     )
     yield "separated: spots", float(run["spot_count"][-1]), 0, "number of spots left in contact at the end of unloading"
     yield (
@@ -365,13 +358,14 @@ def _met_one_way(run):
 def _error_of_work(run):
     """By how much the work of a path may be wrong, as its equilibria are found to their tolerances only, J/m^2.
 
-    An error of the separation is one of the pressure, times the stiffness; that of the stiffness counts as it does
-    itself in the integral of the cubic through both ends of a step.
+    An error of the separation is one of the pressure, times the stiffness; that of the stiffness enters the integral as
+    the stiffness does, by the cubic through both ends of a step.
     """
     way, stiffness = np.abs(np.diff(run["mean_separation"])), run["contact_stiffness"]
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])
     separation = RESIDUAL_TOLERANCE * float(run["rms_height"])
-    return float(np.sum(way * ends * (0.5 * separation + STIFFNESS_TOLERANCE * way / 12)))
+    relative = STIFFNESS_TOLERANCE[run.attrs.get("contact_model", ASPERITIES)]
+    return float(np.sum(way * ends * (0.5 * separation + relative * way / 12)))
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
@@ -418,7 +412,7 @@ def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]
 
     Parameters
     ----------
-    solution : a dataset as `icha.references.finite_range.boundary_elements` returns it.
+    solution : a dataset as `icha.references.finite_range.finite_range_solution` returns it.
     subject : name of the solution in the findings.
     """
     findings = (*_of_solver(solution), *_identities_of_solution(solution))

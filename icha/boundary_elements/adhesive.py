@@ -12,12 +12,14 @@ from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import front_at_rest
 from icha.boundary_elements.regions import region
 from icha.boundary_elements.windows import relaxed_in_windows
-from icha.contact.failures import FullContact
+from icha.contact.failures import FullContact, NotConverged
 
 # Deviation of sqrt(G/dgamma) at which a front rests well enough to see where new contact forms.
 _NEARLY_AT_REST = 1e-3
 # The same where it is clear, and what is clear: by so much of the gap at which a cell lets go.
 _IN_SIGHT, _CLEARLY = 3e-2, 0.1
+# Rounds of new contacts: they end, but may be as many as there are cells.
+_MAX_ROUNDS = 1000
 # More of the surface than this in contact, and the rest follows.
 _NEARLY_ALL = 0.98
 
@@ -83,7 +85,7 @@ def settled(
         return relaxed_in_windows(space, front, separation, state, restless)
 
     tried = np.zeros(space.size, dtype=bool)
-    stage = 0
+    stage = rounds = 0
     while True:
         accuracy, beyond = stages[stage]
         contact = front_at_rest(space, front, topography, separation, contact, accuracy, near=near, mended=mended)
@@ -97,7 +99,9 @@ def settled(
             if stage == len(stages):
                 return contact, len(seeds)
             continue
-        stage = 0
+        stage, rounds = 0, rounds + 1
+        if rounds > _MAX_ROUNDS:
+            raise NotConverged(f"no equilibrium after {rounds - 1} rounds of new contacts")
         made = np.union1d(summits.contacts(within & ~tried[summits.cell], space.grid), new)
         tried[new] = True
         contact = contact.with_closed(made)

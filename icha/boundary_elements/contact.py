@@ -120,7 +120,8 @@ class BoundaryElements:
             new = self._pressed(state, load=control.target / self.contact_modulus)
         else:
             new = under_control(self, state, separation, control, self._at, self._events)
-        return replace(new, history=(*state.history, self._events(state, new)))
+        events = self._events(state, new)
+        return replace(new, history=(*state.history, events) if len(events) else state.history)
 
     def released(self, region: np.ndarray, separation: float) -> CellState:
         """The equilibrium at a separation (m) that a contact of a given region, (n, n) of bool, falls into."""
@@ -188,11 +189,9 @@ class BoundaryElements:
             return contact
         way = (separation - state.separation) / self.spacing
         change = state.rates[0] * way
-        if np.abs(change).max() > _NEAR:
+        if not np.abs(change).max() <= _NEAR:  # or no number
             return contact
-        fraction = np.clip(state.fraction + change, 0.0, 1.0)
-        touching = fraction > 0
-        return Contact(state.cells[touching], fraction[touching], (contact.pressure + state.rates[1] * way)[touching])
+        return contact.changed(change, state.rates[1] * way)
 
     def _at(self, state, separation, tolerance=FRONT_TOLERANCE, *, near=False, same_slopes=False):
         """The equilibrium at a separation, m; near: next to the state, same_slopes: and with its slopes."""

@@ -20,6 +20,8 @@ _ROUNDING = 5e-7
 # What a correction in single precision leaves of the error, at best and at worst; and how far below what is asked.
 _GAIN, _LEAST_GAIN, _MARGIN = 1e-4, 0.5, 0.5
 _MAX_CHANGES = 200
+# A fraction of a cell that is no contact: what its bond carries is lost in the rounding of all others.
+NOTHING = 1e-9
 # What is left of the error while cells still come and go.
 _WHILE_CHANGING = 0.1
 
@@ -44,6 +46,12 @@ class Contact:
         fraction[old], pressure[old] = self.fraction, self.pressure
         fraction[np.searchsorted(together, cells)] = 1.0
         return Contact(together, fraction, pressure)
+
+    def changed(self, fraction: np.ndarray, pressure: np.ndarray) -> Contact:
+        """The same after changes of fraction and pressure, (k,), without cells that are next to out of contact."""
+        fraction = np.clip(self.fraction + fraction, 0.0, 1.0)
+        touching = fraction > NOTHING
+        return Contact(self.cells[touching], fraction[touching], (self.pressure + pressure)[touching])
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +244,7 @@ def held(
     return Held(cells, fraction, pressure, gap, tolerance, energy, unsure, around, rim, around_rim)
 
 
-def tension(front: Front, state: Held) -> tuple[np.ndarray, np.ndarray]:
+def intensity(front: Front, state: Held) -> tuple[np.ndarray, np.ndarray]:
     """sqrt(G/dgamma): of cells in contact, (k,), which open above 1, and of those beside, (m,), which close below."""
     inside = -state.pressure / (state.fraction * front.strengths(state.around))
     return inside, state.gap.ravel()[state.rim] / (COMPLIANCE * front.strengths(state.around_rim))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from icha.boundary_elements.newton import FRONT_TOLERANCE
 from icha.boundary_elements.states import CellState
 from icha.contact.events import Events
 from icha.contact.failures import NotConverged
-from icha.contact.model import AREA_FRACTION, HELD_CELLS, PRESSURE, ContactModel, Control
+from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control
+from icha.contact.tolerances import HELD_CELLS, HELD_PART
 
 # Relative error of a held load or area.
 _HELD = 5e-10
@@ -22,8 +24,9 @@ _SAME = 1e-13
 # error so small, relatively, that slopes are the same.
 _FIRST, _TRIAL = 1e-2, 1e-3
 _SAME_SLOPES = 1e-4
-# What a load of zero is held to over E*, at least (else over the load before).
-_NO_LOAD = 1e-6
+# What a load of zero is held to, at least (else over the load before): over the stiffness times h_rms, about which the
+# attraction and repulsion are that cancel in it.
+_NO_LOAD = 1e-2
 
 
 def under_control(
@@ -46,43 +49,69 @@ def under_control(
         If it is not met.
     """
     value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
-    scale = abs(control.target) or max(abs(value(state)), _NO_LOAD * contact.contact_modulus)
-    enough = _HELD * scale
-    if control.quantity == AREA_FRACTION and not contact.adhesive:
-        enough = max(enough, HELD_CELLS * contact.spacing**2 / contact.area)
-    sign = np.sign(control.target - value(state)) or 1.0
-    short, far = state, None
+    scale, enough = _needed(contact, state, control)
+    whole = bracket = _Bracket(np.sign(control.target - value(state)) or 1.0, state)
     before, start, exact, same = state, state, False, False
+    nearest, least = state, np.inf
     for trial in range(_MAX_TRIALS):
         tolerance = FRONT_TOLERANCE if exact else _TRIAL if trial else _FIRST
         new = settle(start, separation, tolerance, near=exact, same_slopes=same)
         error = value(new) - control.target
         if exact and abs(error) <= enough:
             return new
+        if abs(error) < least:
+            nearest, least = new, abs(error)
         same = exact and abs(error) < _SAME_SLOPES * scale
         was_exact, exact = exact, abs(error) < _CLOSE * scale
-        if exact and not was_exact:
-            # As near as this the trials so far, which were not exact, bound nothing.
-            short, far = state, None
-        elif sign * error < 0:
-            short = new
-        else:
-            far = new
+        # As near as this the trials so far, which were not exact, bound nothing.
+        bracket = whole if exact and not was_exact else bracket.after(new, error)
         # Beyond the target an event may have happened that must not.
-        start = new if new is short or exact or not len(events(short, new)) else short
+        start = new if new is bracket.short or exact or not len(events(bracket.short, new)) else bracket.short
         slope = contact.slope(control.quantity, new)
         if was_exact and exact and new.separation != before.separation:
             # How cells begin to open or to close is not in the slope of an area.
             slope = (value(new) - value(before)) / (new.separation - before.separation)
         before = new
-        separation = new.separation - error / slope if slope else np.nan
-        if far is None:
-            if not np.isfinite(separation):
-                break
-            continue
-        low, high = sorted((short.separation, far.separation))
-        if high - low < _SAME * contact.rms_height:
+        expected = new.separation - error / slope if slope else np.nan
+        separation = bracket.inside(expected, _SAME * contact.rms_height)
+        if separation is None:
             break
-        if not low < separation < high:
-            separation = 0.5 * (low + high)
+    # Without adhesion every trial is an equilibrium, and few cells may be more than what is close.
+    if not contact.adhesive and least <= enough:
+        return nearest
     raise NotConverged(f"a {control.quantity.replace('_', ' ')} of {control.target:g} is not met from here")
+
+
+def _needed(contact, state, control):
+    """The scale of errors of a held quantity, and an error that is small enough."""
+    if control.target:
+        scale = abs(control.target)
+    else:
+        unit = abs(contact.stiffness(state)) * contact.rms_height
+        scale = max(abs(contact.pressure(state)), _NO_LOAD * unit)
+    enough = _HELD * scale
+    if control.quantity == AREA_FRACTION and not contact.adhesive:
+        enough = max(enough, min(HELD_CELLS * contact.spacing**2 / contact.area, HELD_PART * scale))
+    return scale, enough
+
+
+@dataclass(frozen=True, eq=False)
+class _Bracket:
+    """Two states, short of a target and, once one is known, beyond it; sign: of what is missing short of it."""
+
+    sign: float
+    short: CellState
+    far: CellState | None = None
+
+    def after(self, new, error):
+        """With one more state in the place of one of them; error: by which it is off the target."""
+        return replace(self, short=new) if self.sign * error < 0 else replace(self, far=new)
+
+    def inside(self, separation, same):
+        """The separation (m) if it lies within, else the middle; None if it is unknown or the two are the `same`."""
+        if self.far is None:
+            return separation if np.isfinite(separation) else None
+        low, high = sorted((self.short.separation, self.far.separation))
+        if high - low < same:
+            return None
+        return separation if low < separation < high else 0.5 * (low + high)

@@ -9,24 +9,25 @@ are made softer in them, which shortens the step (Levenberg and Marquardt).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from icha.boundary_elements.elasticity import Contact, Held, Topography, held, tension
+from icha.boundary_elements.elasticity import NOTHING, Contact, Held, Topography, held, intensity
 from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_weights
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.regions import adjacent, merged, region
 from icha.contact.failures import NotConverged
+from icha.contact.models import BOUNDARY_ELEMENTS
+from icha.contact.tolerances import STIFFNESS_TOLERANCE
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
 FRONT_TOLERANCE = 1e-9
 # Of the displacement in contact, over the gap at which a cell is free.
 GAP_TOLERANCE = 1e-11
-# The same on the way, over the error of the front that is to be mended, at most; and over an error of the front that
-# is enough.
-_GAP_TO_FRONT, _GAP_TO_TENSION = 1e-2, 0.02
+# The same on the way to rest, over the error of the front, at most; and at rest, over the tolerance of the front.
+_GAP_TO_FRONT, _GAP_TO_TOLERANCE = 1e-1, 0.02
 # Of the displacement, near to rest and where energies are in doubt. Relative change of an energy that is rounding.
 _NEAR, _SAME_ENERGY = 1e-5, 1e-12
 # Pressures that are found again are so much better.
@@ -34,7 +35,7 @@ _FINER = 0.03
 _MAX_STEPS = 400
 _MAX_KRYLOV = 60
 # Of the linear equations: never better than needed, and never worse.
-COARSE, FINE = 5e-2, 1e-4
+COARSE, FINE = 1e-1, STIFFNESS_TOLERANCE[BOUNDARY_ELEMENTS]
 # The rows of the front, in the preconditioner: what is left of a bond beside the half-space.
 _NET = 0.6
 # A deviation of sqrt(G/dgamma) that keeps the whole front waiting, and of how much of it. Least damping of bonds where
@@ -51,8 +52,8 @@ _SMALLEST_STEP = 0.5
 class Moving:
     """The cells that take part in a step: those in contact, and those beside it that close. Arrays of length k.
 
-    cells: rising. fraction, pressure, gap, around: of each. tension: sqrt(G/dgamma). free: whether the front there
-    would close or open.
+    cells: rising. fraction, pressure, gap, around: of each. intensity: of stress at the front over the critical one,
+    K/K_c = sqrt(G/dgamma). free: whether the front there would close or open.
     """
 
     cells: np.ndarray
@@ -60,14 +61,12 @@ class Moving:
     pressure: np.ndarray
     gap: np.ndarray
     around: np.ndarray
-    tension: np.ndarray
+    intensity: np.ndarray
     free: np.ndarray
 
     def moved(self, change: np.ndarray, pressed: np.ndarray) -> Contact:
         """The contact after changes of fraction and pressure."""
-        fraction = np.clip(self.fraction + change, 0.0, 1.0)
-        touching = fraction > 0
-        return Contact(self.cells[touching], fraction[touching], (self.pressure + pressed)[touching])
+        return Contact(self.cells, self.fraction, self.pressure).changed(change, pressed)
 
     @property
     def front(self) -> np.ndarray:
@@ -77,12 +76,12 @@ class Moving:
     @property
     def error(self) -> float:
         """Largest deviation of sqrt(G/dgamma) from 1 where the front is free to move."""
-        return float(np.max(np.abs(self.tension - 1)[self.free], initial=0.0))
+        return float(np.max(np.abs(self.intensity - 1)[self.free], initial=0.0))
 
 
 def moving(front: Front, state: Held) -> Moving:
     """The cells of a state that take part in a step."""
-    inside, outside = tension(front, state)
+    inside, outside = intensity(front, state)
     closed = region(state.cells[state.fraction >= 1], state.gap.shape).ravel()
     opening = inside > 1
     around = adjacent(state.cells[opening], state.gap.shape[-1])
@@ -132,56 +131,80 @@ def front_at_rest(
         If it is not found.
     """
     given = _Given(space, front, topography, separation, beyond)
-    enough = max(GAP_TOLERANCE, _GAP_TO_TENSION * tolerance)
+    enough = max(GAP_TOLERANCE, _GAP_TO_TOLERANCE * tolerance)
     coarse = _NEAR if near else _GAP_TO_FRONT
     state = contact if isinstance(contact, Held) else given.at(contact, max(enough, coarse))
-    damping, most_off, all_moved = 0.0, coarse, True
+    search = _Search(state, most_off=coarse)
     for number in range(most_steps or _MAX_STEPS):
+        state = search.state
         now = moving(front, state)
-        error = now.error
-        if error <= tolerance:
-            if state.off <= enough * given.reach:
+        if now.error <= tolerance:
+            if state.off <= enough * given.critical_opening:
                 return state
             # The pressures are still those of a coarse beginning, and the error theirs.
-            state = given.at(state, enough)
+            search = replace(search, state=given.at(state, enough))
             continue
-        restless = now.free & (np.abs(now.tension - 1) > _RESTLESS)
+        restless = now.free & (np.abs(now.intensity - 1) > _RESTLESS)
         part_restless = np.count_nonzero(restless) / max(np.count_nonzero(now.front), 1)
         if number == 0 and part_restless > _MANY:
-            damping = _FAR_DAMPING
-        if all_moved and 0 < part_restless <= _FEW:
-            all_moved = False
-            contact = mended(state, now.cells[restless])
-            if contact is not None:
-                new = given.at(contact, min(coarse, 0.1 * _GAP_TO_FRONT))
-                if given.is_lower(new, state):
-                    state = new
-                    continue
-        accuracy = min(COARSE, max(FINE, error))
-        step = _down(space, front, now, damping, accuracy)
-        if step is None:
-            if state.off > enough * given.reach:
-                # Or tensions of pressures that are not good enough say so.
-                state = given.at(state, max(enough, _FINER * state.off / given.reach))
-            damping = _more(damping)
-            continue
-        off = max(enough, min(most_off, error * min(_GAP_TO_FRONT, max(error, FINE))))
-        smallest = _SMALLEST_STEP if most_off <= _NEAR else 1.0
-        lower = _lower_along(given, state, now, step, off, smallest)
-        if lower is not None:
-            state, part = lower
-            if part == 1.0:
-                damping = damping / 4 if damping > 0.01 else 0.0
-            most_off, all_moved = coarse, True
-        else:
-            if most_off > _NEAR:
-                # Energies of coarse pressures are not to be trusted that far.
-                most_off = _NEAR
-                state = given.at(state, max(enough, most_off))
-            damping = _more(4 * damping)
+            search = replace(search, damping=_FAR_DAMPING)
+        if search.all_moved and 0 < part_restless <= _FEW:
+            search = _after_mending(given, search, mended(state, now.cells[restless]), coarse)
+            if search.state is not state:
+                continue
+        search = _after_one_step(given, search, now, enough, coarse)
     if most_steps:
-        return state
-    raise NotConverged(f"the front did not come to rest (sqrt(G/dgamma) is off by {error:.1e})")
+        return search.state
+    raise NotConverged(f"the front did not come to rest (sqrt(G/dgamma) is off by {now.error:.1e})")
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """How far a front on its way to rest has come.
+
+    damping: of bonds in the next step. most_off: of the displacement, over the gap at which a cell is free, at most.
+    all_moved: whether the whole front has moved since a few of its cells were mended.
+    """
+
+    state: Held
+    most_off: float
+    damping: float = 0.0
+    all_moved: bool = True
+
+
+def _after_mending(given, search, contact, coarse):
+    """The search after few cells were mended, which gave a contact or None; at its state if that is not lower."""
+    search = replace(search, all_moved=False)
+    if contact is None:
+        return search
+    new = given.at(contact, min(coarse, 0.1 * _GAP_TO_FRONT))
+    return replace(search, state=new) if given.is_lower(new, search.state) else search
+
+
+def _after_one_step(given, search, now, enough, coarse):
+    """The search after a step of Newton's, or with more damping if that leads up in energy.
+
+    enough, coarse: accuracy of the displacement at rest and far from it, over the gap at which a cell is free.
+    """
+    state, damping = search.state, search.damping
+    step = _down(given.space, given.front, now, damping, min(COARSE, max(FINE, now.error)))
+    if step is None:
+        if state.off > enough * given.critical_opening:
+            # Perhaps only since the pressures, and with them the intensities, are not good enough.
+            state = given.at(state, max(enough, _FINER * state.off / given.critical_opening))
+        return replace(search, state=state, damping=_more(damping))
+    off = max(enough, min(search.most_off, now.error * min(_GAP_TO_FRONT, max(now.error, FINE))))
+    smallest = _SMALLEST_STEP if search.most_off <= _NEAR else 1.0
+    lower = _lower_along(given, state, now, step, off, smallest)
+    if lower is not None:
+        state, part = lower
+        if part == 1.0:
+            damping = damping / 4 if damping > 0.01 else 0.0
+        return _Search(state, coarse, damping)
+    if search.most_off > _NEAR:
+        # Energies of coarse pressures are not to be trusted that far.
+        search = replace(search, state=given.at(state, max(enough, _NEAR)), most_off=_NEAR)
+    return replace(search, damping=_more(4 * damping))
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,13 +218,13 @@ class _Given:
     beyond: np.ndarray | None
 
     @property
-    def reach(self):
-        """Gap at which a cell is free, in cells."""
+    def critical_opening(self):
+        """Of a bond: the gap at which a cell is free, in cells."""
         return COMPLIANCE * self.front.strength
 
     def at(self, contact, off):
-        """A contact in elastic equilibrium; its displacement is accurate to this part of the reach."""
-        return held(self.space, self.topography, self.separation, contact, off * self.reach, self.beyond)
+        """A contact in elastic equilibrium; its displacement is accurate to this part of the critical opening."""
+        return held(self.space, self.topography, self.separation, contact, off * self.critical_opening, self.beyond)
 
     def energy(self, state):
         """Elastic energy less that of adhesion, in E* cells^3."""
@@ -212,7 +235,8 @@ class _Given:
     def is_lower(self, new, old):
         """Whether a state is not above another in energy, as far as this is known."""
         energy = self.energy(old)
-        return self.energy(new) <= energy + new.unsure + old.unsure + _SAME_ENERGY * abs(energy)
+        same = _SAME_ENERGY * abs(energy) + NOTHING * self.front.adhesion_length
+        return self.energy(new) <= energy + new.unsure + old.unsure + same
 
 
 def _lower_along(given, state, now, step, off, smallest):
@@ -235,16 +259,16 @@ def _more(damping):
 
 
 def _down(space, front, now, damping, accuracy):
-    """Newton's step if it leads down in energy, as far as tensions tell: G - dgamma against the change of contact."""
+    """Newton's step if it leads down in energy, as far as G - dgamma tells, against the change of contact."""
     change, pressed = _step(space, front, now, damping, accuracy)
-    if np.sum((now.tension**2 - 1) * change) > GAP_TOLERANCE * np.abs(change).sum():
+    if np.sum((now.intensity**2 - 1) * change) > GAP_TOLERANCE * np.abs(change).sum():
         return None
     return change, pressed
 
 
 def _step(space, front, now, damping, accuracy):
     """Newton's step: changes of fraction and pressure, (k,)."""
-    local = np.where(np.abs(now.tension - 1) > _RESTLESS, max(damping, _RUNNING), damping)
+    local = np.where(np.abs(now.intensity - 1) > _RESTLESS, max(damping, _RUNNING), damping)
     linear = Linearised(space, front, now.cells, now.front, now.fraction, now.around, local)
     # To the tension that the law wants at the present fraction, and from there with the law.
     strengths = front.strengths(now.around)
@@ -279,7 +303,13 @@ class Linearised:
         self.weights = neighbour_weights(cells[self.at_front], space.shape)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of fraction and pressure, (k,), for given right-hand sides, to a relative accuracy."""
+        """Changes of fraction and pressure, (k,), for given right-hand sides, to a relative accuracy.
+
+        Raises
+        ------
+        NotConverged
+            If they are not finite.
+        """
         size = (len(self.cells), len(self.cells))
         # Of order one, or squares of what is left at last would be nothing in single precision on flat surfaces.
         scale = 2.0 ** np.frexp(np.abs(right).max(initial=0.0))[1]
@@ -291,6 +321,8 @@ class Linearised:
             restart=_MAX_KRYLOV,
             maxiter=1,
         )
+        if not np.isfinite(solution).all():
+            raise NotConverged(f"the linear equations of {len(self.cells)} cells have no finite solution")
         pressure, _, _ = self._spread(solution)
         fraction = np.zeros(len(solution))
         fraction[self.at_front] = scale * (solution[self.at_front] / (self.front.strength or 1.0))

@@ -8,7 +8,7 @@ from icha.boundary_elements.contact import BoundaryElements
 from icha.boundary_elements.patches import centres, edges, labelled, labels_at
 from icha.boundary_elements.states import CellState
 from icha.contact.bins import PRESSURE_BINS, gap_bins
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
+from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 from icha.surfaces.surface import Surface
 
 
@@ -29,8 +29,9 @@ class PatchObservables:
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
+        events = Events.joined(state.history)
         counts = {
-            name: sum(events.count(kind) for events in state.history)
+            name: events.count(kind)
             for name, kind in (
                 ("jump_in_count", JUMP_IN),
                 ("jump_off_count", JUMP_OFF),

@@ -18,8 +18,9 @@ class CellState:
     area_slope: derivatives of nominal pressure (Pa/m) and area fraction (1/m) with the separation, fronts moving along;
     rates: those of fraction and pressure, (k,) each, per cell and in E* per cell. Residuals: front_residual, the
     largest deviation of sqrt(G/dgamma) from 1 where a front is free to move; gap_residual, the largest gap in contact
-    or overlap outside, m. history: the events of every equilibrium of the path up to here. pending: places within reach
-    of the attraction that were left open, for contact there does not hold.
+    or overlap outside, m. history: the events of the path up to here, for each
+    equilibrium that has any. pending: places within reach of the attraction that were left open, for contact there does
+    not hold.
     """
 
     separation: float
@@ -36,11 +37,12 @@ class CellState:
     history: tuple[Events, ...] = ()
 
 
-def packed(state: CellState) -> dict[str, np.ndarray]:
+def packed(state: CellState, before: CellState) -> dict[str, np.ndarray]:
     """The arrays that a state is made of, with the events since the one before."""
     arrays = {each.name: getattr(state, each.name) for each in fields(state) if each.name not in ("rates", "history")}
     arrays |= {f"rates_{k}": rate for k, rate in enumerate(state.rates or ())}
-    return arrays | {f"event_{name}": getattr(state.history[-1], name) for name in Events.__match_args__}
+    events = Events.joined(state.history[len(before.history) :])
+    return arrays | {f"event_{name}": getattr(events, name) for name in Events.__match_args__}
 
 
 def unpacked(arrays: dict[str, np.ndarray], before: CellState) -> CellState:
@@ -49,4 +51,4 @@ def unpacked(arrays: dict[str, np.ndarray], before: CellState) -> CellState:
     own = {name: value if value.ndim else value.item() for name, value in own.items()}
     rates = (arrays["rates_0"], arrays["rates_1"]) if "rates_0" in arrays else None
     events = Events(*(arrays[f"event_{name}"] for name in Events.__match_args__))
-    return CellState(**own, rates=rates, history=(*before.history, events))
+    return CellState(**own, rates=rates, history=(*before.history, events) if len(events) else before.history)

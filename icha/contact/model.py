@@ -7,8 +7,6 @@ from icha.contact.events import Events
 
 # Quantities that a solve can hold.
 PRESSURE, AREA_FRACTION = "pressure", "area_fraction"
-# Without adhesion the area of boundary elements changes by whole cells: one that is held is met to so many.
-HELD_CELLS = 2.0
 
 
 @dataclass(frozen=True)

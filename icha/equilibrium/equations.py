@@ -16,17 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.contact.model import PRESSURE, Control
+from icha.contact.tolerances import RESIDUAL_TOLERANCE, SMALLEST_LOAD
 from icha.equilibrium.control import held_value
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.sites import Sites
 from icha.half_space.interaction import Interaction
 
-# Largest equilibrium error in units of h_rms at which an equilibrium counts as found.
-RESIDUAL_TOLERANCE = 1e-9
 # Relative error of a load or an area that was asked for.
 TARGET_TOLERANCE = 1e-11
-# Of what a load is made up of, the part below which it counts as none when its error is measured.
-_SMALLEST_LOAD = 1e-4
 # One weighs as much as the other in a solve.
 _MISS_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
 # The near pairs are good for radii of an approach that is larger by so much of h_rms, and by this factor then.
@@ -39,7 +36,7 @@ class Point:
     """One evaluation of the equations.
 
     approach, a (contact radii) and error (n,), m; level (n,): the heights with which the sites would be in equilibrium,
-    m. separation, m. miss: of the held quantity, in its unit. gross: pressure by the repulsive parts of the forces
+    m. separation, m. miss: of the held quantity, in its unit. repulsion: pressure by the repulsive parts of the forces
     alone, Pa. interaction: by which the displacement was computed.
     """
 
@@ -49,7 +46,7 @@ class Point:
     level: np.ndarray
     error: np.ndarray
     miss: float
-    gross: float
+    repulsion: float
     interaction: Interaction
 
 
@@ -74,12 +71,12 @@ class Equations:
             interaction = Interaction.between(law, sites.half_space, R, largest)
         level = approach + interaction.displacement(a) + separation
         error = np.where(part, level - sites.height, 0.0)
-        miss = gross = 0.0
+        miss = repulsion = 0.0
         if self.control is not None:
             miss = held_value(problem, self.control.quantity, a[part], R[part]) - self.control.target
             if self.control.quantity == PRESSURE:
-                gross = float(np.sum(law.repulsive_force(a[part], R[part]))) / problem.area
-        return Point(approach, separation, a, level, error, miss, gross, interaction)
+                repulsion = float(np.sum(law.repulsive_force(a[part], R[part]))) / problem.area
+        return Point(approach, separation, a, level, error, miss, repulsion, interaction)
 
     def size(self, point: Point, miss_weight: float = _MISS_WEIGHT) -> float:
         """Largest error in units of h_rms, the control's relative miss with its weight."""
@@ -87,5 +84,5 @@ class Equations:
         if self.control is None:
             return size
         # A load that is next to nothing beside the attraction and repulsion that make it up is met as well as they are.
-        unit = max(abs(self.control.target), _SMALLEST_LOAD * point.gross)
+        unit = max(abs(self.control.target), SMALLEST_LOAD * point.repulsion)
         return max(size, abs(point.miss) / unit * miss_weight)

@@ -10,6 +10,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.contact.failures import NotConverged
+from icha.contact.models import ASPERITIES
+from icha.contact.tolerances import STIFFNESS_TOLERANCE
 from icha.equilibrium.control import gradient_by_radius, radius_response
 from icha.equilibrium.equations import Equations, Point
 from icha.equilibrium.sites import CONTACT
@@ -18,7 +20,6 @@ _MAX_HALVINGS = 8
 # Relative errors of the linear solves: of most, and of those repeated with the exact operator.
 _LINEAR_TOLERANCE = 3e-3
 _EXACT_TOLERANCE = 1e-6
-_RESPONSE_TOLERANCE = 1e-6
 # Largest dimension of a Krylov space.
 _KRYLOV = 50
 # Longest change of the separation in a step, in h_rms.
@@ -56,7 +57,7 @@ def response(equations: Equations, point: Point) -> np.ndarray:
     x = sites.response[part]
     for attempt in range(12):
         defect = -1.0 - x - exact(x)
-        if np.max(np.abs(defect)) <= _RESPONSE_TOLERANCE:
+        if np.max(np.abs(defect)) <= STIFFNESS_TOLERANCE[ASPERITIES]:
             full[part] = x
             return full
         operator, tolerance = (product, _LINEAR_TOLERANCE) if attempt < 8 else (exact, _EXACT_TOLERANCE)

@@ -1,5 +1,6 @@
 """Boundary elements in the limit of a short range of attraction: fronts of contact obey Griffith's criterion."""
 
+import hashlib
 import pathlib
 
 from icha.asperity.material import Material
@@ -18,7 +19,9 @@ def _observables(surface: Surface, material: Material, path: Path) -> Observable
 
 
 def _kept(contact: BoundaryElements, folder: pathlib.Path) -> Kept:
-    return Kept(contact, folder, packed, unpacked)
+    material = repr((contact.spacing, contact.law.material)).encode()
+    of = hashlib.sha256(contact.heights.tobytes() + material).hexdigest()
+    return Kept(contact, of[:32], folder, packed, unpacked)
 
 
 MODEL = Model(

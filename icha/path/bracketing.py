@@ -12,8 +12,8 @@ SAME_SEPARATION = 1e-10
 # A solve that fails in a bracket narrower than this (in h_rms) fails at a jump, where spots have infinite slopes.
 CLOSE_TO_A_JUMP = 1e-4
 _MAX_HALVINGS = 80
-# Halvings before each of which the target is tried; later only before the sixteenth, the thirty-second, ...: what was
-# not met so often mostly is in a jump.
+# Of the halvings the target is tried before the first nine; later only before the seventeenth, the thirty-third, ...:
+# what was not met so often mostly is in a jump.
 _TRIED = 8
 
 

@@ -15,7 +15,7 @@ from icha.path.targets import Target
 
 # A step that does not converge is halved down to this fraction of the longest one.
 _SMALLEST_STEP = 2.0**-14
-# So many equilibria within a longest step, without a stop, and a path does not get on.
+# So many equilibria within a longest step, without a stop, and a path makes no progress.
 _MOST_EQUILIBRIA = 2000
 
 
@@ -37,7 +37,7 @@ class Course:
     idle: int = 0
 
     def after(self, state: State, loading: bool) -> Course:
-        """After one more equilibrium; refuses to go on where the path does not get on."""
+        """After one more equilibrium; refuses to go on where the path makes no progress."""
         if abs(state.separation - self.mark) >= self.longest:
             return replace(self, mark=state.separation, idle=0)
         if self.idle == _MOST_EQUILIBRIA:

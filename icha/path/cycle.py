@@ -5,6 +5,7 @@ point. It stops at the separations of the way in, so that both can be compared; 
 steps become short enough that the work lost in it is known, whatever the longest step.
 """
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 
@@ -20,7 +21,8 @@ from icha.path.stops import SAME_EXCESS, Queue, Stop
 from icha.path.targets import LOADS, MEAN_SEPARATION, Path, Target
 from icha.path.waypoints import Waypoint, between_stops
 
-# So far above first contact a way back without adhesion ends, in h_rms: beyond the error of an equilibrium.
+# Without adhesion a way back has a station so far above first contact, in h_rms, in case the error of an equilibrium
+# leaves a spot in contact there.
 _ABOVE_CONTACT = 1e-8
 
 
@@ -61,7 +63,6 @@ def cycle(
         stops.remove(stop)
         course = course.met(stop.target, state)
         yield Waypoint(stop.target, state, 0)
-    # Without adhesion nothing touches as high up as contact was made first, but for the error of an equilibrium.
     top = () if contact.adhesive else (start.separation + _ABOVE_CONTACT * contact.rms_height,)
     stride = Stride(SHARP * contact.rms_height if contact.adhesive else longest)
     here = Position(start, stride, course, stations=top)
@@ -112,13 +113,13 @@ class _Leg:
     ) -> Generator[Waypoint, Stop | None, Position]:
         """The equilibria until all stops are met or, `apart`, nothing touches any more; returns where that is."""
         waiting, sent, visited = Queue(stops, self.direction), None, [here.state.separation]
-        here = replace(here, stride=Stride(here.stride.length))
+        here, most = replace(here, stride=Stride(here.stride.length)), np.inf
         while waiting or apart:
             if not self.loading and self._is_apart(here.state):
                 if apart:
                     return here
                 raise self._ended(here, NotConverged(_never_so_far(waiting.foremost[0], here.account)))
-            beyond, step, here = self._one_step(here)
+            beyond, step, here = self._one_step(here, most)
             try:
                 ahead = [*waiting.foremost, sent] if sent else waiting.foremost
                 stop, met = first_passed(ahead, here.state, beyond, self.direction)
@@ -133,12 +134,12 @@ class _Leg:
                         raise self._ended(here) from None
                 continue
             except NotConverged as failure:
-                here = self._with_shorter_step(here, failure)
+                here, most = self._with_shorter_step(here, abs(step.width), failure)
                 continue
             if met is not beyond:
                 step = Step.between(self.contact, here.state, met)
             here.course.require_covered(here.state, met, None if stop is sent else stop, waiting, self.loading)
-            here = self._arrived(here, met, step, first=self.number == 0 and len(visited) == 1)
+            here, most = self._arrived(here, met, step, first=self.number == 0 and len(visited) == 1), np.inf
             if self._is_worth_a_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if stop is None:
@@ -151,9 +152,9 @@ class _Leg:
             sent = yield Waypoint(stop.target, met, self.number)
         return _with_stations(here, visited) if self.loading else here
 
-    def _one_step(self, here):
-        """The next equilibrium, the step to it, and where the path is, with the step that it takes from there."""
-        width = self._to_next_station(here)
+    def _one_step(self, here, most):
+        """The next equilibrium, the step to it, at `most` so wide (m), and where the path is, with its next stride."""
+        width = min(self._to_next_station(here), most)
         try:
             beyond, step, stride = resolved(
                 self.contact, here.state, self.direction, width, here.stride, here.account, self.longest
@@ -162,12 +163,13 @@ class _Leg:
             raise self._ended(here, failure) from failure
         return beyond, step, replace(here, stride=stride)
 
-    def _with_shorter_step(self, here, failure):
+    def _with_shorter_step(self, here, width, failure):
+        """Where the path is after a step in which a stop was not met, and how wide the next one may be, m."""
         try:
-            length = halved(here.stride.length, self.longest, failure)
+            width = halved(width, self.longest, failure)
         except NotConverged:
             raise self._ended(here, failure) from failure
-        return replace(here, stride=replace(here.stride, length=length))
+        return replace(here, stride=replace(here.stride, length=min(here.stride.length, width))), width
 
     def _arrived(self, here, state, step, first):
         """Where the path is after a step, and how far it may go next; after the very `first`, as far as ever."""
@@ -190,9 +192,12 @@ class _Leg:
 
     def _to_next_station(self, here):
         """How far it is to the next separation of the way in; without one a step."""
-        apart = SAME_SEPARATION * self.contact.rms_height
-        ways = ((station - here.state.separation) * self.direction for station in here.stations)
-        return min((way for way in ways if way > apart), default=here.stride.length)
+        at, apart = here.state.separation, SAME_SEPARATION * self.contact.rms_height
+        if self.loading:
+            ahead = bisect_left(here.stations, at - apart) - 1
+        else:
+            ahead = bisect_right(here.stations, at + apart)
+        return abs(here.stations[ahead] - at) if 0 <= ahead < len(here.stations) else here.stride.length
 
     def _ended(self, here, *failures):
         return here.course.ended(here.state, self.loading, *failures)
@@ -209,5 +214,5 @@ def _never_so_far(stop, account):
     """That the surfaces come apart before a turning point; of a load, what tension they bear."""
     reason = f"the surfaces are apart before the turning point {stop.target.named()}"
     if stop.target.kind in LOADS:
-        reason += f"; the largest tension is {max(-account.lowest / stop.pressure_scale, 0.0):.4g}"
+        reason += f"; the largest tension is {max(0.0, -account.lowest / stop.pressure_scale):.4g}"
     return reason

@@ -104,15 +104,17 @@ class EnergyBalance:
 
         A step whose only events are jumps has lost its energy in them, if this is about what they would lose if their
         spots were alone, or if it is not small compared with the work; both kinds of jumps share it as if every spot
-        were alone. Otherwise, and where spots also united, jumps have lost just what their spots would lose alone. The
-        rest belongs to unions and their undoing, where there were any, and is otherwise unattributed.
+        were alone. Otherwise, where spots also united, and where one kind of jump gains what the other loses, jumps
+        have lost just what their spots would lose alone. The rest belongs to unions and their undoing, where there were
+        any, and is otherwise unattributed.
         """
         events, united = step.events, step.unites
         jump_in, jump_off = (
             float(events.energy[events.kind == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF)
         )
         ratio = step.lost / ((jump_in + jump_off) or np.inf)
-        if not united and ratio and (0.5 < ratio < 2 or abs(step.lost) > _PLAIN_LOSS * abs(step.work)):
+        plain = 0.5 < ratio < 2 or abs(step.lost) > _PLAIN_LOSS * abs(step.work)
+        if not united and ratio and plain and jump_in * jump_off >= 0:
             scale = step.lost / (jump_in + jump_off)
             jump_in, jump_off = scale * jump_in, scale * jump_off
         rest = step.lost - jump_in - jump_off

@@ -11,16 +11,18 @@ from icha.contact.model import ContactModel, State
 from icha.path.bracketing import CLOSE_TO_A_JUMP
 from icha.path.course import halved
 from icha.path.energy_balance import Step
-from icha.path.limits import UNRESOLVED_LOSS
+from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS
 
 # Where nothing jumps, the part of the work so far that may be unknown after a step.
 UNRESOLVED_WORK = 2e-4
 # Unions and their undoing are found within this part of the longest step.
 UNITING_STEP = 1 / 16
 # Of the work so far, the part by which the pressure's curvature may matter in a step without events, unless work and
-# energy agree within the other one.
+# energy agree to UNBALANCED_WORK.
 _ROUGH_WORK = 1e-4
-_BALANCED_WORK = 3e-6
+# A loss that is less than this part of the work is known no better than one that is as large: fronts of boundary
+# elements lose such parts in hops from cell to cell, which no short step resolves.
+_LEAST_LOSS = 1e-2
 # The first contact is made and the last one broken within this change of separation, in h_rms.
 SHARP = 1e-12
 # Of the largest tension so far, the part by which it may be missed between two equilibria: at an event, and else.
@@ -81,8 +83,8 @@ def resolved(
         try:
             beyond = _equilibrium(contact, start, start.separation + direction * width, collective)
         except NotConverged as failure:
-            stride = replace(stride, length=halved(stride.length, longest, failure))
-            width = min(0.5 * width, stride.length)
+            width = halved(width, longest, failure)
+            stride = replace(stride, length=min(stride.length, width))
             continue
         step = Step.between(contact, start, beyond)
         settled = replace(stride, event_at=np.inf) if step.sudden else stride
@@ -110,17 +112,14 @@ def _equilibrium(contact, start, separation, collective):
         if separation > start.separation and contact.is_unstable(beyond):
             raise NotConverged("spots would come closer as the surfaces part: an unstable equilibrium")
         return beyond
-    except NotConverged:
-        if not collective:
-            raise
-    count = 1
-    while True:
+    except NotConverged as failure:
+        last, count = failure, 1
+    while collective and count <= contact.spot_count(start):
         try:
             return contact.equilibrium(start, separation, let_go=count)
-        except NotConverged:
-            count *= 2
-            if count > contact.spot_count(start):
-                raise
+        except NotConverged as failure:
+            last, count = failure, 2 * count
+    raise last
 
 
 def _is_work_known(contact, beyond, step, account, longest):
@@ -134,8 +133,9 @@ def _is_work_known(contact, beyond, step, account, longest):
         return False
     scale = effort
     if step.width > 0 and contact.pressure(beyond) < 0:
-        scale = min(effort, 10 * account.jumped)  # there is no way in here that has the same error
-    unbalanced = step.roughness > _ROUGH_WORK * scale and abs(step.lost) > _BALANCED_WORK * scale
+        # There is no way in here that has the same error.
+        scale = min(effort, max(10 * account.jumped, _LEAST_LOSS * effort))
+    unbalanced = step.roughness > _ROUGH_WORK * scale and abs(step.lost) > UNBALANCED_WORK * scale
     return step.sudden or not unbalanced or abs(step.width) <= longest / 256
 
 

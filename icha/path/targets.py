@@ -58,7 +58,8 @@ class Path:
         met. None: the last stop of the list.
     turning_points : pairs (kind, value) at which the path turns after its last stop: the first ends unloading, the
         second loading, and so on. Kinds as for snapshots; loads may be tensile (negative) or zero.
-    unload : whether the path ends with complete separation, met by the stops once more on the way.
+    unload : whether the path ends with complete separation, met by the stops once more on the way, but for those above
+        first contact.
     control : "separation": the mean separation is imposed. "load": the load is; the state runs along the same curve
         and jumps, at constant load, where it would have to turn back. Then all stops and turning points are loads.
     united_until : how long united spots stay united on the way back: "overlap", where the two spots that they were
@@ -181,7 +182,10 @@ def _turns(turning_points, last):
         tensile = kind in LOADS and k % 2 == 0
         value = (NUMBER if tensile else STATES[kind]).checked(label, value)
         if tensile and 0 < abs(value) < LEAST_PRESSURE and kind == REDUCED_PRESSURE:
-            raise ValueError(f"{label}: {value!r} is next to no load; allowed: 0, or at least {LEAST_PRESSURE:g} of it")
+            raise ValueError(
+                f"{label}: {value!r} is next to no load; allowed: 0, or an absolute value of at least "
+                f"{LEAST_PRESSURE:g}"
+            )
         if kind == before.kind:
             opened = value > before.value if kind == MEAN_SEPARATION else value < before.value
             if value == before.value or opened != (k % 2 == 0):

@@ -159,7 +159,7 @@ def contact_state(
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable[[str], None] | None = None,
 ) -> NodalState:
-    """The state of which `boundary_elements` makes a dataset, node by node; arguments and errors are the same."""
+    """The state of which `finite_range_solution` makes a dataset, node by node; arguments and errors are the same."""
     target = POSITIVE.checked("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
     say = progress or silent
     fine = resolved(surface, material, refinement, say)
@@ -183,7 +183,7 @@ def states_at_mean_separations(
     Parameters
     ----------
     mean_separations : m, positive, in any order: up and down show hysteresis.
-    surface, material, refinement, tolerance, progress : as for `boundary_elements`.
+    surface, material, refinement, tolerance, progress : as for `finite_range_solution`.
 
     Raises
     ------

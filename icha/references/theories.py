@@ -31,7 +31,7 @@ def reference_dataset(
     ----------
     spectrum : of the surface; without one (a measured surface) there is no Persson theory of its separation and
         stiffness.
-    moments : of the surface at any rms slope; without them there are no theories of separate summit_theories.
+    moments : of the surface at any rms slope; without them there are no theories of separate summits.
     adhesive : the materials with adhesion that lie against it, by rms slope and name: a curve of Fuller & Tabor each.
     reduced_pressures : p/(E* h'_rms), increasing and positive.
     attrs : further global attributes.

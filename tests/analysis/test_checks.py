@@ -8,6 +8,9 @@ import small_campaign as small
 import icha
 from icha.analysis.checks import (
     Check,
+    _error_of_work,
+    _met_one_way,
+    _Run,
     check_campaign,
     check_run,
     check_solution,
@@ -19,6 +22,7 @@ from icha.analysis.checks import (
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.references.finite_range import finite_range_solution
+from icha.references.one_asperity import paraboloid
 
 
 def failed(run):
@@ -106,6 +110,16 @@ def test_runs_that_come_back_pass(material):
     assert float(run["hysteresis_loss"]) > 0 or material == "hertz"
 
 
+@pytest.mark.parametrize("tabor", [0.8, 1.1])
+def test_a_path_that_ends_in_contact_may_have_gained_energy_in_its_jumps(tabor):
+    """Where the range is long the jump into contact is uphill; the jump off it, which loses more, is still to come."""
+    turns = [("reduced_pressure", 5e-4), ("reduced_pressure", 1e-3)]
+    material, path = icha.Material(1.0, 1.0, 1 / tabor), icha.Path([1e-3], turning_points=turns)
+    run = icha.simulate(paraboloid(32, 16.0), material, path)
+    assert float(run["dissipated_by_jump_in"][-1]) < 0
+    assert failed(run) == set()
+
+
 CYCLE_DAMAGES = {
     "targets": scaled("mean_separation", 1 + 1e-6, -1),
     "finite": written("work", np.nan, 3),
@@ -144,6 +158,40 @@ def test_the_way_back_need_not_rise_but_the_way_in_must():
     assert float(run["contact_area_fraction"].diff("step").min()) < 0
     run["contact_area_fraction"].values[1] *= 1e-3
     assert "area rises" in failed(run)
+
+
+def test_next_to_no_load_is_met_as_well_as_what_it_is_made_up_of():
+    """With adhesion a load may be the small difference of two large ones, which are about stiffness times h_rms."""
+    run = small.run(material="soft").copy(deep=True)
+    whole = abs(float(run["contact_stiffness"][0])) * float(run["rms_height"])
+    unit = float(run["contact_modulus"]) * float(run["rms_slope"])
+    run["step_kind"].values[0] = "reduced_pressure"
+    run["step_target"].values[0] = 1e-9 * whole / unit
+    # A load below a ten thousandth of both counts as none, and the error of one is measured against that.
+    for part, known in ((0.5e-8, True), (2e-8, False)):
+        run["reduced_pressure"].values[0] = run["step_target"].values[0] + 1e-4 * part * whole / unit
+        assert ("targets" not in failed(run)) == known
+
+
+def bare_run(separations, legs, stiffness=0.0, model="asperities"):
+    """What the errors of the work are made of, with an h_rms of 1 m."""
+    values = {"mean_separation": np.array(separations), "leg": np.array(legs), "rms_height": np.array(1.0)}
+    return _Run(values | {"contact_stiffness": np.full(len(legs), stiffness)}, {}, {"contact_model": model})
+
+
+def test_separations_that_only_the_way_back_meets_are_counted():
+    assert _met_one_way(bare_run([3.0, 2.0, 1.0, 2.0, 3.0], [0, 0, 0, 1, 1])) == 0
+    # To ten times the error of an equilibrium two are the same; turning points have their own.
+    assert _met_one_way(bare_run([3.0, 2.0, 1.0, 2.0 + 5e-9, 2.5, 2.0, 3.0], [0, 0, 0, 1, 1, 2, 3])) == 1
+    assert _met_one_way(bare_run([3.0, 2.0, 1.0, 0.5, 1.5, 3.5], [0, 0, 0, 1, 1, 1])) == 3
+
+
+def test_the_error_of_the_work_is_that_of_separations_and_stiffnesses():
+    """The integral of the cubic over a step: w (p + q)/2 + w^2 (k - l)/12, all p off by 1e-9 k, and all k by a part."""
+    for model, part in (("asperities", 1e-6), ("boundary_elements", 1e-4)):
+        run = bare_run([3.0, 1.0, 0.5], [0, 0, 0], stiffness=7.0, model=model)
+        expected = 7.0 * 1e-9 * 2.5 + 2 * 7.0 * part * (2.0**2 + 0.5**2) / 12
+        assert _error_of_work(run) == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_union_may_take_load_from_a_step_but_not_from_a_stop():

@@ -10,9 +10,14 @@ import numpy as np
 import pytest
 
 import icha
+from icha.analysis.checks import check_run
+from icha.boundary_elements import adhesive
+from icha.boundary_elements.contact import BoundaryElements
 from icha.boundary_elements.elasticity import solve_bonds
 from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.newton import Linearised
 from icha.contact.failures import NotConverged
+from icha.contact.tolerances import HELD_CELLS
 from icha.references.short_range.against_finite_range import towards_short_range, without_adhesion
 from icha.references.short_range.rough_contacts import HARD, SOFT, by_cells_per_wave, by_steps, loop, rough, symmetries
 
@@ -68,22 +73,16 @@ def test_attraction_of_shorter_and_shorter_range_tends_to_the_limit():
         assert near < far
 
 
-def test_contacts_of_flat_surfaces_are_those_of_steep_ones():
-    """Heights in any unit, with energy and range of the attraction that go along."""
-    steep, found = rough(48, 6), []
-    for factor in (1.0, 1e-12):
-        surface = icha.Surface(steep.heights * factor, steep.period)
-        material = icha.Material(25e6, 0.05 * factor**2, 2e-9 * factor)
-        run = icha.simulate(surface, material, icha.Path([1e-2]), model="boundary_elements")
-        found.append([float(run[name][0]) for name in ("contact_area_fraction", "reduced_separation")])
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-7)
+# Small grids are worked on by blocks and threads, as large ones are.
+BY_THREADS = "import runpy; from icha.boundary_elements import kernel; kernel._CACHE, kernel._LARGE = 1000, 0; "
+BY_THREADS += "runpy.run_module('icha.references.short_range.rough_contacts', run_name='__main__')"
 
 
 def test_threads_change_no_byte():
     digests = set()
     for threads in ("1", "2"):
         environment = os.environ | {"OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
-        command = [sys.executable, "-m", "icha.references.short_range.rough_contacts", "64"]
+        command = [sys.executable, "-c", BY_THREADS, "64"]
         run = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True)
         digests.add(json.loads(run.stdout))
     assert len(digests) == 1
@@ -122,3 +121,48 @@ def test_pressures_that_are_no_numbers_end_in_a_failure():
     cells, nothing = np.arange(64), np.zeros(64)
     with pytest.raises(NotConverged, match="pressures at a given contact were not found"):
         solve_bonds(HalfSpace.of(8), cells, nothing, np.full(64, np.nan), nothing, 1e-9)
+
+
+def test_an_area_of_few_cells_is_met_to_two_of_them():
+    """Without adhesion the area changes by whole cells, one at a time where contact is small."""
+    surface = rough(64, 8)
+    areas = [0.005, 0.02, 0.05]
+    run = icha.simulate(surface, HARD, icha.Path(area_fractions=areas), model="boundary_elements")
+    cells = np.abs(run.contact_area_fraction - areas) * surface.grid**2
+    assert cells.max() <= HELD_CELLS
+    assert not [check for check in check_run(run) if not check.passed]
+    # Two cells are not a part of one.
+    with pytest.raises(icha.ConvergenceError, match="lies inside a jump") as caught:
+        icha.simulate(surface, HARD, icha.Path(area_fractions=[1e-4, 0.02]), model="boundary_elements")
+    assert caught.value.dataset.step_target == [0.02]
+
+
+@pytest.mark.parametrize("slope", [1.0, 1e-6, 1e-9])
+def test_no_load_is_as_little_on_flat_surfaces_as_on_steep_ones(slope):
+    steep = rough(48, 6)
+    factor = slope / steep.rms_slope
+    surface = icha.Surface(steep.heights * factor, steep.period)
+    material = icha.Material(25e6, 0.02 * factor**2, 2e-9 * factor)
+    path = icha.Path([1e-2], turning_points=[("reduced_pressure", 0.0)])
+    run = icha.simulate(surface, material, path, model="boundary_elements")
+    assert not [check for check in check_run(run) if not check.passed]
+
+
+def test_as_many_rounds_of_new_contacts_as_there_are_cells_are_not_waited_for(monkeypatch):
+    monkeypatch.setattr(adhesive, "_MAX_ROUNDS", 0)
+    with pytest.raises(icha.ConvergenceError, match="no equilibrium after 0 rounds of new contacts"):
+        icha.simulate(rough(64, 8), SOFT, icha.Path([1e-2]), model="boundary_elements")
+
+
+def test_a_state_that_is_no_number_is_not_gone_on_from():
+    contact = BoundaryElements.of(rough(48, 6), SOFT)
+    state = contact.equilibrium(contact.untouched(), 2.0 * contact.rms_height)
+    unknown = np.full(len(state.cells), np.nan)
+    cells = (state.cells, state.fraction, state.around)
+    linear = Linearised(contact.space, contact.front, cells[0], state.fraction < 1, *cells[1:], np.zeros(len(cells[0])))
+    with pytest.raises(NotConverged, match=rf"the linear equations of {len(unknown)} cells have no finite solution"):
+        linear.solve(unknown, 1e-4)
+    # Rates that are no numbers predict nothing.
+    lost = dataclasses.replace(state, rates=(unknown, unknown))
+    further = contact.equilibrium(lost, 0.999 * state.separation)
+    assert np.isfinite(further.pressure).all()

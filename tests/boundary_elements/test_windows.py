@@ -55,7 +55,7 @@ def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_mov
     fraction = np.where(near, 1.0, state.fraction)
     disturbed = held(contact.space, contact.topography, u, Contact(state.cells, fraction, pressure), 1e-9 * reach)
     before = moving(contact.front, disturbed)
-    restless = before.cells[before.free & (np.abs(before.tension - 1) > 0.03)]
+    restless = before.cells[before.free & (np.abs(before.intensity - 1) > 0.03)]
     assert len(restless) and before.error > 0.1
 
     mended = module.relaxed_in_windows(contact.space, contact.front, u, disturbed, restless)

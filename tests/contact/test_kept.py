@@ -55,6 +55,21 @@ def test_a_path_that_was_stopped_goes_on_to_the_same_last_bit(monkeypatch, case,
     assert followed(monkeypatch, case, prepared(folder, "another"), None)[1] == needed
 
 
+def test_what_was_kept_of_another_path_is_never_taken_for_this_ones(tmp_path, monkeypatch):
+    folder = prepared(tmp_path / "kept", "another path")
+    (folder / "00000.npz").write_bytes(b"an equilibrium of the other path")
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("os.unlink", refuse)
+        with pytest.raises(PermissionError):
+            prepared(folder, "this path")
+    prepared(folder, "this path")
+    assert [file.name for file in folder.iterdir()] == ["of.txt"]
+
+
 def test_what_is_damaged_is_looked_for_again(monkeypatch, tmp_path):
     folder = prepared(tmp_path / "kept", "this path")
     whole, _ = followed(monkeypatch, "areas", folder, None)
@@ -64,3 +79,23 @@ def test_what_is_damaged_is_looked_for_again(monkeypatch, tmp_path):
     again, needed = followed(monkeypatch, "areas", folder, None)
     assert needed == 2
     assert_identical(again, whole)
+
+
+def test_of_another_contact_or_path_nothing_is_found_but_what_both_share(monkeypatch, tmp_path):
+    """A folder may be given by hand: what it has of other calls must not be taken for what is asked for."""
+    folder = tmp_path / "kept"
+    material, path = PATHS["areas"]
+    followed(monkeypatch, "areas", folder, None)
+    monkeypatch.setitem(PATHS, "stiffer", (Material(2e6, 0.02, 1e-8), path))  # jumps in at the same separation
+    monkeypatch.setitem(PATHS, "other way", (material, Path(area_fractions=[0.07, 0.1])))
+    # The first step of the other way is the same.
+    for case, same in (("stiffer", 0), ("other way", 1)):
+        expected, needed = followed(monkeypatch, case, None, None)
+        found, computed = followed(monkeypatch, case, folder, None)
+        assert_identical(found, expected)
+        assert computed == needed - same
+
+
+def test_asperities_keep_nothing(tmp_path):
+    with pytest.raises(ValueError, match=r"^kept: equilibria of the model asperities cannot be kept"):
+        simulate(SURFACE, *PATHS["areas"], kept=tmp_path)

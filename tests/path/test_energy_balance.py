@@ -37,8 +37,9 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.events import JUMP_IN, JUMP_OFF
+from icha.contact.events import JUMP_IN, JUMP_OFF, Events
 from icha.path import resolution
+from icha.path.energy_balance import EnergyBalance, Step
 from icha.path.limits import DEFAULT_STEP
 
 LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
@@ -292,3 +293,13 @@ def test_steps_of_a_lone_asperity_do_not_matter():
     for step in (0.05, 0.5):
         waypoints = travelled(contact, [0.01], unload=True, max_step=step)
         assert lost(contact, waypoints)[0] == pytest.approx(exact, rel=5e-4)
+
+
+@pytest.mark.parametrize("gained_and_lost", [(-1.0, 1.0001), (1.0001, -1.0)])
+def test_jumps_that_nearly_cancel_lose_no_more_than_each_alone(gained_and_lost):
+    """Where the range is long a jump into contact may be uphill; the two are not a share of what the step loses."""
+    events = Events(np.array([JUMP_IN, JUMP_OFF]), np.zeros((2, 2)), np.ones(2, int), np.array(gained_and_lost))
+    step = Step(0.1, work=0.6, gained=0.1, pressure_jump=0.0, roughness=0.0, sudden=True, events=events)
+    balance = EnergyBalance().after(contact_of([HEIGHT], period=1.0), step)
+    assert (balance.jump_in, balance.jump_off) == pytest.approx(gained_and_lost)
+    assert balance.lost == pytest.approx(0.5)

@@ -48,18 +48,21 @@ def test_next_to_no_load_is_refused_in_units_of_the_slope():
 
 
 @pytest.mark.parametrize("strength", [0.0, 1e-2])
-@pytest.mark.parametrize("modulus", [1e-6, 1e12])
-@pytest.mark.parametrize(("height", "period"), [(1e-14, 1e-12), (1e-6, 1e-12), (1.0, 1e8), (1e8, 1e8)])
+@pytest.mark.parametrize("modulus", [1e-9, 1e15])
+@pytest.mark.parametrize(("height", "period"), [(1e-24, 1e-24), (1e-22, 1e-24), (1.0, 1e9), (2e8, 1e9)])
 def test_at_the_ends_of_the_ranges_runs_are_finite_and_pass_their_checks(height, period, modulus, strength):
     surface = Surface(height * WAVES, period)
     energy = strength * modulus * surface.rms_height**1.5 * surface.rms_curvature**0.5
     with np.errstate(over="raise", invalid="raise", divide="raise"):
         for path in (Path([1e-12, 1e-2], unload=True), Path(area_fractions=[1e-9, 1e-2])):
             try:
-                run = simulate(surface, Material(modulus, energy, 1e-2 * max(height, 1e-13)), path)
+                run = simulate(surface, Material(modulus, energy, 1e-2 * max(height, 1e-22)), path)
             except ConvergenceError as error:
+                # With adhesion these surfaces are sticky: the larger area is not reached.
+                assert strength and not path.unload and "the surface is sticky" in str(error)
                 run = error.dataset
-            assert [check.name for check in check_run(run) if not check.passed] in ([], ["steps"])
+                assert run.sizes["step"] == 1
+            assert not [check for check in check_run(run) if not check.passed]
 
 
 def test_a_path_that_does_not_get_on_ends_and_says_so(monkeypatch):

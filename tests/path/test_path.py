@@ -7,7 +7,7 @@ from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, 
 from icha.analysis.checks import check_run
 from icha.asperity.jkr import JKR
 from icha.contact.failures import NotConverged
-from icha.equilibrium.equations import RESIDUAL_TOLERANCE
+from icha.contact.tolerances import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.path.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
@@ -118,18 +118,22 @@ def test_stops_are_met_in_the_order_of_the_path(surface):
     assert run.snapshot_target.values.tolist() == [2.4 * surface.rms_height, 4e-3, 0.15]
 
 
-def test_a_stop_inside_a_jump_is_met_exactly_all_the_same(surface):
-    # The first contact with adhesion jumps to a finite area; a smaller area is asked for.
+def test_a_stop_inside_a_jump_is_met_on_the_branch_beyond_as_far_as_that_reaches_back(surface):
+    """The first contact with adhesion jumps to a finite area, which shrinks to jump-off as the surfaces part again."""
     contact = contact_of(surface, ADHESIVE)
     first = contact.equilibrium(contact.untouched(), contact.untouched().separation * (1 - 1e-9))
     jumped = contact.area_fraction(first)
     assert contact.pressure(first) < 0
-    try:
-        run = simulate(surface, ADHESIVE, Path(area_fractions=[0.9 * jumped]))
-    except ConvergenceError as error:
-        assert error.dataset.sizes["step"] == 0
-    else:
-        assert float(run.contact_area_fraction[0]) == pytest.approx(0.9 * jumped, rel=1e-9)
+    R, a = first.spots.radius_of_curvature[0], first.spots.contact_radius[0]
+    smallest = (contact.law.jump_off_radius(R) / a) ** 2
+    assert 0.1 < smallest < 0.5
+    for part in (0.9, 0.5):
+        run = simulate(surface, ADHESIVE, Path(area_fractions=[part * jumped]))
+        assert float(run.contact_area_fraction[0]) == pytest.approx(part * jumped, rel=1e-9)
+        assert int(run.spot_count[0]) == 1 and float(run.mean_separation[0]) > contact.untouched().separation
+    with pytest.raises(ConvergenceError, match="lies inside a jump") as caught:
+        simulate(surface, ADHESIVE, Path(area_fractions=[0.1 * jumped]))
+    assert caught.value.dataset.sizes["step"] == 0
 
 
 def test_the_path_starts_where_the_first_asperity_makes_contact(surface):

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from few_asperities import (
+    BARE,
     FAR,
     HEIGHT,
     JUMP_OFF_APPROACH,
@@ -42,8 +43,10 @@ import icha
 from icha import Material, Path
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
 from icha.contact.failures import NotConverged
+from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.path.limits import MAX_REDUCED_PRESSURE
+from icha.path.resolution import Account, Stride, resolved
 from icha.path.targets import LOAD_CONTROL
 from icha.references.one_asperity import paraboloid
 from icha.surfaces.summits import find_summits
@@ -393,3 +396,52 @@ def test_a_tension_that_is_never_reached_is_said_to_be_so():
     path = Path(reduced_pressures=[0.005], turning_points=[("reduced_pressure", -0.1)])
     with pytest.raises(NotConverged, match=r"apart before the turning point reduced_pressure = -0.1; the largest"):
         list(follow(contact, path, 1e3 / FAR**2))
+
+
+@pytest.mark.parametrize("load", [7e-4, 1.1e-3, 1.3e-3, 2e-3, 3e-3])
+def test_under_load_no_stop_is_lost_at_the_load_of_another(load):
+    """Equilibria are found to some 1e-11 of their load: of two at the same, the second may have a little less."""
+    surface = paraboloid(32, 16.0)
+    snapshots = [("relative_load", load * surface.rms_slope)]
+    path = Path([load, 2 * load], snapshots=snapshots, unload=True, control="load")
+    run = icha.simulate(surface, Material(1.0, 0.0, 1.0), path)
+    asked = sorted(str(kind) for kind in run.step_kind.values[run.leg.values == 0] if kind != "path")
+    assert asked == ["reduced_pressure", "reduced_pressure", "relative_load"]
+    assert "relative_load" in run.snapshot_kind.values
+
+
+class Touchy(InteractingAsperities):
+    """On the way back it finds no equilibrium in a step of some lengths, in m, nor a load farther away than some."""
+
+    lengths, farthest = (0.0, 0.0), np.inf
+
+    def equilibrium(self, state, separation, control=None, *, let_go=0):
+        way, (least, most) = separation - state.separation, self.lengths
+        if least < way < most or (control and way > self.farthest):
+            raise NotConverged("on purpose")
+        return super().equilibrium(state, separation, control, let_go=let_go)
+
+
+def touchy(lengths, farthest=np.inf):
+    one = contact_of([HEIGHT], material=BARE)
+    contact = Touchy(one.law, one.asperities, one.rms_height)
+    object.__setattr__(contact, "lengths", lengths)
+    object.__setattr__(contact, "farthest", farthest)
+    return contact
+
+
+@pytest.mark.parametrize("stride", [1.5, 1e-4])
+def test_a_step_that_fails_is_halved_whatever_the_one_before(stride):
+    contact = touchy((0.6, np.inf))
+    start = contact.equilibrium(contact.untouched(), HEIGHT - 3.0)
+    beyond, step, _ = resolved(contact, start, 1, 1.0, Stride(stride), Account(), 1.5)
+    assert step.width == pytest.approx(0.5) and beyond.separation == start.separation + step.width
+
+
+def test_a_load_that_is_not_met_before_a_station_is_met_in_shorter_steps():
+    """The next station, 0.75 away, is reached at once, but nothing half way there, nor the load from so far."""
+    contact = touchy((0.3, 0.6), farthest=0.3)
+    turn = ("reduced_pressure", 4 / 3 * 2.5**1.5 / 1e3)  # Hertz's force at an approach of 2.5
+    waypoints = travelled(contact, None, mean_separations=[HEIGHT - 3.0], turning_points=[turn], max_step=0.15)
+    assert waypoints[-1].leg == 1
+    assert HEIGHT - waypoints[-1].state.separation == pytest.approx(2.5, abs=1e-6)

@@ -39,8 +39,8 @@ def let_go(search: Search, separation: float, count: int) -> Search:
 
 def _broken(search, off):
     """Without the contact of spots (n,). Asperities of united ones fall back, if they have not done so here before;
-    the others may not come back at this separation. Who has jumped in on the way here has not: there is no such
-    equilibrium."""
+    the others may not come back at this separation. An asperity that jumped in during this search and lets go again was
+    never in contact."""
     sites, law = search.sites, search.problem.law
     came = np.isin(sites.asperity, search.jumped_in) & off
     spots = np.flatnonzero(off & ~came)
