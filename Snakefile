@@ -1,12 +1,13 @@
 # ICHA: adhesive rough contact by interacting and coalescing asperities.
 # One configuration file is one campaign: config/config.yaml, or that of --configfile. See config/README.md.
 
+import os
 import sys
-import sysconfig
 
-# What is installed goes before files of the same name that lie here or in the working directory.
-INSTALLED = tuple(map(sysconfig.get_path, ("stdlib", "purelib", "platlib")))
-sys.path.sort(key=lambda folder: not folder.startswith(INSTALLED))
+# Files that lie here or in the working directory go after all else of their names, unless PYTHONPATH asks for them.
+HERE = {os.path.realpath(workflow.basedir), os.path.realpath("")}
+ASKED = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+sys.path.sort(key=lambda folder: os.path.realpath(folder) in HERE and folder not in filter(None, ASKED))
 
 from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import min_version
@@ -48,6 +49,8 @@ onstart:
     here.refuse_unwritable()
     if DeploymentMethod.CONDA not in workflow.deployment_settings.deployment_method:
         here.refuse_without(missing_software(CAMPAIGN))
+    here.own()
+    here.remove_left_over()
     origin.claim()
     origin.note_versions()
 

@@ -233,7 +233,7 @@ class Reference:
         wrong = [f"{path} differs" for path in self.contents if path in there and there[path] != self.contents[path]]
         wrong += [f"{path} is missing" for path in self.contents if path not in there]
         wrong += [f"{path} is not of the campaign" for path in there if path not in self.contents]
-        rests = [*place.results.rglob("*.part"), *place.results.rglob(".*.probe")]
+        rests = place.results.rglob("*.part")
         return [*wrong, *(f"{rest.relative_to(place.results)} is left" for rest in rests)]
 
     def goes_on(self, place: Place, way: str = "snakemake") -> list[str]:

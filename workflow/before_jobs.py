@@ -113,10 +113,6 @@ class Campaign:
         """Look at the folder `results`; a dry run changes nothing."""
         self.results, self.dry_run = results, dry_run
         self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
-        if not (dry_run or self._other):
-            # Before anything is looked at: what an earlier call has left running must not change it any more.
-            with contextlib.suppress(OSError):  # where nothing can be written nothing will be computed
-                take_over(f".snakemake/{Path(results).name}.owner")
         not_whole = checksums.damaged(results)
         unknown = dict(_of_unknown_origin(results))
         if self._other and (not_whole or unknown):
@@ -140,8 +136,8 @@ class Campaign:
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
         """Have results made again that are not those of what is asked for, where Snakemake does not see it.
 
-        It compares with its own records, which may be gone, or be those of another file than is there: of one that was
-        restored from a backup. Whatever else it makes again, it sees for itself.
+        It compares what is asked for with its own records, which may be gone, or be those of another file than is
+        there: of one that was restored from a backup. Of inputs it sees times, and not content.
 
         Parameters
         ----------
@@ -154,7 +150,7 @@ class Campaign:
             (os.path.relpath(path, self.results) for path in paths),
             lambda path: _asked_now(rules, f"{self.results}/{path}"),
         )
-        unseen = [(path, why) for path, why in found if not self._is_seen(path)]
+        unseen = [(path, why) for path, why in found if why != checksums.OTHER_SETTINGS or not self._is_seen(path)]
         if not unseen:
             return
         if self._other:
@@ -165,8 +161,8 @@ class Campaign:
             except OSError as error:
                 raise SystemExit(_unwritable(".snakemake", error.strerror)) from None
         first, why = unseen[0]
-        others = f"; and {len(unseen) - 1} more results, for such reasons" if len(unseen) > 1 else ""
-        text = f"to be made again: {self.results}/{first}, for {why}{others}"
+        others = f" and {len(unseen) - 1} more results" if len(unseen) > 1 else ""
+        text = f"to be made again: {self.results}/{first} ({why}){others}"
         logger.warning(text, extra={"remark": text})
 
     def _is_seen(self, path):
@@ -192,6 +188,22 @@ class Campaign:
         text = f"{why}, to be made again: {file}{aside}"
         logger.warning(text, extra={"remark": text})
 
+    def own(self) -> None:
+        """Own the results from now on, with jobs to start: what an earlier call has left running changes none of them.
+
+        A call that only reports takes nothing from jobs that run. So what one of those has done since the results were
+        looked at is looked for once more.
+        """
+        try:
+            take_over(f".snakemake/{Path(self.results).name}.owner")
+        except OSError as error:
+            raise SystemExit(_unwritable(".snakemake", error.strerror)) from None
+        if changed := checksums.damaged(self.results):
+            raise SystemExit(
+                f"{self.results}/{changed[0]} has changed since the results were looked at, maybe by a job of an "
+                f"earlier call. Nothing was computed; give the same command again."
+            )
+
     def refuse_second(self) -> None:
         """End the program with a message if another one runs the campaign."""
         if self._other:
@@ -216,9 +228,13 @@ class Campaign:
                 reason = error
             if reason is not None:
                 raise SystemExit(_unwritable(folder, reason.strerror))
-        for folder, _, names in os.walk(self.results):
+        for folder, _, _ in os.walk(self.results):
             if not os.access(folder, os.W_OK | os.X_OK):
                 raise SystemExit(_unwritable(folder, "Permission denied"))
+
+    def remove_left_over(self) -> None:
+        """Remove what killed programs have left among the results, which are this call's own by now."""
+        for folder, _, names in os.walk(self.results):
             for name in filter(is_left_over, names):
                 Path(folder, name).unlink(missing_ok=True)
 

@@ -6,6 +6,7 @@ from snakemake.logging import logger
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import Configuration, load_configuration
+from icha.support.printable import printable, printable_lines
 
 DEFAULT = "config/config.yaml"
 
@@ -26,9 +27,9 @@ def campaign_configuration(workflow) -> Configuration:
             files[0] if files else _as_given(Path(workflow.basedir, DEFAULT)), dict(settings.config)
         )
     except ConfigurationError as error:
-        raise SystemExit(f"The configuration cannot be run:\n{error}") from None
+        raise SystemExit(f"The configuration cannot be run:\n{printable_lines(error)}") from None
     for warning in configuration.warnings:
-        logger.warning(f"Warning: {warning}")
+        logger.warning(f"Warning: {printable(warning)}")
     return configuration
 
 

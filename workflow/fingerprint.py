@@ -16,6 +16,8 @@ from pathlib import Path
 from syntax import syntax_of
 
 PACKAGE = "icha"
+# What surrounds the work of every script, from beside it: it says how jobs begin, fail and end, and changes no number.
+AROUND = "job.py"
 
 
 def code_fingerprint(script: str | Path, *modules: str) -> str:
@@ -33,15 +35,17 @@ def files_of(script: str | Path, *modules: str) -> dict[str, Path]:
     """Files of a script, of what it imports from the package or from beside itself, and so on, by their sorted names.
 
     `modules` are those that the script imports by a name it is told only when it runs. Packages on the way to a
-    module are not part of it; data files are, if they lie beside a module whose text names them.
+    module are not part of it, nor is what surrounds all scripts, with what only that imports; data files are, if they
+    lie beside a module whose text names them.
     """
+    around = Path(script).with_name(AROUND)
     found: set[Path] = set()
     pending = [Path(script), *(_module_file(name) for name in modules)]
     while pending:
         file = pending.pop()
         if file not in found:
             found.add(file)
-            pending += _imports(file)
+            pending += (each for each in _imports(file) if each != around)
     return {_name(file): file for file in sorted(found, key=_name)}
 
 

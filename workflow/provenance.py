@@ -9,7 +9,8 @@ from typing import Any
 
 from snakemake_records import record_of
 
-from icha.publication.crate import SOURCE, Job
+from icha.publication.crate import Job
+from icha.publication.deposit_files import SOURCE
 
 SCRIPTS = "workflow/scripts"
 
@@ -56,7 +57,7 @@ def recorded_jobs(
                 outputs=tuple(sorted(made[name] for name in outputs[job])),
                 parameters=_settings(record["params"]),
                 description=_description(scripts / script),
-                script=f"{SOURCE}{SCRIPTS}/{script}",
+                script=f"{SOURCE}/{SCRIPTS}/{script}",
             )
         )
     return sorted(jobs, key=lambda job: job.outputs)

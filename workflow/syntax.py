@@ -100,5 +100,5 @@ def _keep() -> None:
     text = json.dumps(_kept() | _new)
     lines = (hashlib.sha256(text.encode()).hexdigest(), _reader(), text)
     # Where nothing can be written it is read every time.
-    with contextlib.suppress(OSError), whole_file(_KEPT) as temporary:
+    with contextlib.suppress(OSError), whole_file(_KEPT, lasting=False) as temporary:
         temporary.write_text("".join(f"{line}\n" for line in lines), encoding="ascii")

@@ -45,7 +45,7 @@ from icha.support.values import (
 BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
 # Each of these looks at all runs of its study.
 _FEW = Field(max_length=100)
-# Cells of boundary elements per shortest wavelength: fewer are refused, and fewer than that warned of.
+# Cells per shortest wavelength: with fewer, boundary elements are refused and asperities warned of; those to recommend.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
@@ -277,10 +277,10 @@ class Campaign(Section):
             origin = self.origin("surfaces", name)
             variant = "" if origin == name else f" (variant {name})"
             cells = self._cells_per_short_wave(name)
-            if cells is not None and cells < 4 * (1 - ROUNDING):
+            if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
-                    f"{variant}; recommended: 8, at least 4"
+                    f"{variant}; recommended: {_ADVISABLE_CELLS}, at least {_LEAST_CELLS}"
                 )
             elif cells is not None and cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_patches:
                 found.append(

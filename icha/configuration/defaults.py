@@ -3,8 +3,6 @@
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
 
-from pydantic import BaseModel
-
 from icha.configuration.campaign import Defaults
 from icha.configuration.surfaces import SURFACE_KINDS
 from icha.support.values import NOTHING, Problem
@@ -37,20 +35,20 @@ def with_defaults(content: Mapping) -> dict:
             if not isinstance(entry, Mapping | None):
                 continue
             entry = dict(entry or {})
-            kind = SURFACE_KINDS.get(entry.get("kind", given.get("kind")))
-            foreign = _of_other_kinds(kind) if section == "surfaces" and kind else ()
+            kind = entry.get("kind", given.get("kind"))
+            foreign = _of_other_kinds(kind) if section == "surfaces" and isinstance(kind, str) else ()
             entries[name] = {key: deepcopy(value) for key, value in given.items() if key not in foreign} | entry
     return result
 
 
 def excessive_defaults(written: Mapping) -> Iterator[Problem]:
-    """Sections of defaults that would be as long as a book, written out in all entries."""
+    """Sections of defaults that would be more than half a million values, written out in all entries."""
     defaults = written.get("defaults")
     for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
         entries = written.get(section)
         count = _values_in(defaults.get(section)) * (len(entries) if isinstance(entries, Mapping) else 0)
         if count > _MOST_VALUES:
-            reason = f"stand for {count} values in all {section}; allowed: {_MOST_VALUES} at most"
+            reason = f"would be {count} values, written out in all {section}; allowed: {_MOST_VALUES} at most"
             yield ("defaults", section), NOTHING, reason
 
 
@@ -59,9 +57,12 @@ def _values_in(content) -> int:
     return 1 + sum(map(_values_in, inside))
 
 
-def _of_other_kinds(kind: type[BaseModel]) -> set[str]:
-    """Keys that only surfaces of other kinds have."""
-    return {key for other in SURFACE_KINDS.values() for key in other.model_fields} - set(kind.model_fields)
+def _of_other_kinds(kind: str) -> set[str]:
+    """Keys that only surfaces of other kinds have; none if there is no such kind."""
+    if kind not in SURFACE_KINDS:
+        return set()
+    every = {key for other in SURFACE_KINDS.values() for key in other.model_fields}
+    return every - set(SURFACE_KINDS[kind].model_fields)
 
 
 def place_in_defaults(location: tuple, written: Mapping) -> tuple:

@@ -69,7 +69,9 @@ def designed(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Probl
     )
     grown = grown.with_contacts(contacts)
     grown._origins = variants.origin
-    return _with_variants_for_their_origin(grown, variants.origin), []
+    grown = _with_variants_for_their_origin(grown, variants.origin)
+    found = list(_too_many_beside(grown))
+    return (campaign, found) if found else (grown, [])
 
 
 def _lists(label: str, study: Study) -> dict[str, list[_Placed]]:
@@ -128,29 +130,45 @@ def _axes(lists, groups, fixed) -> Iterator[list[str]]:
 def _too_many(campaign: Campaign) -> Iterator[Problem]:
     """More runs, or stops of their paths, than can be planned; they are counted before any is written out."""
     runs = {label: _run_count(label, study) for label, study in campaign.studies.items()}
-    stops = {label: runs[label] * len(study.targets.states) for label, study in campaign.studies.items()}
-    for what, counts, most in (("runs", runs, MAX_RUNS), ("stops of all its runs", stops, _MAX_STOPS)):
-        large = [label for label, count in counts.items() if count > most]
-        for label in large:
-            yield ("studies", label), NOTHING, f"asks for {counts[label]} {what}; allowed: {most} at most"
-        total = sum(counts.values())
-        if total > most and not large:
-            yield ("studies",), NOTHING, f"ask for {total} {what} together; allowed: {most} at most"
-        if total > most:
-            return
+    stops = {}
+    for label, study in campaign.studies.items():
+        states = {*study.targets.states, *(campaign.snapshots_of(label) or ())}
+        stops[label] = runs[label] * (len(states) + len(study.turning_points))
+    yield from _excess("studies", runs, "runs", MAX_RUNS)
+    yield from _excess("studies", stops, "stops of all its runs", _MAX_STOPS)
+
+
+def _too_many_beside(campaign: Campaign) -> Iterator[Problem]:
+    """More solutions beside the runs, which are written out, than can be planned."""
+    for section in BESIDE_STUDIES:
+        counts = {
+            label: len(campaign.solved(entry)) * len(getattr(entry, "reduced_pressures", [0]))
+            for label, entry in getattr(campaign, section).items()
+            if entry.study in campaign.studies
+        }
+        yield from _excess(section, counts, "solutions", MAX_RUNS)
+
+
+def _excess(section: str, counts: Mapping[str, int], what: str, most: int) -> Iterator[Problem]:
+    """That entries of a section ask for more than `most`, each by itself or all of them together."""
+    large = {label: count for label, count in counts.items() if count > most}
+    for label, count in large.items():
+        yield (section, label), NOTHING, f"asks for {count} {what}; allowed: {most} at most"
+    total = sum(counts.values())
+    if total > most and not large:
+        yield (section,), NOTHING, f"ask for {total} {what} together; allowed: {most} at most"
 
 
 def _run_count(label: str, study: Study) -> int:
-    """Number of runs of a study, one by one model counted once, without those that are the same."""
+    """Number of runs of a study by all its models; those that turn out to be the same are counted each."""
     lists = _lists(label, study)
     groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
 
     def count(fixed):
         return math.prod(len(lists[group[0]]) for group in _axes(lists, groups, fixed))
 
-    if study.cases is None:
-        return count(())
-    return sum(count(case.model_dump(exclude_none=True)) for case in study.cases)
+    cases = [()] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
+    return len(study.models) * sum(map(count, cases))
 
 
 def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Problem]:

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SURFACE_KINDS
+from icha.support.printable import printable
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 # Of what is wrong with a configuration so much is told at once.
@@ -20,10 +21,10 @@ class ConfigurationError(ValueError):
 
 
 def line(origin: str, location: tuple, value: Any, reason: str) -> str:
-    """A problem as a line for the author of the file."""
+    """A problem as a line for the author of the file, or for whoever has got it from a stranger."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{_cut(str(part), 80)}" for part in location).lstrip(".")
     shown = "" if value is NOTHING else " (empty)" if value is None else f" {_short(value)}"
-    return f"{origin}: {key or 'top level'}:{shown} {_cut(reason, 2000)}"
+    return printable(f"{origin}: {key or 'top level'}:{shown} {_cut(reason, 2000)}")
 
 
 def _short(value: Any) -> str:
@@ -66,7 +67,8 @@ def problem_of(details: Mapping, content: Mapping) -> Problem:
     if kind in ("too_short", "string_too_short"):
         return location, value, "is empty; allowed: at least one entry"
     if kind in ("too_long", "string_too_long"):
-        return location, value, f"is too long; allowed: a length of {context['max_length']} at most"
+        what = "characters" if isinstance(value, str) else "entries"
+        return location, value, f"is too long; allowed: at most {context['max_length']} {what}"
     if kind == "literal_error":
         return location, value, f"is not a choice; allowed: {context['expected']}"
     wrong_type = {

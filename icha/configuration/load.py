@@ -62,6 +62,7 @@ def load_configuration(
     path = Path(path)
     from_file = read_yaml(path)
     written = merged(from_file, overrides or {})
+    text = dumped(written, str(path))
     unusual, meant = unusual_values(written), written.get(CONFIRMED)
     # Told with whatever else is wrong, of which they may be the cause.
     slips = list(plausibility_problems(unusual, meant))
@@ -99,7 +100,7 @@ def load_configuration(
     confirmed = [
         said(each.location, each.value, f"is unusual{each.how}, but confirmed; usual: {each.usual}") for each in unusual
     ]
-    return Configuration(campaign, dumped(written), str(path), (*campaign.warnings(), *confirmed))
+    return Configuration(campaign, text, str(path), (*campaign.warnings(), *confirmed))
 
 
 def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
@@ -139,7 +140,7 @@ def _topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Probl
         if surface.random:
             continue
         try:
-            grid, period, boundary, slope = _facts(surface, name in asking)
+            grid, period, boundary, slope, sha256 = _facts(surface, name in asking)
         except (ValueError, MemoryError) as error:
             key = getattr(error, "key", "path")
             origin = campaign.origin("surfaces", name)
@@ -149,19 +150,18 @@ def _topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Probl
             wrong.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
             continue
         # Six digits name the files, and are more than any instrument has.
-        found[name] = Topography(
-            grid, period, boundary, None if slope is None else float(f"{slope:.6g}"), sha256_of(Path(surface.path))
-        )
+        found[name] = Topography(grid, period, boundary, None if slope is None else float(f"{slope:.6g}"), sha256)
     return found, wrong
 
 
-def _facts(surface, with_slope: bool) -> tuple[int, float, str, float | None]:
+def _facts(surface, with_slope: bool) -> tuple[int, float, str, float | None, str]:
     if isinstance(surface, MeasuredSurface):
         # Slow to import, and not for every campaign.
         from icha.surfaces.measured.topography import topography_facts
 
         facts = topography_facts(surface.path, surface.preparation)
-        return facts.grid, facts.period, facts.boundary, facts.rms_slope if with_slope else None
+        slope = facts.rms_slope if with_slope else None
+        return facts.grid, facts.period, facts.boundary, slope, facts.source_sha256
     heights = read_height_map(surface.path, surface.metres_per_unit)
     slope = None
     if with_slope:
@@ -169,4 +169,4 @@ def _facts(surface, with_slope: bool) -> tuple[int, float, str, float | None]:
         from icha.surfaces.surface import Surface
 
         slope = Surface(heights, surface.period).rms_slope
-    return len(heights), surface.period, "periodic", slope
+    return len(heights), surface.period, "periodic", slope, sha256_of(Path(surface.path))

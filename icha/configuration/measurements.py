@@ -54,7 +54,7 @@ class Measurement(Section):
     """Measured contact areas, drawn over the figure of the study that they belong to."""
 
     path: File = Field(description="CSV file with a line of headings. Relative to the configuration file.")
-    label: Annotated[str, Field(strict=True, min_length=1, max_length=200), AfterValidator(_drawable)] = Field(
+    label: Annotated[Text, Field(max_length=200), AfterValidator(_drawable)] = Field(
         description="Its name in the legend; formulas stand between two `$`."
     )
     citation: Text = Field(description="Where the numbers come from; printed in the report.")

@@ -41,4 +41,4 @@ def with_files_beside_it(configuration: Configuration) -> tuple[str, dict[str, s
             files[place] = path
     # All surfaces have a path of their own now.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
-    return dumped(content), files
+    return dumped(content, configuration.origin), files

@@ -119,9 +119,7 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
         yield Unusual((*location, "size"), in_words.length(period), _SIDE, "as the file has it")
     if rms_slope is not None and not _SLOPE.holds(rms_slope):
         about = f"rms slope {rms_slope:.3g}"
-        yield Unusual(
-            (*location, "height_unit"), about, _SLOPE, "as units, size, or a number for missing points make it"
-        )
+        yield Unusual((*location, "height_unit"), about, _SLOPE, _OF_SLOPE)
 
 
 def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:

@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+from collections.abc import Callable
+from functools import partial
 
 from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
@@ -81,9 +83,13 @@ def run_sha256(campaign: Campaign, case: RunLabels) -> str:
     return _sha256([run_settings(campaign, case), surface_settings(campaign, case.surface), *file])
 
 
-def campaign_sha256(campaign: Campaign) -> str:
-    """Checksum of everything that determines the runs of a campaign: not of its figures or its title."""
-    return _sha256({case.path: run_sha256(campaign, case) for case in run_cases(campaign)})
+def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | None = None) -> str:
+    """Checksum of everything that determines the runs of a campaign: not of its figures or its title.
+
+    `of_run` gives those of its runs (`run_sha256`), where they are known already.
+    """
+    of_run = of_run or partial(run_sha256, campaign)
+    return _sha256({case.path: of_run(case) for case in run_cases(campaign)})
 
 
 def _sha256(settings) -> str:

@@ -2,6 +2,7 @@
 
 import codecs
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import yaml
@@ -10,8 +11,8 @@ from icha.configuration.errors import ConfigurationError
 from icha.support import in_words
 from icha.support.input_files import flaw_of_path
 
-# No configuration comes near: those that come with ICHA have some hundred values.
-_MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 50_000, 50, 100
+# No text of so many bytes has as many values, but aliases may stand for them.
+_MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 10**6, 50, 100
 
 
 def read_yaml(path: Path) -> dict:
@@ -77,7 +78,7 @@ class _Loader(yaml.SafeLoader):
 
     def compose_node(self, parent, index):
         event, before = self.peek_event(), self._values
-        self._values += 1 + self._size_of_alias(event)
+        self._values += self._size_of_alias(event) or 1
         self._depth += 1
         self._refuse(event, getattr(event, "tag", None) is not None, "a tag")
         self._refuse(event, self._depth > _DEEPEST, f"more than {_DEEPEST} sections or lists in one another")
@@ -85,7 +86,8 @@ class _Loader(yaml.SafeLoader):
         self._refuse(event, self._values > _MOST_VALUES, many)
         node = super().compose_node(parent, index)
         self._depth -= 1
-        self._sizes[id(node)] = self._values - before
+        # An alias is its node once more, whose size is known.
+        self._sizes.setdefault(id(node), self._values - before)
         return node
 
     def _size_of_alias(self, event):
@@ -100,33 +102,48 @@ class _Loader(yaml.SafeLoader):
         if wrong:
             raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
 
-    def construct_yaml_int(self, node):
-        # Longer ones are text, which is checked where it belongs: Python refuses to read some thousand digits.
-        long = len(self.construct_scalar(node)) > _LONGEST_NUMBER
-        return self.construct_scalar(node) if long else super().construct_yaml_int(node)
+    def construct_unless_text(self, node, construct):
+        """What a scalar stands for; if that cannot be said, its text, which is checked where it belongs.
 
-    def construct_yaml_timestamp(self, node):
+        `0b_` and a 30th of February only look like a number and a date; of thousands of digits Python reads none.
+        """
+        text = self.construct_scalar(node)
+        if len(text) > _LONGEST_NUMBER:
+            return text
         try:
-            return super().construct_yaml_timestamp(node)
-        except ValueError:  # a 30th of February, say: text, which is checked where it belongs
-            return self.construct_scalar(node)
+            return construct(self, node)
+        except (ValueError, OverflowError):
+            return text
 
     def construct_mapping(self, node, deep=False):
         seen = set()
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)
-            if not isinstance(key, str | int | float):
-                raise yaml.constructor.ConstructorError(None, None, "a key is no text", key_node.start_mark)
-            if key in seen:
-                raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is given twice", key_node.start_mark)
+            wrong = "" if isinstance(key, str) else "is not text (in quotes it is)"
+            wrong = wrong or ("is given twice" if key in seen else "")
+            if wrong:
+                raise yaml.constructor.ConstructorError(None, None, f"key {key!r} {wrong}", key_node.start_mark)
             seen.add(key)
         return super().construct_mapping(node, deep)
 
 
-_Loader.add_constructor("tag:yaml.org,2002:timestamp", _Loader.construct_yaml_timestamp)
-_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+for _kind in ("int", "float", "timestamp"):
+    _construct = getattr(yaml.SafeLoader, f"construct_yaml_{_kind}")
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", partial(_Loader.construct_unless_text, construct=_construct))
 
 
-def dumped(content: Mapping) -> str:
-    """The text of a configuration, in the order in which it was written."""
-    return yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True, width=110)
+def dumped(content: Mapping, origin: str) -> str:
+    """The text of a configuration, in the order in which it was written, with a line for each value.
+
+    Raises
+    ------
+    ConfigurationError
+        If nobody could read that text again, for it is too long; it names the file `origin`.
+    """
+    text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True, width=110)
+    if len(text.encode()) > _MOST_BYTES:
+        raise ConfigurationError(
+            f"{origin}: with a line for each value, as it is kept with the results, is longer than "
+            f"{in_words.size(_MOST_BYTES)}; allowed: fewer values, such as ranges of seeds"
+        )
+    return text

@@ -18,7 +18,7 @@ from icha.datasets.variables import run as variables_of_run
 from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
 from icha.datasets.variables.terms import Variable
 from icha.support.hdf5 import refuse_data_elsewhere
-from icha.support.input_files import bounded_memory, flaw_of_path
+from icha.support.input_files import bounded_memory, flaw_of_path, most_memory, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
 SOLUTION = "solution by boundary elements at a finite range"
@@ -125,9 +125,13 @@ def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
     if not os.path.getsize(path):
         raise UnknownFile(f"{path}: the file is empty")
     try:
-        with bounded_memory():
+        most = most_memory(path)
+        with bounded_memory(most):
             refuse_data_elsewhere(path)
             data = read_campaign(path) if has_groups(path) else read_dataset(path)
+        if isinstance(data, xr.DataTree):
+            # Large arrays are still in the file, and read when they are used.
+            require_room(sum(node.to_dataset(inherit=False).nbytes for node in data.subtree), most)
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
         reason = str(error).removeprefix(f"{path}: ")
         raise UnknownFile(f"{path}: {reason}") from None

@@ -177,9 +177,9 @@ def _library() -> str:
 
 
 def _printable(data):
-    """The same data; their texts are fit for a page."""
+    """The same data; their texts are fit for a page, and so are the names by which others find them."""
     if isinstance(data, dict):
-        return {name: _printable(value) for name, value in data.items()}
+        return {_printable(name): _printable(value) for name, value in data.items()}
     if isinstance(data, list):
         return [_printable(value) for value in data]
     return printable_lines(data) if isinstance(data, str) else data

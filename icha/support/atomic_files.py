@@ -58,7 +58,7 @@ def moving() -> AbstractContextManager:
 
 
 def is_left_over(name: str) -> bool:
-    """Whether a file of this name, where nobody writes any more, is what a killed program has left of `whole_file`."""
+    """Whether a file of this name is what a killed program has left where nobody writes any more."""
     return name.startswith(".") and name.endswith(_ENDING)
 
 
@@ -74,16 +74,17 @@ def sync_folder(folder: Path) -> None:
 def in_the_way(folder: Path) -> str | None:
     """What is where a folder is to be, if anything but a folder is: a file, or a link to what is not there."""
     for path in (folder, *folder.parents):
-        if path.is_symlink() and not path.exists():
-            return f"{path} is a link to {os.readlink(path)}, which is not there"
-        if path.exists():
-            return None if path.is_dir() else f"{path} is a file, and no folder"
+        # Methods of Path raise errors where a folder on the way may not be entered.
+        if os.path.exists(path):
+            return None if os.path.isdir(path) else f"{path} is a file, and no folder"
+        if os.path.islink(path):
+            return f"{path} is a link to {os.readlink(path)}, which is not there, or not to be reached"
     return None
 
 
 def why_not_writable(folder: Path) -> OSError | None:
     """What the system says against data in a folder, if anything; they are removed again."""
-    probe = folder / f".{os.getpid()}.probe"
+    probe = folder / f".{os.getpid()}.probe{_ENDING}"
     try:
         probe.write_bytes(bytes(_PROBE))
     except OSError as error:
@@ -97,7 +98,7 @@ _permission: Callable[[], AbstractContextManager] = nullcontext
 
 
 def _sync(path: Path) -> None:
-    """Have a file's content, or the names in a folder, on the disk."""
+    """Have a file's content, or the names in a folder, on the disk; on macOS that may still have it in its memory."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

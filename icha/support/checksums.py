@@ -22,6 +22,8 @@ from typing import NamedTuple
 from icha.support.atomic_files import whole_file
 
 FOLDER = "checksums"
+# Why a result is stale that Snakemake sees for itself, if its record belongs to the result.
+OTHER_SETTINGS = "it was made with other settings, or by another version of the program"
 
 
 class Checksum(NamedTuple):
@@ -61,7 +63,7 @@ def write_checksum(results: str | os.PathLike, path: str, *, asked: str = "", in
 
 
 def begin(results: str | os.PathLike, path: str) -> None:
-    """Say that a result is about to be written; until its checksum is, whatever is there counts as whole."""
+    """Say that a result is about to be written; until its checksum is, it is not checked for damage, and stale."""
     _write(results, path, _BEGUN, lasting=False)
 
 
@@ -124,6 +126,14 @@ def stale(
     asked : what is asked of each now (`asked_of`); left out, only what they were made from is looked at.
     """
     known = cache(lambda path: _known(results, path))
+
+    @cache
+    def content(path):
+        """SHA-256 of an input, empty if it is not there; a file that came with the configuration has no sidecar."""
+        with contextlib.suppress(FileNotFoundError):
+            return known(path).sha256 or sha256_of(Path(results, path))
+        return ""
+
     for path in paths:
         if not os.path.exists(os.path.join(results, path)):
             continue
@@ -131,9 +141,9 @@ def stale(
         if not written.asked:
             yield path, "nothing says what it was made from"
         elif asked is not None and asked(path) != written.asked:
-            yield path, "it was made with other settings, or by another version of the program"
+            yield path, OTHER_SETTINGS
         else:
-            others = [each for each, sha256 in written.inputs.items() if known(each).sha256 != sha256]
+            others = [each for each, sha256 in written.inputs.items() if content(each) != sha256]
             if others:
                 yield path, f"it was made from another {others[0]} than is there"
 

@@ -3,6 +3,9 @@
 import os
 from collections.abc import Iterable
 
+# https://support.hdfgroup.org/documentation/hdf5/latest/_f_m_t3.html, section II.A.
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
 
 def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
     """A text, however the library that wrote it keeps texts; that of netCDF puts those beyond ASCII into arrays."""
@@ -23,10 +26,11 @@ def refuse_data_elsewhere(path: str | os.PathLike) -> None:
     OSError
         If the file is damaged.
     """
+    if not _is_hdf5(path):
+        return
+    # Not for every text.
     import h5py
 
-    if not h5py.is_hdf5(path):
-        return
     with h5py.File(path, "r") as file:
 
         def elsewhere(name, link):
@@ -41,6 +45,18 @@ def refuse_data_elsewhere(path: str | os.PathLike) -> None:
 
         if found := file.id.links.visit(elsewhere, info=True):
             raise ValueError(f"{found}; allowed: files that hold all of their data")
+
+
+def _is_hdf5(path):
+    """Whether the signature is at the beginning, or after a block of the user's own of 512, 1024, 2048, … bytes."""
+    with open(path, "rb") as file:
+        size, place = os.fstat(file.fileno()).st_size, 0
+        while place < size:
+            file.seek(place)
+            if file.read(len(_SIGNATURE)) == _SIGNATURE:
+                return True
+            place = max(512, 2 * place)
+    return False
 
 
 def _lies_elsewhere(properties):

@@ -16,6 +16,8 @@ from icha.support import in_words
 # Environment variable with the limit in MB, and the limit without it.
 VARIABLE = "ICHA_INPUT_MB"
 _USUAL_MB = 2000
+# Arrays of the size of a file that reading it may take.
+_COPIES = 3
 
 _KINDS = {
     stat.S_IFDIR: "is a folder",
@@ -29,11 +31,11 @@ _KINDS = {
 class TooLarge(ValueError):
     """A file that would take more memory than reading one may; the message says how to allow more."""
 
-    def __init__(self, needed: str):
-        """Say what is `needed`, what is allowed and what allows more."""
+    def __init__(self, needed: str, most: int):
+        """Say what is `needed`, that `most` bytes are allowed, and what allows more."""
         super().__init__(
-            f"needs {needed} of memory; allowed: {in_words.size(most_memory())}, or what the environment "
-            f"variable {VARIABLE} says, in MB"
+            f"needs {needed} of memory; allowed: {in_words.size(most)}, or what the environment variable {VARIABLE} "
+            f"says, in MB"
         )
 
 
@@ -48,34 +50,44 @@ def flaw_of_path(path: str | os.PathLike) -> str | None:
     return _KINDS.get(kind)
 
 
-def most_memory() -> int:
+def most_memory(file: str | os.PathLike | None = None) -> int:
     """Bytes of memory that reading a file may take.
+
+    Parameters
+    ----------
+    file : which one, if no environment variable sets the limit: one that is large itself may take what it needs.
 
     Raises
     ------
     ValueError
         If the environment variable is no number.
     """
-    asked = os.environ.get(VARIABLE, str(_USUAL_MB))
+    asked = os.environ.get(VARIABLE)
+    if asked is None:
+        # Of a file with holes only what is on the disk; 512 is the unit of st_blocks everywhere.
+        own = 0 if file is None else _COPIES * 512 * os.stat(file).st_blocks
+        return max(_USUAL_MB * 10**6, own)
     if not re.fullmatch(r"[0-9]{1,9}", asked):
         raise ValueError(f"{VARIABLE}: {asked!r} is not a number of MB")
     return int(asked) * 10**6
 
 
-def require_room(needed: float) -> None:
-    """Raise `TooLarge` if reading needs more bytes of memory than it may take."""
-    if needed > most_memory():
-        raise TooLarge(f"about {in_words.size(needed)}")
+def require_room(needed: float, most: int | None = None) -> None:
+    """Raise `TooLarge` if reading needs more bytes of memory than it may take: `most`, or those of any file."""
+    most = most_memory() if most is None else most
+    if needed > most:
+        raise TooLarge(f"about {in_words.size(needed)}", most)
 
 
 @contextmanager
-def bounded_memory() -> Iterator[None]:
-    """Let a block allocate no more than `most_memory` bytes, whatever libraries it calls; more is `TooLarge`.
+def bounded_memory(most: int | None = None) -> Iterator[None]:
+    """Let a block allocate no more than `most` bytes, those of any file if left out, whatever libraries it calls.
 
+    More is `TooLarge`.
     Libraries in C may have errors of their own for memory that they do not get. Only Linux can bound memory so;
     elsewhere nothing but declared sizes is checked.
     """
-    most, taken = most_memory(), _taken()
+    most, taken = most_memory() if most is None else most, _taken()
     if taken is None:
         yield
         return
@@ -87,7 +99,7 @@ def bounded_memory() -> Iterator[None]:
     try:
         yield
     except MemoryError:
-        raise TooLarge(f"more than {in_words.size(most)}") from None
+        raise TooLarge(f"more than {in_words.size(most)}", most) from None
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 

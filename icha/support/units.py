@@ -77,7 +77,7 @@ def _by_pint(unit, si_unit):
     except Exception:  # pint raises a dozen kinds of errors for text that is not a unit
         raise ValueError(f"{unit!r} is not a unit") from None
     if not 0 < float(factor) < math.inf:
-        raise ValueError(f"{unit!r} is not a unit of any use")
+        raise ValueError(f"{unit!r} is a unit too large or too small for a number")
     return factor
 
 

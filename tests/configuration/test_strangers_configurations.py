@@ -1,6 +1,7 @@
 """Configurations of strangers: each is refused at once with file, key, value and what is allowed, or it is sound."""
 
 import os
+import re
 import resource
 import sys
 from pathlib import Path
@@ -24,8 +25,8 @@ MERGED = "a0: &a0 {k: 1}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (ALIASES, "line 5: the file has more than 50000 values, aliases written out"),
-        (MERGED, "more than 50000 values"),
+        (ALIASES, "line 7: the file has more than 1000000 values, aliases written out"),
+        (MERGED, "more than 1000000 values"),
         ("studies: {one: {vary: {hurst: &a [*a]}}}", "line 1: an alias of what it stands in"),
         ("a: " + "[" * 5000 + "]" * 5000, "more than 50 sections or lists in one another"),
         ("a: " + "{a: " * 5000, "more than 50 sections or lists in one another"),
@@ -42,13 +43,52 @@ def test_texts_that_would_never_end(text, message, tmp_path):
     assert message in str(error.value)
 
 
-@pytest.mark.parametrize("number", ["9" * 5000, "0x" + "f" * 5000, "1" + ":59" * 3000])
-def test_integers_of_thousands_of_digits_are_text_until_they_are_checked(number, tmp_path):
+def test_thousands_of_cases_are_read_and_aliases_count_as_what_they_stand_for(tmp_path):
+    (tmp_path / "one.yaml").write_text("a: [" + "1, " * 60_000 + "]")
+    assert len(read_yaml(tmp_path / "one.yaml")["a"]) == 60_000
+    (tmp_path / "two.yaml").write_text("a: [&b {seed: 1}" + ", *b" * 2000 + "]")
+    assert read_yaml(tmp_path / "two.yaml")["a"] == [{"seed": 1}] * 2001
+
+
+def test_what_would_be_too_long_as_it_is_kept_is_refused_before_anything_is_computed(tmp_path):
+    loads = ", ".join(f"{1e-3 + 1e-7 * k:.7f}" for k in range(62_000))
+    text = GOOD.replace("[1e-3, 0.01]", f"[{loads}]")
+    assert len(text) < 10**6
+    (tmp_path / "long.yaml").write_text(text)
+    with pytest.raises(ConfigurationError, match=r"long\.yaml: with a line for each value.* longer than 1 MB; allowed"):
+        load_configuration(tmp_path / "long.yaml")
+
+
+@pytest.mark.parametrize(
+    "number",
+    ["9" * 5000, "0x" + "f" * 5000, "1" + ":59" * 3000, "1" + ":1" * 180 + ".5", "0b_", "0x_", "-0b_", "2026-02-30"],
+)
+def test_what_only_looks_like_a_number_is_text_until_it_is_checked(number, tmp_path):
     (tmp_path / "one.yaml").write_text(f"a: {number}")
     assert read_yaml(tmp_path / "one.yaml") == {"a": number}
     (tmp_path / "two.yaml").write_text(GOOD.replace("grid: 80", f"grid: {number}"))
     with pytest.raises(ConfigurationError, match=r"rough\.grid: .* is not an integer from 8 to 32768; allowed: "):
         load_configuration(tmp_path / "two.yaml")
+
+
+@pytest.mark.parametrize("key", ["1.5", "1", "yes", "~", "2026-02-01"])
+def test_keys_that_are_no_text_are_refused_by_their_line(key, tmp_path):
+    (tmp_path / "one.yaml").write_text(GOOD.replace("  rough:", f"  {key}:"))
+    with pytest.raises(ConfigurationError, match=r"one\.yaml, line 7: key .+ is not text \(in quotes"):
+        load_configuration(tmp_path / "one.yaml")
+
+
+def test_kinds_that_are_no_text_are_refused_with_defaults_as_without(refused):
+    surface = yaml.safe_load(GOOD)["surfaces"]["rough"]
+    for kind in (["self_affine"], {"a": 1}, "none"):
+        wrong = {"defaults": {"surfaces": {"hurst": 0.8}}, "surfaces.rough": surface | {"kind": kind}}
+        refused(None, wrong, f"surfaces.rough.kind: {kind!r} is no kind of surface; allowed: ")
+
+
+def test_what_is_wrong_is_told_without_what_acts_on_a_terminal(load):
+    with pytest.raises(ConfigurationError, match=r"\\x1b\[2Jx: unknown key") as error:
+        load({"\x1b[2Jx": 1})
+    assert "\x1b" not in str(error.value)
 
 
 def test_pipes_and_devices_are_not_opened(tmp_path, refused):
@@ -99,12 +139,44 @@ WRONG = {
             "studies.one.targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(1000)]},
         },
         None,
-        "studies.one: asks for 40000000 stops of all its runs; allowed: 5000000 at most",
+        "studies.one: asks for 40040000 stops of all its runs; allowed: 5000000 at most",
+    ),
+    "stops of loads beside a study": (
+        {
+            "studies.one.seeds": "1..20000",
+            "boundary_elements": {"b": {"study": "one", "reduced_pressures": [1e-3 + 1e-6 * i for i in range(10_000)]}},
+        },
+        None,
+        "stops of all its runs; allowed: 5000000 at most",
+    ),
+    "turning points": (
+        {
+            "studies.one.seeds": "1..20000",
+            "studies.one.turning_points": [{"reduced_pressure": 1e-3 * (i % 2)} for i in range(1000)],
+        },
+        None,
+        "stops of all its runs; allowed: 5000000 at most",
+    ),
+    "solutions": (
+        {
+            "studies.one.seeds": "1..10000",
+            "boundary_elements": {"b": {"study": "one", "reduced_pressures": [1e-3 + 1e-6 * i for i in range(100)]}},
+        },
+        None,
+        "boundary_elements.b: asks for 2000000 solutions; allowed: 100000 at most",
+    ),
+    "solutions together": (
+        {
+            "studies.one.seeds": "1..10000",
+            "error_sources": {f"b{i}": {"study": "one", "reduced_pressures": [0.01, 0.02]} for i in range(3)},
+        },
+        None,
+        "error_sources: ask for 120000 solutions together; allowed: 100000 at most",
     ),
     "entries beside a study": (
         "boundary_elements",
         {f"b{i}": {"study": "one", "reduced_pressures": [0.01]} for i in range(101)},
-        "is too long; allowed: a length of 100 at most",
+        "is too long; allowed: at most 100 entries",
     ),
     "defaults of all studies": (
         {
@@ -112,7 +184,7 @@ WRONG = {
             "studies": {f"s{i}": {"surfaces": ["rough"]} for i in range(1000)},
         },
         None,
-        "defaults.studies: stand for 2003000 values in all studies; allowed: 500000 at most",
+        "defaults.studies: would be 2003000 values, written out in all studies; allowed: 500000 at most",
     ),
     "authors": ("publication", {"authors": [{"name": f"a{i}"} for i in range(1001)]}, "allowed: 1000 at most"),
     "grid": (
@@ -152,7 +224,8 @@ def test_values_to_vary_make_names_that_files_can_have(refused):
         (r"glass $\frac{1$", "label: 'glass $\\\\frac{1$' holds a formula that cannot be drawn ("),
         (r"$\nosuchthing$", "holds a formula that cannot be drawn ("),
         ("$" + "{" * 90 + "$", "holds a formula that cannot be drawn ("),
-        ("x" * 201, "is too long; allowed: a length of 200 at most"),
+        ("x" * 201, "is too long; allowed: at most 200 characters"),
+        ("glass\x1b[2J", "label: 'glass\\x1b[2J' holds the control character '\\x1b'; allowed: text"),
     ],
 )
 def test_labels_that_no_figure_can_draw(label, message, refused):
@@ -192,7 +265,7 @@ def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
         {
             "studies.one.seeds": "1..10000",
             "materials.soft.interaction_range": "120 nm",
-            "boundary_elements": {f"b{i}": beside for i in range(20)},
+            "boundary_elements": {f"b{i}": beside for i in range(5)},
         }
     )
     assert len(many.campaign.solved(many.campaign.boundary_elements["b0"])) == 20_000
@@ -233,6 +306,8 @@ _SHIPPED = [
 def mutated(draw):
     """A configuration that comes with ICHA, in which some values are others, gone, or elsewhere."""
     content = yaml.safe_load(yaml.safe_dump(draw(st.sampled_from(_SHIPPED))))
+    if draw(st.booleans()):
+        content["defaults"] = {"surfaces": {"hurst": 0.8}, "materials": {"surface_energy": "0 J/m^2"}}
     for _ in range(draw(st.integers(1, 3))):
         inside = content
         while True:
@@ -267,17 +342,24 @@ def test_mutated_configurations_are_right_or_refused(file, content):
     _loaded_or_refused(file, yaml.safe_dump(content, allow_unicode=True))
 
 
+# What YAML takes for something else than text, or nearly.
+_ODD = ["0b_", "-0x_", "1:1:1.5", f"1{':1' * 180}.5", "1.5", "._", "2026-02-30", "~", "yes", ".nan", "=", "<<", "*a"]
+
+
 @given(content=st.sampled_from(_SHIPPED), data=st.data())
 def test_mutated_texts_are_right_or_refused(file, content, data):
-    """Of the text single characters are others, or lines are gone or come twice."""
+    """Of the text single characters, keys and values are others, or lines are gone or come twice."""
     text = yaml.safe_dump(content, allow_unicode=True)
     lines = text.splitlines(keepends=True)
     for _ in range(data.draw(st.integers(1, 3))):
         k = data.draw(st.integers(0, len(lines) - 1))
         at = data.draw(st.integers(0, len(lines[k]) - 1))
+        odd = data.draw(st.sampled_from(_ODD))
         lines[k] = data.draw(
             st.sampled_from(
                 [
+                    re.sub(r"(?<=[:-] ).*", odd, lines[k]),
+                    re.sub(r"[\w.]+(?=:)", odd, lines[k], count=1),
                     lines[k][:at] + data.draw(st.sampled_from(list("{}[]:-&*!|>'\"%@`#,?0\t\x00é \n"))) + lines[k][at:],
                     lines[k] * 2,
                     "\n",
@@ -299,9 +381,10 @@ def test_refusals_take_little_memory(tmp_path):
     """In a process of 1 GB the worst configurations end with their messages."""
     worst = {name: value for name, value in WRONG.items() if name in ("cases times seeds", "grid", "runs")}
     script = "import sys; from icha.configuration.load import load_configuration as l\nfor f in sys.argv[1:]:\n"
-    script += "    try: l(f)\n    except ValueError as e: print(e)\n"
-    files = [tmp_path / "aliases.yaml", tmp_path / "merged.yaml", tmp_path / "nested.yaml"]
-    for file, text in zip(files, (ALIASES, MERGED, "a: " + "[" * 200_000), strict=True):
+    script += "    try: l(f)\n    except ValueError: print('refused', f)\n"
+    files = [tmp_path / f"{name}.yaml" for name in ("aliases", "merged", "nested", "cases")]
+    cases = f"{GOOD}    cases: [&c {{seed: 1}}{', *c' * 100_000}]\n"
+    for file, text in zip(files, (ALIASES, MERGED, "a: " + "[" * 200_000, cases), strict=True):
         file.write_text(text)
     for name, (key, value, _) in worst.items():
         content = yaml.safe_load(GOOD)
@@ -319,4 +402,4 @@ def test_refusals_take_little_memory(tmp_path):
 
     done = run([sys.executable, "-c", script, *files], capture_output=True, text=True, preexec_fn=bounded, check=False)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("; allowed: ") >= len(files)
+    assert done.stdout.splitlines() == [f"refused {file}" for file in files]

@@ -165,6 +165,19 @@ def test_the_page_needs_nothing_else_and_is_closed_to_the_network(page):
     assert text.count("</script>") == 3 and "Small &lt;/script&gt; campaign" in text
 
 
+def test_a_topography_is_found_by_its_name_whatever_that_holds(folder, tmp_path, monkeypatch):
+    name = "surfaces/\u202e{surface}-{seed}.nc"
+    for seed in (1, 2, 3):
+        old = folder / f"surfaces/rough/seed{seed}.nc"
+        (folder / name.format(surface="rough", seed=seed)).write_bytes(old.read_bytes())
+    monkeypatch.setattr("icha.datasets.results.SURFACE", name)
+    write_explorer(folder, tmp_path / "page.html", largest=20)
+    data = data_of(tmp_path / "page.html")
+    assert {contact["topography"] for contact in data["contacts"]} <= {*data["topographies"]}
+    for seed in (1, 2, 3):
+        (folder / name.format(surface="rough", seed=seed)).unlink()
+
+
 def test_the_same_results_give_the_same_bytes(folder, page, tmp_path):
     write_explorer(folder, tmp_path / "again.html", largest=20)
     assert (tmp_path / "again.html").read_bytes() == page.read_bytes()

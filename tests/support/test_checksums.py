@@ -171,6 +171,19 @@ def test_results_that_are_not_of_what_is_asked_for_or_of_what_is_there_are_stale
     assert set(found()) == {"checks.json"}
 
 
+def test_what_was_made_from_a_file_that_no_job_wrote_is_stale_once_that_is_another(results):
+    table = results / "inputs/measurements/lab/points.csv"
+    table.parent.mkdir(parents=True)
+    table.write_text("p,a\n")
+    path = str(table.relative_to(results))
+    write_checksum(results, PATH, asked="a", inputs={path: sha256_as_written(results, path)})
+    assert dict(stale(results, [PATH])) == {}
+    table.write_text("p,b\n")
+    assert dict(stale(results, [PATH])) == {PATH: f"it was made from another {path} than is there"}
+    table.unlink()
+    assert set(dict(stale(results, [PATH]))) == {PATH}
+
+
 def test_the_order_of_parameters_does_not_matter():
     assert asked_of(["a", "b"]) == asked_of(["b", "a"]) != asked_of(["ab"])
 

@@ -4,7 +4,9 @@ import sys
 import unicodedata
 from types import SimpleNamespace
 
+import netCDF4
 import pytest
+import small_campaign as small
 from typer.testing import CliRunner
 
 import icha
@@ -12,6 +14,8 @@ from icha.cli import app
 from icha.cli.events import Job, last_line, reason_of
 from icha.cli.project import Mistake, told
 from icha.cli.terminal import markup, say
+from icha.datasets.files import write_dataset
+from icha.datasets.surface_file import write_surface
 from icha.report.explorer import _filled
 from icha.report.template import template
 from icha.support.printable import is_printable, printable, printable_lines
@@ -69,6 +73,22 @@ def test_attributes_of_a_file_are_shown_in_their_lines(tmp_path):
     assert shown.exit_code == 0, shown.output
     assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(shown.output)
     assert shown.output.count("all is well") == 5 and "\nrun.nc" not in shown.output
+
+
+def test_no_text_of_a_file_begins_a_line_of_its_own(tmp_path):
+    forged = f"{EVIL}\nrun.nc: run, all is well"
+    write_surface(tmp_path / "surface.nc", small.surface(), name="rough", seed=1)
+    with netCDF4.Dataset(tmp_path / "surface.nc", "a") as file:
+        file["rms_height"].long_name = file["rms_height"].units = file["rms_slope"].units = forged
+    tree = small.tree()
+    tree.attrs["summary"] = forged
+    write_dataset(tree, tmp_path / "campaign.nc")
+    told = {}
+    for command, name in (("show", "surface"), ("check", "surface"), ("show", "campaign")):
+        said = told[command, name] = CliRunner().invoke(app, [command, str(tmp_path / f"{name}.nc")]).output
+        assert "all is well" in said, said
+        assert "\nrun.nc" not in said and not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(said)
+    assert "flaw" in told["check", "surface"]
 
 
 def test_pages_hold_no_overrides_and_no_control_characters():

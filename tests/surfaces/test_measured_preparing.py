@@ -316,7 +316,7 @@ def test_provenance_and_facts(prepared, tmp_path):
     how = preparation(height_unit=1.0, size=(5.0, 5.0), boundary="free", detrend="tilt")
     facts = topography_facts(tmp_path / "scan.npy", how)
     assert (facts.grid, facts.period, facts.boundary) == (10, 5.0, "free")
-    assert facts.rms_slope == result.rms_slope
+    assert (facts.rms_slope, facts.source_sha256) == (result.rms_slope, result.source_sha256)
     # A file that changes is read again.
     np.save(tmp_path / "scan.npy", np.pad(heights, 1))
     assert topography_facts(tmp_path / "scan.npy", how).grid == 12

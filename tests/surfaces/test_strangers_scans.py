@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, scan, write_xyz
 
-from icha.datasets.format import UnknownFile, kind_of
+from icha.datasets.format import SURFACE, UnknownFile, kind_of
 from icha.surfaces.measured.height_map import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
@@ -143,6 +143,32 @@ def test_files_that_unpack_to_more_than_they_declare_are_refused(name, tmp_path)
     assert int(more) < 40_000  # kB
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can bound the memory of a process")
+def test_files_that_are_large_themselves_are_read_and_small_ones_that_say_so_are_not(tmp_path, monkeypatch):
+    monkeypatch.setattr("icha.support.input_files._USUAL_MB", 16)
+    nodes = 2048  # a side: 34 MB
+    for name, compression in (("own.nc", None), ("packed.nc", "zlib")):
+        with netCDF4.Dataset(tmp_path / name, "w") as file:
+            for axis in "yx":
+                file.createDimension(axis, nodes)
+            file.createVariable("period", "f8")[...] = 1.0
+            file.createVariable("height", "f8", ("y", "x"), compression=compression)[:] = np.zeros((nodes, nodes))
+    assert kind_of(tmp_path / "own.nc")[0] == SURFACE
+    with pytest.raises(UnknownFile, match=r"packed\.nc: "):
+        kind_of(tmp_path / "packed.nc")
+
+
+def test_what_is_left_in_a_campaign_dataset_until_it_is_used_is_bounded_as_well(tmp_path):
+    with netCDF4.Dataset(tmp_path / "campaign.nc", "w") as file:
+        study = file.createGroup("one")
+        study.createDimension("run", HUGE)
+        study.createDimension("step", HUGE)
+        study.createVariable("status", "i4", ())[...] = 0
+        study.createVariable("residual", "f8", ("run", "step"), chunksizes=(100, 100), compression="zlib")
+    with pytest.raises(UnknownFile, match="needs about 320 GB of memory; allowed: 2 GB, or what"):
+        kind_of(tmp_path / "campaign.nc")
+
+
 def write_external_storage(path, secret):
     with h5py.File(path, "w") as file:
         file.create_dataset("height", (16, 16), "f8", external=[(str(secret), 0, 2048)])
@@ -177,6 +203,14 @@ def test_data_that_lie_in_other_files_are_refused(write, name, tmp_path):
     if name == "scan.nc":
         with pytest.raises(ValueError, match=r"'height' (is a link to another file|has its data elsewhere)"):
             read_height_map(path, 1.0)
+
+
+@pytest.mark.parametrize("block", [512, 4096])
+def test_a_block_of_the_users_own_before_the_file_hides_nothing(block, tmp_path):
+    with h5py.File(tmp_path / "scan.h5", "w", userblock_size=block) as file:
+        file["height"] = h5py.ExternalLink("secret.h5", "/height")
+    with pytest.raises(UnfitTopography, match="is a link to another file"):
+        scan(tmp_path / "scan.h5", **LINES)
 
 
 def test_soft_links_are_no_datasets(tmp_path):

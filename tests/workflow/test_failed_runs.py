@@ -209,7 +209,15 @@ def test_values_that_are_not_finite_end_a_run_and_leave_what_came_before(sweep, 
     assert dataset({"odd": file})[0].exists()
 
 
-@pytest.mark.parametrize("error", [MemoryError("no room"), OSError(28, "No space left on device"), ImportError("none")])
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("no room"),
+        OSError(28, "No space left on device"),
+        ImportError("none"),
+        RuntimeError("can't start new thread"),
+    ],
+)
 def test_what_the_machine_lacks_is_no_result(sweep, tmp_path, monkeypatch, error):
     def raising(*arguments):
         raise error

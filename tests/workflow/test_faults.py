@@ -4,6 +4,7 @@ import importlib.util
 import json
 import os
 import random
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -79,7 +80,9 @@ def test_an_orphan_leaves_nothing_of_its_own_settings(reference):
     assert faults.orphan(reference, 0.4 * reference.seconds).violations == ()
 
 
-@pytest.mark.skipif(os.getuid() != 0, reason="only root may mount")
+@pytest.mark.skipif(
+    os.getuid() != 0 or not shutil.which("mkfs.ext4"), reason="only root may mount, and ext4 must be there"
+)
 def test_what_is_complete_is_still_there_after_a_power_cut(tmp_path):
     contents = {f"runs/{number}.nc": random.Random(number).randbytes(100_000) for number in range(5)}
     disk = tmp_path / "disk"

@@ -9,14 +9,18 @@ import time
 from base64 import urlsafe_b64encode
 from multiprocessing import spawn
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from conftest import REPOSITORY
 
+from icha.datasets.surface_file import write_surface
 from icha.support.atomic_files import whole_file, why_not_writable
-from icha.support.checksums import is_whole, lost, write_checksum
+from icha.support.checksums import asked_of, is_whole, lost, made_as, sha256_of, write_checksum
 from icha.support.ownership import take_over
 from icha.support.processes import beginning_of
+from icha.surfaces.spectrum import SelfAffineSpectrum
 
 RESULTS = "results/tiny"
 SCRIPT = f"""
@@ -42,9 +46,9 @@ def job(tmp_path):
     (tmp_path / RESULTS / "surfaces/a.nc").write_bytes(b"heights")
     write_checksum(tmp_path / RESULTS, "surfaces/a.nc")
 
-    def start(work, log="logs/b.log", **environment):
+    def start(work, log="logs/b.log", before="", **environment):
         return subprocess.Popen(
-            [sys.executable, "-c", SCRIPT + work, f"{RESULTS}/{log}"],
+            [sys.executable, "-c", before + SCRIPT + work, f"{RESULTS}/{log}"],
             cwd=tmp_path,
             env=os.environ | {"PYTHONPATH": str(REPOSITORY)} | environment,
             stderr=subprocess.PIPE,
@@ -64,6 +68,46 @@ def test_a_job_records_what_it_wrote(job):
     assert ended(job(WORK)) == (0, "")
     assert json.loads((job.results / "checksums/runs/b.nc.json").read_text())["size"] == len("a result")
     assert (job.results / "logs/b.log").read_text() == "at work\n"
+
+
+def test_a_job_records_what_it_was_asked_for_whatever_it_does_with_it(job):
+    assert ended(job(f"{WORK}    snakemake.params[0].clear()\n")) == (0, "")
+    assert made_as(job.results, "runs/b.nc") == asked_of([repr({"seed": 1}), repr("code")])
+
+
+def test_a_run_that_is_there_is_not_lost_because_what_was_kept_for_it_cannot_be_removed(tmp_path):
+    """As of file systems in networks, which leave names of files that are still open."""
+    results = tmp_path / RESULTS
+    for folder in ("surfaces", "logs"):
+        (results / folder).mkdir(parents=True)
+    surface = SelfAffineSpectrum(1e-6, 1e-6, 0.5e-6, 0.8).realise(16, 1).scaled_to_rms_slope(1.0)
+    write_surface(results / "surfaces/a.nc", surface, name="a", seed=1)
+    write_checksum(results, "surfaces/a.nc")
+    script = f"""
+import os, runpy, sys
+from types import SimpleNamespace
+sys.path.insert(0, {str(REPOSITORY / "workflow/scripts")!r})
+class Named(list):
+    def __init__(self, **named):
+        super().__init__(named.values())
+        self.__dict__.update(named)
+def refuse(*_, **__):
+    raise OSError(39, "Directory not empty")
+os.rmdir = refuse
+settings = dict(
+    material=dict(contact_modulus=1e6, surface_energy=1e-4, interaction_range=1e-9), rms_slope=0.3, seed=1,
+    path=dict(reduced_pressures=[0.01], snapshots=None), model="boundary_elements",
+)
+snakemake = SimpleNamespace(
+    input=Named(surface="{RESULTS}/surfaces/a.nc"), output=["{RESULTS}/runs/b.nc"], log=["{RESULTS}/logs/b.log"],
+    params=Named(settings=settings, attributes={{"campaign": "tiny"}}, keeps=True),
+)
+runpy.run_path({str(REPOSITORY / "workflow/scripts/run_sweep.py")!r}, dict(snakemake=snakemake))
+"""
+    environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment, check=False)
+    assert done.returncode == 0, (results / "logs/b.log").read_text()
+    assert (results / "runs/b.kept").is_dir() and made_as(results, "runs/b.nc")
 
 
 def test_a_job_that_fails_leaves_its_result_to_be_made_again(job):
@@ -107,6 +151,13 @@ def test_a_job_ends_with_the_snakemake_that_wants_it(job):
     assert ended(process) == (1, "")
 
 
+def test_a_job_runs_where_processes_may_not_be_watched(job):
+    """As in containers whose system calls are filtered."""
+    refused = "import os\ndef refuse(*_):\n    raise PermissionError(1, 'Operation not permitted')\n"
+    told = f"{os.getpid()} {beginning_of(os.getpid())}"
+    assert ended(job(WORK, before=f"{refused}os.pidfd_open = refuse\n", ICHA_SNAKEMAKE=told)) == (0, "")
+
+
 @pytest.mark.parametrize("reused", [False, True])
 def test_a_job_whose_snakemake_is_gone_before_it_begins_writes_nothing(job, reused):
     snakemake = subprocess.Popen(["true"])
@@ -119,14 +170,14 @@ def test_a_job_whose_snakemake_is_gone_before_it_begins_writes_nothing(job, reus
 
 
 def test_a_job_is_killed_with_the_snakemake_that_started_it(job, tmp_path):
-    (tmp_path / "busy.py").write_text(SCRIPT + f"{WORK}    int('7' * 4_000_000)  # in the interpreter, for minutes\n")
+    busy = "    import re\n    re.match('(a?){60}b', 'a' * 60)  # holds the interpreter for longer than anybody lives\n"
+    (tmp_path / "busy.py").write_text(SCRIPT + WORK + busy)
     caller = f"""
 import os, subprocess, sys
 sys.path.insert(0, {str(REPOSITORY)!r})
 from icha.support.processes import beginning_of
 os.environ["ICHA_SNAKEMAKE"] = f"{{os.getpid()}} {{beginning_of(os.getpid())}}"
-sys.set_int_max_str_digits(0)
-process = subprocess.Popen([sys.executable, "-X", "int_max_str_digits=0", "busy.py", "{RESULTS}/logs/b.log"])
+process = subprocess.Popen([sys.executable, "busy.py", "{RESULTS}/logs/b.log"])
 print(process.pid, flush=True)
 process.wait()
 """
@@ -176,6 +227,27 @@ def test_a_job_of_an_earlier_call_that_begins_late_touches_no_record_of_a_later_
     assert (job.results / "runs/b.nc").read_text() == "a result"
 
 
+def test_a_call_that_has_no_jobs_takes_nothing_from_those_that_run(job, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import before_jobs
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)  # as where files cannot be locked
+    monkeypatch.setenv("ICHA_OWNER", "")
+    take_over(".snakemake/tiny.owner")
+    earlier = os.environ["ICHA_OWNER"]
+    campaign = before_jobs.Campaign(RESULTS, dry_run=False)
+    assert ended(job(WORK, ICHA_OWNER=earlier)) == (0, "")
+    # With jobs to start it owns the results, but not if they are not those any more that it has looked at.
+    (job.results / "runs/b.nc").write_text("another result")
+    with pytest.raises(SystemExit, match=r"runs/b\.nc has changed since .* give the same command again"):
+        campaign.own()
+    (job.results / "runs/b.nc").unlink()
+    campaign.own()
+    assert ended(job(WORK, ICHA_OWNER=earlier))[0] == 1
+    assert not (job.results / "runs/b.nc").exists()
+
+
 def wait_for(what, seconds=120):
     until = time.monotonic() + seconds
     while time.monotonic() < until:
@@ -195,6 +267,33 @@ def is_alive(process):
         return False
 
 
+def test_a_file_that_has_changed_since_it_was_looked_at_is_neither_a_surface_nor_copied(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
+    from make_surface import make_surface
+    from write_configuration import write_configuration
+
+    file, surface, copy = (tmp_path / name for name in ("heights.npy", "surface.nc", "copy.npy"))
+    settings = {"kind": "file", "period": 1e-3, "metres_per_unit": 1e-6}
+
+    def both(sha256):
+        make_surface(
+            surface, name="own", seed=0, settings=settings, height_map=file, sha256=sha256, attributes={"campaign": "a"}
+        )
+        write_configuration(tmp_path / "used.yaml", text="name: a", copies={copy: file}, sha256=[sha256])
+
+    np.save(file, np.random.default_rng(1).normal(size=(16, 16)))
+    looked_at = sha256_of(file)
+    both(looked_at)
+    assert copy.read_bytes() == file.read_bytes() and surface.exists()
+    surface.unlink()
+    np.save(file, np.random.default_rng(2).normal(size=(16, 16)))
+    with pytest.raises(ValueError, match=r"heights\.npy has changed since the campaign was begun; give the same"):
+        both(looked_at)
+    with pytest.raises(ValueError, match=r"heights\.npy has changed"):
+        write_configuration(tmp_path / "used.yaml", text="name: a", copies={copy: file}, sha256=[looked_at])
+    assert not surface.exists() and sha256_of(copy) == looked_at
+
+
 def test_a_shell_gets_pythons_path_in_quotes_and_nobody_else_does(monkeypatch):
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
     import before_jobs
@@ -207,6 +306,23 @@ def test_a_shell_gets_pythons_path_in_quotes_and_nobody_else_does(monkeypatch):
         assert said == "/it's a folder/python" == os.fsdecode(spawn.get_executable())
     finally:
         spawn.set_executable(own)
+
+
+def test_only_files_that_lie_here_go_after_modules_of_their_names(tmp_path, monkeypatch):
+    clone, folder, asked = (tmp_path / name for name in ("clone", "folder", "asked"))
+    folder.mkdir()
+    own, installed = "/home/anna/.local/lib/python3/site-packages", "/usr/lib/python3/dist-packages"
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("PYTHONPATH", f"{asked}{os.pathsep}")
+    monkeypatch.setattr(sys, "path", [str(clone), "", str(folder), str(asked), own, installed])
+    first = (REPOSITORY / "Snakefile").read_text(encoding="utf-8").partition("from snakemake")[0]
+    exec(first, {"workflow": SimpleNamespace(basedir=clone)})
+    assert sys.path == [str(asked), own, installed, str(clone), "", str(folder)]
+    # What is asked for stays where it is, wherever it lies.
+    monkeypatch.setenv("PYTHONPATH", str(clone))
+    monkeypatch.setattr(sys, "path", [str(folder), str(clone), installed])
+    exec(first, {"workflow": SimpleNamespace(basedir=clone)})
+    assert sys.path == [str(clone), installed, str(folder)]
 
 
 def test_a_library_that_cannot_write_is_told_apart_from_one_that_will_not(tmp_path):

@@ -140,6 +140,15 @@ def test_scripts_whose_fingerprint_a_module_is_part_of(module, scripts, fingerpr
     assert having == scripts
 
 
+def test_what_surrounds_all_scripts_is_part_of_no_fingerprint(fingerprint):
+    script = REPOSITORY / "workflow/scripts/run_sweep.py"
+    sweep = fingerprint.files_of(script, *(f"icha.models.{name}" for name in MODELS))
+    around = {"job.py", *(f"icha/support/{name}.py" for name in ("ownership", "printable", "processes"))}
+    assert not around & set(sweep)
+    # What writes and reads datasets is.
+    assert {"icha/support/atomic_files.py", "icha/datasets/files.py"} <= set(sweep)
+
+
 def test_models_of_contact_know_nothing_of_each_other(fingerprint):
     script = REPOSITORY / "workflow/scripts/run_sweep.py"
     asperities, patches = (set(fingerprint.files_of(script, f"icha.models.{name}")) for name in MODELS)

@@ -1,14 +1,18 @@
 """Results that are whole but are not those of what is asked for: they never pass for up to date."""
 
+import json
+import os
 import shutil
 from base64 import urlsafe_b64encode
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import xarray as xr
 from bare_campaign import CAMPAIGN
 from conftest import REPOSITORY, copy_project, snakemake
 
-from icha.support.checksums import damaged
+from icha.support.checksums import asked_of, damaged, sha256_as_written, write_checksum
 
 CONFIGURATION = "config/campaigns/small.yaml"
 RUNS = [f"runs/load/rough/seed{seed}/slope1/bare.nc" for seed in (1, 2)]
@@ -97,3 +101,48 @@ def test_unchanged_results_without_the_workflows_records_are_left_alone(finished
     project = shutil.copytree(finished[0], tmp_path / "project", symlinks=True)
     records_lost(finished[0], project)
     assert NOTHING in campaign(project, 25).stdout
+
+
+class Rule(SimpleNamespace):
+    """What of a rule is looked at, whose result is one file."""
+
+    def __init__(self, path, *params):
+        super().__init__(script="script.py", params=params, output=[SimpleNamespace(match=path.__eq__)])
+
+    def get_wildcards(self, path):
+        return {}
+
+
+def test_what_was_made_from_another_input_is_made_again_whatever_the_records_and_times_say(tmp_path, monkeypatch):
+    """A run with its sidecar from another machine: of the same settings, other bytes, an older time."""
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import before_jobs
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
+    results, asked = Path("results/tiny"), {"run.nc": ["25e6"], "dataset.nc": ["a title"]}
+    rules = [Rule(f"{results}/{path}", *values) for path, values in asked.items()]
+    metadata, incomplete = Path(".snakemake/metadata"), Path(".snakemake/incomplete")
+    for folder in (results, metadata):
+        folder.mkdir(parents=True)
+
+    def written(path, content, **made_from):
+        (results / path).write_bytes(content)
+        write_checksum(results, path, asked=asked_of(map(repr, asked[path])), inputs=made_from)
+        record = metadata / urlsafe_b64encode(f"{results}/{path}".encode()).decode()
+        record.write_text(json.dumps({"params": [repr(value) for value in asked[path]]}))
+
+    def made_again():
+        before_jobs.Campaign(str(results), dry_run=False).have_stale_made_again(
+            [f"{results}/{path}" for path in asked], rules
+        )
+        return len(list(incomplete.iterdir())) if incomplete.is_dir() else 0
+
+    written("run.nc", b"one run")
+    written("dataset.nc", b"of one run", **{"run.nc": sha256_as_written(results, "run.nc")})
+    assert made_again() == 0
+    written("run.nc", b"another")
+    os.utime(results / "run.nc", (1, 1))
+    write_checksum(results, "run.nc", asked=asked_of(map(repr, asked["run.nc"])))
+    assert damaged(results) == []
+    assert made_again() == 1

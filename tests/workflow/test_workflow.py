@@ -381,3 +381,10 @@ def test_surface_files_and_measurements(smoke, tmp_path):
     assert "A. Nobody, private communication" in (tmp_path / "results/own/report.html").read_text()
     again = snakemake(smoke, "-n", "-d", str(tmp_path), configuration=tmp_path / "own.yaml")
     assert "Nothing to be done" in again.stdout
+    # Another table is another figure, even if it is an old one.
+    (tmp_path / "points.csv").write_text("p,a\n1,0.1\n100,3\n")
+    os.utime(tmp_path / "points.csv", (0, 0))
+    planned = snakemake(smoke, "-n", "-d", str(tmp_path), configuration=tmp_path / "own.yaml").stdout
+    assert "Figure fig5_multi_slope" in planned and "Sweep" not in planned
+    # And it is copied anew.
+    assert "Writing the configuration as used" in planned

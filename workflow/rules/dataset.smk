@@ -3,6 +3,7 @@
 
 from icha.configuration.settings import campaign_sha256
 from icha.publication.attributes import discovery_attributes
+from icha.support.checksums import sha256_of
 
 
 rule configuration:
@@ -22,6 +23,8 @@ rule configuration:
         runtime=2,
     params:
         text=as_it_is(CONFIG_TEXT),
+        # Of the files that are copied their content, whatever their time.
+        sha256=lambda wildcards: [sha256_of(Path(file)) for file in COPIED.values()],
         code=code_of("write_configuration.py"),
     message:
         "Writing the configuration as used"
@@ -50,7 +53,11 @@ rule campaign_dataset:
         attributes=as_it_is(
             ATTRIBUTES
             | discovery_attributes(PUBLICATION)
-            | {"title": CAMPAIGN.title, "summary": CAMPAIGN.summary, "config_sha256": campaign_sha256(CAMPAIGN)}
+            | {
+                "title": CAMPAIGN.title,
+                "summary": CAMPAIGN.summary,
+                "config_sha256": campaign_sha256(CAMPAIGN, SHA256_OF_RUN),
+            }
         ),
         code=code_of("make_dataset.py"),
     message:

@@ -4,6 +4,7 @@
 from icha.datasets.results import ResultFiles
 from icha.figures.registry import DECLARATIONS
 from icha.planning.resources import figure_memory
+from icha.support.checksums import sha256_of
 
 RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)
 
@@ -29,6 +30,11 @@ rule figure:
         runtime=10,
     params:
         arguments=lambda wildcards: CAMPAIGN.figures.arguments(wildcards.name, CAMPAIGN),
+        # Of tables of measurements their content, whatever their time.
+        sha256=lambda wildcards: [
+            sha256_of(Path(table))
+            for table in CAMPAIGN.figures.inputs(wildcards.name, CAMPAIGN, RESULT_FILES).get("tables", ())
+        ],
         code=lambda wildcards: code_of("draw_figure.py", f"icha.figures.{wildcards.name}"),
     message:
         "Figure {wildcards.name}"

@@ -33,6 +33,8 @@ def _failures_of_solvers():
 def guarded(snakemake):
     """Surround the work of a job: its inputs must be what was written, its outputs get checksums, its errors are told.
 
+    Its context gives what was asked of the job (`checksums.asked_of`), and checksums of inputs that are results.
+
     All output goes to the job's log; an error ends the job with its message there. The errors that users can mend say
     all in their message. The traceback of any other one is for the developers and is kept beside the log.
     """
@@ -50,8 +52,9 @@ def guarded(snakemake):
         for path in outputs:
             checksums.begin(results, path)
         inputs = _checksums_of(results, snakemake.input)
-        yield
+        # Before the work, which could change what it is given.
         asked = checksums.asked_of(map(repr, snakemake.params))
+        yield asked, inputs
         for path in outputs:
             checksums.write_checksum(results, path, asked=asked, inputs=inputs)
         sys.stdout.flush()
@@ -65,6 +68,18 @@ def guarded(snakemake):
                 traceback.print_exc(file=details)
                 _say(f"Details for the developers: {log}.traceback", terminal)
         sys.exit(1)
+
+
+def refuse_changed(file, sha256, name=None):
+    """Refuse a file that was read, or copied from the file `name`, unless its content is what was asked for.
+
+    Raises
+    ------
+    ValueError
+        If it has another SHA-256: results would be known as those of what was there before.
+    """
+    if checksums.sha256_of(Path(file)) != sha256:
+        raise ValueError(f"{name or file} has changed since the campaign was begun; give the same command again")
 
 
 def attributes(snakemake):
@@ -128,16 +143,22 @@ def _end_with_snakemake():
     if SNAKEMAKE not in os.environ or not hasattr(os, "pidfd_open"):
         return  # no job of Snakemake, or not on Linux
     number, _, began = os.environ[SNAKEMAKE].partition(" ")
+    number = int(number)
     try:
-        snakemake = os.pidfd_open(int(number))
+        snakemake = os.pidfd_open(number)
+    except OSError:  # it is gone, which is seen next, or processes may not be watched here
+        snakemake = None
+    try:
         # Another process may have the number by now.
-        is_gone = beginning_of(int(number)) != began
+        is_gone = beginning_of(number) != began
     except (ProcessLookupError, FileNotFoundError):
         is_gone = True
     if is_gone:
         os._exit(1)
-    if os.getppid() == int(number):
-        end_with_parent(int(number))
+    if os.getppid() == number:
+        end_with_parent(number)
+    if snakemake is None:
+        return
 
     def wait():
         select.select([snakemake], [], [])

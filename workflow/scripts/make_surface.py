@@ -1,6 +1,6 @@
 """Make a topography, by spectral synthesis or from a file, and write it at rms slope 1."""
 
-from job import attributes, guarded
+from job import attributes, guarded, refuse_changed
 
 from icha.datasets.surface_file import write_surface
 from icha.surfaces.measured.height_map import read_height_map
@@ -11,8 +11,11 @@ from icha.surfaces.surface import Surface
 SPECTRUM = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
 
 
-def make_surface(output, *, name, seed, settings, height_map=None, attributes):
-    """Write the surface `name` to `output`; `settings` are those of the configuration, in SI units."""
+def make_surface(output, *, name, seed, settings, height_map=None, sha256=None, attributes):
+    """Write the surface `name` to `output`; `settings` are those of the configuration, in SI units.
+
+    `height_map` is the file of a surface that is not made at random, and `sha256` its checksum as it was asked for.
+    """
     spectrum = measured = None
     if settings["kind"] == "self_affine":
         spectrum = SelfAffineSpectrum(**{key: settings[key] for key in SPECTRUM})
@@ -22,6 +25,8 @@ def make_surface(output, *, name, seed, settings, height_map=None, attributes):
         surface = measured.surface
     else:
         surface = Surface(read_height_map(height_map, settings["metres_per_unit"]), settings["period"])
+    if height_map is not None:
+        refuse_changed(height_map, sha256)
     surface = surface.scaled_to_rms_slope(1.0)
     write_surface(output, surface, name=name, seed=seed, spectrum=spectrum, measured=measured, attrs=attributes)
 
@@ -34,5 +39,6 @@ if "snakemake" in globals():
             seed=int(snakemake.wildcards.seed),
             settings=snakemake.params.settings,
             height_map=snakemake.input.get("height_map"),
+            sha256=snakemake.params.sha256,
             attributes=attributes(snakemake),
         )

@@ -15,7 +15,6 @@ from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
 from icha.simulation import ConvergenceError, simulate, unfollowed
-from icha.support.checksums import sha256_of
 
 # What this machine lacks says nothing of the run: its job fails, and the next call tries again.
 OF_THE_MACHINE = (OSError, MemoryError, ImportError)
@@ -36,6 +35,8 @@ def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, p
     except OF_THE_MACHINE:
         raise
     except Exception as error:
+        if type(error) is RuntimeError:  # of Python itself, which could start no thread
+            raise
         reason = f"nothing was computed: {error}"
         if not isinstance(error, ValueError):
             reason = f"{type(error).__name__}, which was not expected: {error}"
@@ -46,18 +47,14 @@ def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, p
     write_dataset(dataset.assign_attrs(attributes), output)
 
 
-def _kept(snakemake):
-    """The folder in which equilibria are kept, if they are, with nothing in it from another surface, path or code."""
-    if not snakemake.params.keeps:
-        return None
-    asked = [snakemake.params.attributes["config_sha256"], snakemake.params.code, np.__version__, scipy.__version__]
-    asked.append(sha256_of(pathlib.Path(snakemake.input.surface)))
-    return prepared(pathlib.Path(snakemake.output[0]).with_suffix(".kept"), " ".join(asked))
+def _kept(output, asked, inputs):
+    """The folder in which equilibria are kept, with nothing in it from another surface, path or code."""
+    return prepared(pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {np.__version__} {scipy.__version__}")
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
-        kept = _kept(snakemake)
+    with guarded(snakemake) as (asked, inputs):
+        kept = _kept(snakemake.output[0], asked, inputs) if snakemake.params.keeps else None
         run_sweep(
             snakemake.input.surface,
             snakemake.output[0],
@@ -67,4 +64,5 @@ if "snakemake" in globals():
             kept=kept,
         )
         if kept is not None:
-            shutil.rmtree(kept)
+            # The run is there. What cannot be removed, of a file system in a network for one, is no reason to lose it.
+            shutil.rmtree(kept, ignore_errors=True)

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from icha.support.rules import GRID
 from icha.support.units import conversion_factor
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-
-# Points along a side that a text of coordinates may have.
-_MOST_NODES = 32768
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +49,8 @@ def regular_ticks(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float
     usual = np.median(steps)
     # Where every tick is there, counting them is safer than trusting the digits of one step.
     count = len(steps) + 1 if np.max(steps) < 1.5 * usual else int(np.rint((high - low) / usual)) + 1
-    if count > _MOST_NODES:
-        raise ValueError(f"{axis} is not on a regular grid of at most {_MOST_NODES} points")
+    if count > GRID.most:
+        raise ValueError(f"{axis} is not on a regular grid of at most {GRID.most} points")
     step = (high - low) / (count - 1)
     index = np.rint((values - low) / step).astype(int)
     if np.max(np.abs(values - low - index * step)) > 0.05 * step:

@@ -1,5 +1,6 @@
 """A scan in metres: what a file of any format says, with units and size."""
 
+import importlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,8 @@ READERS = {
     "fourier": read_fourier,
     "instrument": read_instrument,
 }
+# Libraries of the readers that have one. They are imported before memory is bounded: theirs is not the file's.
+_LIBRARIES = {"netcdf": "netCDF4", "hdf5": "h5py", "instrument": "SurfaceTopography"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +90,8 @@ def read_scan(path: Path, how: Preparation) -> Scan:
 def _read(path, name, how):
     """What the reader of a format finds, if that are heights."""
     try:
+        if name in _LIBRARIES:
+            importlib.import_module(_LIBRARIES[name])
         with bounded_memory():
             refuse_data_elsewhere(path)
             found = READERS[name](path, how)

@@ -85,12 +85,13 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
 
 @dataclass(frozen=True)
 class TopographyFacts:
-    """What the plan of a campaign needs to know of a measured surface: side (m) and nodes, slope and boundary."""
+    """What a plan needs to know of a measured surface and its file: side (m), nodes, slope, boundary, checksum."""
 
     grid: int
     period: float
     rms_slope: float
     boundary: str
+    source_sha256: str
 
 
 def topography_facts(path: str | os.PathLike, preparation: Mapping) -> TopographyFacts:
@@ -101,8 +102,9 @@ def topography_facts(path: str | os.PathLike, preparation: Mapping) -> Topograph
 
 @lru_cache(maxsize=256)
 def _facts(path, modified, size, preparation):
-    surface = prepared_topography(path, json.loads(preparation)).surface
-    return TopographyFacts(surface.grid, surface.period, surface.rms_slope, surface.boundary)
+    prepared = prepared_topography(path, json.loads(preparation))
+    surface = prepared.surface
+    return TopographyFacts(surface.grid, surface.period, surface.rms_slope, surface.boundary, prepared.source_sha256)
 
 
 def _existing(path):
