@@ -9,6 +9,7 @@ from icha.cli.project import FAILED, WRONG
 from icha.cli.terminal import say
 from icha.publication.deposit_files import CHECKSUMS
 from icha.support.in_words import counted
+from icha.support.printable import printable
 
 # What of a campaign is no netCDF file, by its name.
 _BY_NAME = {
@@ -62,7 +63,7 @@ def check(
             status = max(status, FAILED)
             say(f"{file}: {kind}, {counted(len(found), 'flaw')}", fg="red")
             for flaw in found:
-                say(f"    {flaw}")
+                say(f"    {printable(flaw)}")
         else:
             numbers = f" ({counted(tested, 'check')} of its numbers)" if tested else ""
             say(f"{file}: {kind}, all is well{numbers}")

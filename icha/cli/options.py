@@ -46,6 +46,9 @@ Folder = Annotated[
         show_default=False,
     ),
 ]
+Anyway = Annotated[
+    bool, typer.Option("--anyway", help="Run even if more memory or disk is expected to be needed than there is.")
+]
 Large = Annotated[
     bool,
     typer.Option(

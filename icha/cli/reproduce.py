@@ -1,19 +1,20 @@
 """Compute a deposit again, by the program that is installed or by its own, and compare."""
 
 import shutil
-import sys
 import tempfile
 import textwrap
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import typer
 
-from icha.cli.options import Cores, Large
+from icha.cli.deposits import agree, flaws_of, listed
+from icha.cli.options import Anyway, Cores, Large
 from icha.cli.project import FAILED, Mistake, shown
 from icha.cli.rerun_programs import fail, run_installed, run_own_source, stopped_by_signals
-from icha.cli.terminal import confirmed, say
+from icha.cli.terminal import say
+from icha.publication.strangers_files import Found
 from icha.support import in_words
 from icha.support.in_words import counted
 from icha.support.printable import printable
@@ -58,7 +59,10 @@ def reproduce(
             show_default=False,
         ),
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", help="Do not ask; with --isolation none also where nothing isolates.")
+    ] = False,
+    anyway: Anyway = False,
     json: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the comparison to this file.", show_default=False)
     ] = None,
@@ -73,59 +77,69 @@ def reproduce(
     what that means, and asked. Everything that was computed is compared, variable by variable: identical, within
     tolerance, or different. With `--only smallest` this takes minutes.
 
-    Exit status: 0 if all is identical or within tolerance, 1 if not, 2 if the deposit is damaged or not there, or
-    cannot be computed.
+    Exit status: 0 if all is identical or within tolerance, 1 if not, or if computing fails or is stopped, 2 if the
+    deposit is damaged or not there, or nothing is computed for another reason.
     """
-    from icha.publication.deposit_files import contents, verify_deposit
-    from icha.publication.isolation import NO_ISOLATION
-    from icha.publication.rerun import LOCK, OWN_SOURCE, PROGRAM, Refused, asked_runs, begin, campaign_of
-    from icha.publication.strangers_files import LIMITS, NO_LIMITS
+    from icha.publication.deposit_files import whole_deposit
 
-    if not deposit.exists():
-        raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")
     if not own_source and (environment or isolation):
         given = "--environment" if environment else "--isolation"
         raise Mistake(f"{given}: is about the deposit's own source, which is not run; needed: --own-source as well")
-    if wrong := verify_deposit(deposit, NO_LIMITS if large else LIMITS):
-        raise Mistake(f"{printable(deposit)}: the deposit is damaged; needed: a whole one:\n" + "\n".join(wrong))
-    sizes = contents(deposit)
+    if wrong := flaws_of(deposit, large=large):
+        raise Mistake(f"{printable(deposit)}: the deposit is damaged; needed: a whole one:\n{listed(wrong)}")
     temporary = folder is None
-    try:
-        campaign = campaign_of(deposit, sizes, OWN_SOURCE if own_source else (PROGRAM, LOCK))
-        runs = asked_runs(only or (), deposit, sizes)
-        isolation = _isolation(isolation, environment) if own_source else NO_ISOLATION
-        place = shown(folder) if folder else "a temporary folder"
-        _tell_what_it_says(deposit, sizes)
-        if own_source:
-            _tell_of_own_source(environment or "lock", isolation, place)
-            _ask(yes)
-        else:
-            _tell_of_installed(deposit, place)
+    with whole_deposit(deposit) as found:
+        rerun = _agreed(found, only or (), own_source, environment, isolation, folder, yes)
         folder = Path(tempfile.mkdtemp(prefix="icha-reproduce-") if temporary else folder).resolve()
-        begin(folder, deposit)
-    except Refused as refused:
-        raise Mistake(str(refused)) from None
-    try:
-        how = (environment or "lock", isolation) if own_source else None
-        made, comparison, status = _computed_again(deposit, folder, campaign, runs, sizes, how, cores)
-    except Mistake:
-        if temporary:
-            shutil.rmtree(folder)
-        raise
-    if json:
-        from icha.publication.rerun_comparison import write_json
-
-        write_json(comparison, json)
+        try:
+            made, comparison, status = _computed_again(rerun, folder, cores, anyway)
+        except (Mistake, OSError):
+            if temporary:
+                shutil.rmtree(folder)
+            raise
     good = _tell(comparison, status)
     if temporary and good and not keep:
         shutil.rmtree(folder)
     else:
         say(f"what was computed again: {shown(made)}")
+    if json:
+        from icha.publication.rerun_comparison import write_json
+
+        write_json(comparison, json)
     if not good:
         raise typer.Exit(FAILED)
 
 
-def _isolation(asked: str | None, environment: str | None) -> str:
+class _Rerun(NamedTuple):
+    """What is computed again, and how: by the deposit's own program, with an environment and isolation, or not."""
+
+    deposit: Found
+    campaign: dict
+    runs: list[str]
+    own_source: tuple[str, str] | None
+
+
+def _agreed(deposit: Found, only, own_source: bool, environment, isolation, folder: Path | None, yes: bool) -> _Rerun:
+    """What is asked for of a deposit that is whole, after telling of it and asking."""
+    from icha.publication.rerun import LOCK, OWN_SOURCE, PYPROJECT, Refused, asked_runs, campaign_of
+
+    place = shown(folder) if folder else "a temporary folder"
+    try:
+        campaign = campaign_of(deposit, OWN_SOURCE if own_source else (PYPROJECT, LOCK))
+        runs = asked_runs(only, deposit)
+        how = (environment or "lock", _isolation(isolation, environment, yes)) if own_source else None
+        _tell_what_it_says(deposit)
+        if how:
+            _tell_of_own_source(*how, place)
+            agree("Run it?", yes=yes, done="run")
+        else:
+            _tell_of_installed(deposit, place)
+    except Refused as refused:
+        raise Mistake(str(refused)) from None
+    return _Rerun(deposit, campaign, runs, how)
+
+
+def _isolation(asked: str | None, environment: str | None, yes: bool) -> str:
     """The program that isolates: the one that is asked for, or `bwrap` where it works."""
     from icha.publication.isolation import BWRAP, CONTAINERS, NO_ISOLATION, works
 
@@ -137,45 +151,51 @@ def _isolation(asked: str | None, environment: str | None) -> str:
         return asked or BWRAP
     if asked:
         raise Mistake(f"--isolation {asked}: is not installed, or cannot isolate here; allowed: another one, or none")
+    if yes:
+        raise Mistake(
+            f"--yes: {BWRAP} is not installed, or cannot isolate here, so that the deposit's program could do whatever "
+            "you can, and nobody is asked; needed: --isolation none as well, or another --isolation"
+        )
     return NO_ISOLATION
 
 
-def _tell_what_it_says(deposit: Path, sizes) -> None:
+def _tell_what_it_says(deposit: Found) -> None:
     """Print what the deposit is, and what it says of itself."""
-    from icha.publication.statement import METADATA, metadata_of, statement
+    from icha.publication.deposit_files import ZENODO
+    from icha.publication.statement import metadata_of, statement
 
-    said = {}
-    if METADATA in sizes:
+    sizes, said = deposit.sizes, {}
+    if ZENODO in sizes:
         try:
             said = {name: text for name, text in statement(metadata_of(deposit)).items() if text}
         except ValueError as error:
-            raise Mistake(f"{printable(deposit)}: {error}") from None
-    say(f"deposit:    {printable(deposit)}, {counted(len(sizes), 'file')}, {in_words.size(sum(sizes.values()))}")
+            raise Mistake(f"{printable(deposit.path)}: {error}") from None
+    say(f"deposit:    {printable(deposit.path)}, {counted(len(sizes), 'file')}, {in_words.size(sum(sizes.values()))}")
     say("it says of itself, and nobody has checked it:" if said else "it does not say whose it is")
     for name, text in said.items():
         say(f"  {name + ':':<10}{printable(textwrap.shorten(text, 200, placeholder=' …'))}")
 
 
-def _tell_of_installed(deposit: Path, place) -> None:
+def _tell_of_installed(deposit: Found, place) -> None:
     """Print that the installed program is run; `Mistake` if it is not the one that made the deposit."""
-    from icha.publication.rerun import changed_modules, unlike_installed
+    from icha.publication.rerun import changed_files, unlike_installed
 
     if wrong := unlike_installed(deposit):
         raise Mistake(
-            f"what is installed is not what {printable(deposit)} was made with; needed: these versions, as "
+            f"what is installed is not what {printable(deposit.path)} was made with; needed: these versions, as "
             "`make environment` installs them in a clone of that version; or --own-source, which runs the program in "
             "the deposit:\n" + "\n".join(wrong)
         )
     say(f"is run:     the ICHA that is installed, {version('icha')}; nothing in the deposit is executed")
-    if changed := changed_modules(deposit):
-        say(f"            (the deposit's source differs from it in {counted(changed, 'module')})", fg="yellow")
+    if changed := changed_files(deposit):
+        say(f"            (the deposit's source differs from it in {counted(changed, 'file')})", fg="yellow")
     say(f"can touch:  {place}")
 
 
 def _tell_of_own_source(environment: str, isolation: str, place) -> None:
     """Print that the deposit's own program is run, what it can touch, and what is better."""
     from icha.publication.isolation import BWRAP, CONTAINERS, NO_ISOLATION, works
-    from icha.publication.rerun import surroundings
+    from icha.publication.rerun import PROJECT, surroundings
 
     first = "" if environment == "here" else "its `make environment`, and then "
     say(f"is run:     the program in the deposit: {first}its `icha run`")
@@ -186,40 +206,32 @@ def _tell_of_own_source(environment: str, isolation: str, place) -> None:
         say(f"advice:     run it isolated: {advice}", fg="yellow")
     else:
         until = "no network" if environment == "here" else "the network until its environment is installed"
-        say(f"can touch:  {place}, and by {isolation} nothing else; {until}")
+        say(f"can touch:  {PROJECT} in {place}, and by {isolation} nothing else; {until}")
     say(f"variables:  {', '.join(sorted(surroundings()))}; no other ones of yours")
 
 
-def _ask(yes: bool) -> None:
-    if yes:
-        return
-    if not sys.stdin.isatty():
-        raise Mistake("there is no terminal to ask at, so nothing of the deposit is run; needed: --yes, or a terminal")
-    if not confirmed("Run it?"):
-        say("Nothing was run.")
-        raise typer.Exit(FAILED)
-
-
-def _computed_again(deposit, folder, campaign, runs, sizes, how, cores):
+def _computed_again(rerun: _Rerun, folder: Path, cores: str | None, anyway: bool):
     """The folder with the results, their comparison with the deposit's, and the exit status of the campaign."""
-    from icha.publication.rerun import Refused, prepare, refuse_wrong_configuration
+    from icha.publication.rerun import Refused, begin, prepare, refuse_wrong_configuration
 
     goes_on = f"the same command with --folder {shown(folder)} goes on from here"
-    name = campaign["name"]
+    name = rerun.campaign["name"]
+    options = [*(["--cores", cores] if cores else []), *(["--anyway"] if anyway else [])]
     try:
         with stopped_by_signals():
-            project, original = prepare(folder, deposit, own_source=bool(how))
+            begin(folder, rerun.deposit)
+            project, original = prepare(folder, rerun.deposit, own_source=bool(rerun.own_source))
             say(f"computing in {shown(project)}")
-            targets = [f"results/{name}/{run}" for run in runs] or ["all"]
-            if how:
-                status = run_own_source(project, folder, campaign, targets, cores, *how)
+            asked = [*([f"results/{name}/{run}" for run in rerun.runs] or ["all"]), *options]
+            if rerun.own_source:
+                status = run_own_source(project, rerun.deposit, rerun.campaign, asked, *rerun.own_source)
             else:
                 refuse_wrong_configuration(project)
-                status = run_installed(project, targets, cores)
+                status = run_installed(project, asked)
             made = project / "results" / name
-            if not made.is_dir():
+            if not made.is_dir() or made.resolve() != made:  # a link may lead to results that nobody computed
                 fail(f"nothing was computed; {goes_on}")
-            return made, _compared(original, made, runs, sizes), status
+            return made, _compared(original, made, rerun.runs, rerun.deposit.sizes), status
     except Refused as refused:
         raise Mistake(str(refused)) from None
     except KeyboardInterrupt:

@@ -13,7 +13,7 @@ from icha.cli.project import FAILED, Mistake, shown
 from icha.cli.terminal import say
 from icha.support.printable import printable
 
-# In the folder of a rerun: what was said while its environment was installed.
+# Beside the project: what was said while its environment was installed.
 _LOG = "environment.log"
 _LAST_LINES = 8
 _LONGEST_LINE = 10_000
@@ -41,29 +41,34 @@ def stopped_by_signals():
             signal.signal(each, handler)
 
 
-def run_installed(project: Path, targets: list[str], cores: str | None) -> int:
-    """Run the configuration in a folder by the program that is installed, which says itself how it goes."""
+def run_installed(project: Path, asked: list[str]) -> int:
+    """Run the configuration in a folder by the program that is installed, which says itself how it goes.
+
+    asked : arguments of its `icha run` after the configuration, targets and options.
+    """
     from icha.datasets.results import CONFIGURATION
     from icha.publication.rerun import surroundings
     from icha.support.program import own_workflow
 
     program = [sys.executable, "-P", "-c", "from icha.cli import main; main()"]
     own = {name: os.environ[name] for name in ("PATH", "PYTHONPATH") if name in os.environ}
-    asked = ["run", str(project / CONFIGURATION), *targets, "--directory", str(project), *_cores(cores)]
+    run = ["run", str(project / CONFIGURATION), *asked, "--directory", str(project)]
     # Where its own workflow is the nearest, whatever others have put above the folder.
-    return _call([*program, *asked], cwd=own_workflow(), env=surroundings() | own)
+    return _call([*program, *run], cwd=own_workflow(), env=surroundings() | own)
 
 
-def run_own_source(project: Path, folder: Path, campaign, targets, cores, environment: str, isolation: str) -> int:
-    """Run the deposit's own program, isolated or not, in the environment that is asked for."""
+def run_own_source(project: Path, deposit, campaign, asked: list[str], environment: str, isolation: str) -> int:
+    """Run the program of a deposit, isolated or not, in the environment that is asked for.
+
+    Of its copy in the project, which it may change as it likes, nothing is read here. `asked` as above.
+    """
     from icha.datasets.results import CONFIGURATION
-    from icha.publication.environment import differences
-    from icha.publication.isolation import CONTAINERS, NO_ISOLATION, isolated, variables_within
-    from icha.publication.rerun import environment_target, surroundings
+    from icha.publication.isolation import CONTAINERS, NO_ISOLATION, isolated, make_home
+    from icha.publication.rerun import environment_target, surroundings, unlike_lock
 
-    variables = variables_within(isolation, folder, surroundings())
+    variables = make_home(isolation, project, surroundings())
     if environment == "here":
-        if wrong := differences((project / "uv.lock").read_text(encoding="utf-8")):
+        if wrong := unlike_lock(deposit):
             raise Mistake(
                 "--environment here: what is installed is not what the deposit's uv.lock says; needed: that, or "
                 "--environment lock:\n" + "\n".join(wrong)
@@ -73,24 +78,20 @@ def run_own_source(project: Path, folder: Path, campaign, targets, cores, enviro
     else:
         # That of no environment.
         python = "python3" if isolation in CONTAINERS else os.path.realpath(sys.executable)
-        install = ["make", environment_target(project, campaign), f"PYTHON={python}"]
-        _install(isolated(isolation, install, folder, project, variables, network=True), project, folder, variables)
+        install = ["make", environment_target(deposit, campaign), f"PYTHON={python}"]
+        _install(isolated(isolation, install, project, variables, network=True), project, variables)
         program = [str(project / ".venv/bin/icha")]
     command = isolated(
         isolation,
-        [*program, "run", CONFIGURATION, *targets, *_cores(cores)],
-        *(folder, project, variables),
+        [*program, "run", CONFIGURATION, *asked],
+        *(project, variables),
         network=isolation == NO_ISOLATION,
     )
     return _call(command, cwd=project, env=variables, heard=True)
 
 
-def _cores(cores: str | None) -> list[str]:
-    return ["--cores", cores] if cores else []
-
-
-def _install(command: list[str], project: Path, folder: Path, variables) -> None:
-    log = folder / _LOG
+def _install(command: list[str], project: Path, variables) -> None:
+    log = project.with_name(_LOG)
     say(f"installing the environment of the deposit ({shown(log)})")
     with log.open("w", encoding="utf-8") as said:
         try:
@@ -115,14 +116,19 @@ def _call(command: list[str], *, heard: bool = False, **how) -> int:
     said = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT} if heard else {}
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True, **said, **how)
     try:
-        if heard:
-            for line in iter(lambda: process.stdout.readline(_LONGEST_LINE), b""):
-                say(printable(line.decode("utf-8", errors="replace").removesuffix("\n")))
-        return process.wait()
+        return _ended(process)
     except KeyboardInterrupt:
         # What ignores one of them, started in the background of a script for one, heeds the other.
         ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGTERM if ignored else signal.SIGINT)
-        process.wait()
+        _ended(process)
         raise
+
+
+def _ended(process: subprocess.Popen) -> int:
+    """Print what a program says, if we hear it, until it has ended; its exit status."""
+    if process.stdout:
+        for line in iter(lambda: process.stdout.readline(_LONGEST_LINE), b""):
+            say(printable(line.decode("utf-8", errors="replace").removesuffix("\n")))
+    return process.wait()

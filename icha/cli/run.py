@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.describe import tell
-from icha.cli.options import Config, Cores, Folder, core_count
+from icha.cli.options import Anyway, Config, Cores, Folder, core_count
 from icha.cli.project import (
     DEFAULT,
     FAILED,
@@ -63,9 +63,7 @@ def run(
     plain: Annotated[
         bool, typer.Option("--plain", help="Print a line for every job instead of the live view.")
     ] = False,
-    anyway: Annotated[
-        bool, typer.Option("--anyway", help="Run even if more memory or disk is expected to be needed than there is.")
-    ] = False,
+    anyway: Anyway = False,
 ) -> None:
     """Run a campaign; what is there and up to date is not computed again.
 

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import Mistake
+from icha.cli.scans import check_picture
 from icha.cli.terminal import say
 from icha.support.printable import printable
 
@@ -24,8 +25,7 @@ def show(
     ] = None,
 ) -> None:
     """Show what is in a file: a run, a surface or a campaign dataset. --plot draws it."""
-    if plot is not None and plot.suffix not in (".png", ".pdf", ".svg"):
-        raise Mistake(f"--plot {plot}: ends in {plot.suffix!r}; allowed: .png, .pdf, .svg")
+    check_picture(plot)
     from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, kind_of
 
     try:
@@ -37,7 +37,7 @@ def show(
     if kind == CAMPAIGN:
         studies = list(data.children)
         if study is not None and study not in studies:
-            raise Mistake(f"--study {study}: there is none in {file}; there are: {', '.join(studies)}")
+            raise Mistake(f"--study {study}: there is none in {file}; there are: {printable(', '.join(studies))}")
         data = data if study is None else data.filter(lambda node: node.name in (None, data.name, study))
     try:
         if kind == RUN:
@@ -132,7 +132,8 @@ def _show_surface(surface, file) -> None:
         if variable.ndim == 0 and variable.dtype.kind in "fiu":
             unit = variable.attrs.get("units", "1")
             text = quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g}"
-            say(f"{variable.attrs.get('long_name', name)}: {text}{'' if unit in ('1', 'm') else f' {unit}'}")
+            unit = "" if unit in ("1", "m") else f" {unit}"
+            say(printable(f"{variable.attrs.get('long_name', name)}: {text}{unit}"))
     heights = surface["height"].values
     low, high = (quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
     say(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; a line through the middle:")
@@ -143,7 +144,7 @@ def _show_campaign(tree, file) -> None:
     from icha.datasets.labels import LABELS
 
     say(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
-    say(tree.attrs.get("summary", ""))
+    say(printable(" ".join(str(tree.attrs.get("summary", "")).split())))
     for name, node in tree.children.items():
         study = node.to_dataset()
         sizes = ", ".join(f"{study.sizes[d]} {d}" for d in LABELS)
@@ -151,8 +152,8 @@ def _show_campaign(tree, file) -> None:
         meanings = study["status"].attrs.get("flag_meanings", "").split()
         numbers = {word: int((status == k).sum()) for k, word in enumerate(meanings)}
         counts = ", ".join(f"{number} {word}" for word, number in numbers.items() if number)
-        say(f"\n{printable(name)}: {sizes}; {counts}")
-        say(f"  models {', '.join(study['model'].values)}")
+        say(f"\n{printable(f'{name}: {sizes}; {counts}')}")
+        say(f"  models {printable(', '.join(study['model'].values))}")
         for label, variable in (("A/A0", "contact_area_fraction"), ("p*", "reduced_pressure")):
             values = study[variable].values
             if (known := values[values == values]).size:

@@ -1,16 +1,15 @@
 """Send a deposit to Zenodo, after having said what is sent, and asked."""
 
 import contextlib
-import math
 import os
 import re
-import sys
 import tempfile
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from icha.cli.deposits import agree, flaws_of, listed
 from icha.cli.options import Large
 from icha.cli.project import FAILED, Mistake, shown
 from icha.cli.terminal import confirmed, say
@@ -18,8 +17,6 @@ from icha.support import in_words
 from icha.support.printable import printable
 
 TOKEN = "ZENODO_TOKEN"
-# Beside the archive, where Zenodo shows them.
-_BESIDE = ("README.md", "ro-crate-metadata.json")
 
 
 def upload(
@@ -78,7 +75,7 @@ def upload(
         _refuse_foreign_doi(metadata, draft)
         place = f"draft {draft}" if draft else f"a new version of {new_version_of}" if new_version_of else "a new draft"
         say(_summary(metadata, files, f"{address}, {place}"))
-        _ask(yes)
+        agree("Send it?", yes=yes, done="sent")
         _send(archive, files, metadata, address, token, draft, new_version_of, publish, yes)
 
 
@@ -106,39 +103,39 @@ def _token(address: str) -> str:
 
 def _archive(deposit: Path, large: bool) -> Path:
     """The zip of a deposit, verified."""
-    from icha.publication.deposit_files import CHECKSUMS, read_file, verify_deposit
-    from icha.publication.strangers_files import LIMITS, NO_LIMITS
+    from icha.publication.deposit_files import CHECKSUMS, read_file, whole_deposit
 
     archive = deposit
     if deposit.is_dir():
         archive = deposit.resolve().with_name(f"{deposit.resolve().name}.zip")
         if not archive.is_file():
             raise Mistake(f"{deposit}: there is no {archive.name} beside it; `icha run … publish` makes both")
-    if not archive.is_file():
-        raise Mistake(f"{deposit}: no such file or folder")
-    wrong = verify_deposit(archive, NO_LIMITS if large else LIMITS)
-    if not wrong and deposit.is_dir() and read_file(archive, CHECKSUMS) != read_file(deposit, CHECKSUMS):
-        wrong = ["its zip and its folder have different checksums"]
+    wrong = flaws_of(archive, large=large)
+    if not wrong and deposit.is_dir():
+        with whole_deposit(archive) as packed, whole_deposit(deposit) as folder:
+            if read_file(packed, CHECKSUMS) != read_file(folder, CHECKSUMS):
+                wrong = ["its zip and its folder have different checksums"]
     if wrong:
-        raise Mistake(f"{deposit}: the deposit is damaged, and nothing is sent:\n" + "\n".join(wrong))
+        raise Mistake(f"{deposit}: the deposit is damaged, and nothing is sent:\n{listed(wrong)}")
     return archive
 
 
 def _contents(archive: Path, folder: Path) -> tuple[list[Path], dict]:
     """The files that are sent, and the metadata for Zenodo."""
-    from icha.publication.deposit_files import contents, read_file
-    from icha.publication.statement import METADATA, metadata_of
+    from icha.publication.deposit_files import CRATE, README, ZENODO, copy_file, whole_deposit
+    from icha.publication.statement import metadata_of
 
-    there = contents(archive)
-    for name in (*_BESIDE, METADATA):
-        if name not in there:
-            raise Mistake(f"{archive}: has no {name}, as a deposit has")
-    for name in _BESIDE:
-        (folder / name).write_bytes(read_file(archive, name, math.inf))
-    try:
-        return [archive, *(folder / name for name in _BESIDE)], metadata_of(archive)
-    except ValueError as error:
-        raise Mistake(f"{archive}: {error}") from None
+    beside = README, CRATE
+    with whole_deposit(archive) as found:
+        for name in (*beside, ZENODO):
+            if name not in found.sizes:
+                raise Mistake(f"{archive}: has no {name}, as a deposit has")
+        for name in beside:
+            copy_file(found, name, folder / name)
+        try:
+            return [archive, *(folder / name for name in beside)], metadata_of(found)
+        except ValueError as error:
+            raise Mistake(f"{archive}: {error}") from None
 
 
 def _refuse_foreign_doi(metadata: dict, draft: str | None) -> None:
@@ -162,16 +159,6 @@ def _summary(metadata: dict, files: list[Path], where: str) -> str:
         *(("file", f"{path.name}, {in_words.size(size)} ({size:,} bytes)") for path, size in sizes),
     ]
     return "\n".join(f"{name + ':':<11}{printable(value or 'none')}" for name, value in rows)
-
-
-def _ask(yes: bool) -> None:
-    if yes:
-        return
-    if not sys.stdin.isatty():
-        raise Mistake("there is no terminal to ask at, so nothing is sent; needed: --yes, or a terminal")
-    if not confirmed("Send it?"):
-        say("Nothing was sent.")
-        raise typer.Exit(FAILED)
 
 
 def _send(archive, files, metadata, address, token, number, new_version_of, publish, yes) -> None:

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from icha.cli.deposits import flaws_of, listed
 from icha.cli.options import Large
-from icha.cli.project import FAILED, Mistake
+from icha.cli.project import FAILED
 from icha.cli.terminal import say
 from icha.support import in_words
 from icha.support.printable import printable
@@ -21,18 +22,14 @@ def verify(
     Names that lead out of it, links, devices and zips that unpack to far more than their size are flaws, too, and
     nothing is read of what has them. Nothing of the deposit is executed.
 
-    Exit status: 0 if it is whole, 1 if not (each flaw is printed), 2 if there is no such file or folder.
+    Exit status: 0 if it is whole, 1 if not (the first hundred flaws are printed), 2 if there is no such file or folder.
     """
-    from icha.publication.deposit_files import contents, verify_deposit
-    from icha.publication.strangers_files import LIMITS, NO_LIMITS
+    from icha.publication.deposit_files import whole_deposit
 
-    if not deposit.exists():
-        raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")
-    problems = verify_deposit(deposit, NO_LIMITS if large else LIMITS)
-    for problem in problems:
-        say(problem)
-    if problems:
+    if problems := flaws_of(deposit, large=large):
+        say(listed(problems))
         say(f"{printable(deposit)}: not whole: {in_words.counted(len(problems), 'problem')}", err=True, fg="red")
         raise typer.Exit(FAILED)
-    sizes = contents(deposit)
+    with whole_deposit(deposit) as found:
+        sizes = found.sizes
     say(f"{printable(deposit)}: whole: {in_words.counted(len(sizes), 'file')}, {in_words.size(sum(sizes.values()))}")

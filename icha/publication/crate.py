@@ -24,15 +24,14 @@ from icha.configuration.publication import Author, Publication
 from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
 from icha.publication.citation import web_address
+from icha.publication.deposit_files import CRATE, README, SOURCE
 from icha.publication.licences import known_licence
 from icha.support.atomic_files import whole_file
 
-METADATA = "ro-crate-metadata.json"
-README = "README.md"
-SOURCE = "source/"
-WORKFLOW = f"{SOURCE}Snakefile"
-LOCK = f"{SOURCE}uv.lock"
-PROGRAM_LICENCE = f"{SOURCE}LICENSE"
+_PROGRAM = f"{SOURCE}/"
+WORKFLOW = f"{_PROGRAM}Snakefile"
+LOCK = f"{_PROGRAM}uv.lock"
+PROGRAM_LICENCE = f"{_PROGRAM}LICENSE"
 
 _RUN_PROFILES = {
     "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
@@ -128,7 +127,7 @@ def write_crate(
     """
     sizes = {path: (Path(folder) / path).stat().st_size for path in checksums}
     metadata = crate_metadata(publication, jobs, campaign=campaign, revision=revision, checksums=checksums, sizes=sizes)
-    with whole_file(Path(folder) / METADATA) as part:
+    with whole_file(Path(folder) / CRATE) as part:
         part.write_text(json.dumps(metadata, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
@@ -149,7 +148,7 @@ def crate_metadata(
     crate.metadata["conformsTo"] = [{"@id": crate.metadata.PROFILE}, {"@id": _WORKFLOW_PROFILE}]
     _describe(crate, publication, campaign)
 
-    shown = {path for path in checksums if not path.startswith(SOURCE)}
+    shown = {path for path in checksums if not path.startswith(_PROGRAM)}
     shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in steps)} & set(checksums)
     files = {path: _add_file(crate, path, sizes[path], checksums[path]) for path in sorted(shown)}
     _add_source(crate, files, revision)
@@ -312,11 +311,11 @@ def _add_file(crate: ROCrate, path: str, size: int, sha256: str) -> File:
 def _add_source(crate: ROCrate, files: Mapping[str, File], revision: str) -> None:
     """The folder with the source, of which only some files are shown."""
     _set(
-        crate.add(Dataset(crate, dest_path=SOURCE)),
+        crate.add(Dataset(crate, dest_path=_PROGRAM)),
         name="Source of the workflow and of its program",
         version=revision,
         identifier=revision,
-        hasPart=[file for path, file in files.items() if path.startswith(SOURCE)],
+        hasPart=[file for path, file in files.items() if path.startswith(_PROGRAM)],
     )
 
 

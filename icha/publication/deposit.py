@@ -19,8 +19,8 @@ from icha.configuration.publication import Publication
 from icha.datasets.files import read_campaign
 from icha.planning.costs import Cost
 from icha.publication.citation import citation_cff, datacite_metadata, zenodo_metadata
-from icha.publication.crate import METADATA, Job, write_crate
-from icha.publication.deposit_files import CHECKSUMS, files_of
+from icha.publication.crate import Job, write_crate
+from icha.publication.deposit_files import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of
 from icha.publication.dictionary import data_dictionary, dictionary_csv
 from icha.publication.licences import known_licence, licence_page
 from icha.publication.readme import readme
@@ -29,7 +29,6 @@ from icha.publication.strangers_files import flaw_of_name
 from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, sha256_of
 
-SOURCE = "source"
 _BLOCK = 2**20
 # The earliest time that a zip can hold.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
@@ -81,8 +80,8 @@ def make_deposit(
         _describe(part, files, publication, campaign, source.revision, cost)
         checksums = {path: sha256_of(part / path) for path in files_of(part)}
         write_crate(part, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
-        (part / METADATA).chmod(0o644)
-        checksums[METADATA] = sha256_of(part / METADATA)
+        (part / CRATE).chmod(0o644)
+        checksums[CRATE] = sha256_of(part / CRATE)
         _write(part / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
         with whole_file(archive) as temporary:
             _write_zip(temporary, part, folder.name)
@@ -128,7 +127,7 @@ def _describe(part: Path, files: Sequence[str], publication: Publication, campai
     dictionary = data_dictionary(part, files)
     _write(part / "LICENSE.txt", licence_page(licence, source=SOURCE))
     _write(part / "CITATION.cff", citation_cff(publication, revision))
-    _write(part / ".zenodo.json", _json(zenodo_metadata(publication)))
+    _write(part / ZENODO, _json(zenodo_metadata(publication)))
     _write(part / "datacite.json", _json(datacite_metadata(publication)))
     _write(part / "data_dictionary.csv", dictionary_csv(dictionary))
     error = part / "aggregated/model_error.nc"
@@ -146,7 +145,7 @@ def _describe(part: Path, files: Sequence[str], publication: Publication, campai
             sizes={path: (part / path).stat().st_size for path in files_of(part)},
             cost=cost,
         )
-    _write(part / "README.md", page)
+    _write(part / README, page)
 
 
 def _json(content) -> str:

@@ -5,6 +5,7 @@ import os
 import re
 import zipfile
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from icha.publication.strangers_files import LIMITS, NO_LIMITS, Found, Limits, blocks, flaw_of_name, looked_through
@@ -12,6 +13,10 @@ from icha.support import in_words
 from icha.support.printable import printable
 
 CHECKSUMS = "SHA256SUMS"
+# What it says of itself: to readers, as an RO-Crate, to Zenodo.
+README, CRATE, ZENODO = "README.md", "ro-crate-metadata.json", ".zenodo.json"
+# The folder of the program.
+SOURCE = "source"
 # What is computed, and made again by a rerun; all the rest of a deposit says what it is and how.
 COMPUTED = (
     *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
@@ -22,28 +27,29 @@ LARGEST_TEXT = 64_000_000
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 
 
-def contents(path: str | os.PathLike) -> dict[str, int]:
-    """Bytes of every file of a deposit that is whole, by its path in the deposit."""
-    with looked_through(Path(path), NO_LIMITS) as found:
-        return found.sizes
+def whole_deposit(path: str | os.PathLike) -> AbstractContextManager[Found]:
+    """The files of a deposit that `verify_deposit` has found to be whole."""
+    return looked_through(Path(path), NO_LIMITS)
 
 
-def read_file(deposit: str | os.PathLike, name: str, most: float = LARGEST_TEXT) -> bytes:
-    """The content of a file of a deposit that is whole, by its path in the deposit.
+def read_file(found: Found, name: str) -> bytes:
+    """The content of a text in a deposit, by its path there.
 
     Raises
     ------
     ValueError
-        If it has more than `most` bytes.
+        If it has more than `LARGEST_TEXT` bytes.
     """
-    with looked_through(Path(deposit), NO_LIMITS) as found:
-        return _read(found, name, most)
-
-
-def _read(found: Found, name: str, most: float) -> bytes:
-    if found.sizes[name] > most:
-        raise ValueError(f"{name}: has {in_words.size(found.sizes[name])}; allowed: {in_words.size(most)}")
+    if found.sizes[name] > LARGEST_TEXT:
+        raise ValueError(f"{name}: has {in_words.size(found.sizes[name])}; allowed: {in_words.size(LARGEST_TEXT)}")
     return b"".join(blocks(found, name))
+
+
+def copy_file(found: Found, name: str, copy: Path) -> None:
+    """Write a file of a deposit to another one, however large it is; its folder is made if need be."""
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    with copy.open("wb") as file:
+        file.writelines(blocks(found, name))
 
 
 def files_of(folder: Path) -> list[str]:
@@ -81,7 +87,7 @@ def _problems(found: Found) -> Iterator[str]:
             yield f"{CHECKSUMS}: is missing, so this is no whole deposit"
         return
     try:
-        lines = _read(found, CHECKSUMS, LARGEST_TEXT).decode("utf-8").splitlines()
+        lines = read_file(found, CHECKSUMS).decode("utf-8").splitlines()
     except Exception as error:  # whatever a damaged archive may lead to
         yield f"{CHECKSUMS}: cannot be read: {printable(error)}"
         return

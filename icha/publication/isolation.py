@@ -15,9 +15,10 @@ IMAGE = f"docker.io/library/python:{sys.version_info.major}.{sys.version_info.mi
 # What a program must read of a system to run, and nothing that is anybody's own.
 _SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64")
 _SETTINGS = (
-    *("passwd", "group", "hosts", "resolv.conf", "nsswitch.conf", "host.conf", "gai.conf", "localtime", "pip.conf"),
+    *("passwd", "group", "hosts", "resolv.conf", "nsswitch.conf", "host.conf", "gai.conf", "localtime"),
     *("ssl", "ca-certificates", "pki", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "alternatives", "fonts"),
 )
+_HOME = ".home"
 
 
 def works(program: str) -> bool:
@@ -29,31 +30,33 @@ def works(program: str) -> bool:
 
 
 def isolated(
-    program: str, command: list[str], folder: Path, cwd: Path, variables: Mapping[str, str], *, network: bool
+    program: str, command: list[str], folder: Path, variables: Mapping[str, str], *, network: bool
 ) -> list[str]:
-    """A command that runs another one with nothing to write to but a folder.
+    """A command that runs another one with nothing to write to but a folder, and a `/tmp` of its own.
+
+    What was isolated may have left anything in the folder, links to files of anybody's too: take nothing from there
+    without a look at what it is.
 
     Parameters
     ----------
     program : one of the names above; the command is left as it is with `NO_ISOLATION`.
     command : what is run.
-    folder : what it may write to, under the same name.
-    cwd : the folder below it in which the command is run.
+    folder : where it is run, and what it may write to, under the same name.
     variables : the environment variables that containers are to pass on.
     network : whether it may use the network.
     """
     if program == BWRAP:
-        return [*_bwrap(folder, network=network), "--chdir", str(cwd), *command]
+        return [*_bwrap(folder, network=network), "--chdir", str(folder), *command]
     if program in CONTAINERS:
-        return [*_container(program, folder, cwd, variables, network=network), *command]
+        return [*_container(program, folder, variables, network=network), *command]
     return command
 
 
-def variables_within(program: str, folder: Path, variables: Mapping[str, str]) -> dict[str, str]:
-    """The environment variables of what is isolated: home and caches are in its folder."""
+def make_home(program: str, folder: Path, variables: Mapping[str, str]) -> dict[str, str]:
+    """Make a home for what is isolated, in its folder, and return its environment variables; caches are there, too."""
     if program == NO_ISOLATION:
         return dict(variables)
-    home = folder / "home"
+    home = folder / _HOME
     home.mkdir(exist_ok=True)
     kept = {name: value for name, value in variables.items() if name != "UV_CACHE_DIR"}
     return kept | {"HOME": str(home), "TMPDIR": "/tmp"}
@@ -76,7 +79,7 @@ def _bwrap(folder: Path, *, network: bool) -> list[str]:
     return [BWRAP, "--die-with-parent", *rights, *seen, "--bind", str(folder), str(folder)]
 
 
-def _container(program: str, folder: Path, cwd: Path, variables: Mapping[str, str], *, network: bool) -> list[str]:
+def _container(program: str, folder: Path, variables: Mapping[str, str], *, network: bool) -> list[str]:
     rights = ["--cap-drop=all", "--security-opt=no-new-privileges", "--read-only", "--tmpfs=/tmp"]
     rights += ["--userns=keep-id"] if program == PODMAN else [f"--user={os.getuid()}:{os.getgid()}"]
     passed = [f"--env={name}={value}" for name, value in variables.items() if name != "PATH"]
@@ -88,7 +91,7 @@ def _container(program: str, folder: Path, cwd: Path, variables: Mapping[str, st
         "--init",
         *rights,
         f"--volume={folder}:{folder}",
-        f"--workdir={cwd}",
+        f"--workdir={folder}",
         *passed,
         IMAGE,
     ]

@@ -2,7 +2,7 @@
 
 import contextlib
 import difflib
-import math
+import hashlib
 import os
 import re
 import shutil
@@ -10,7 +10,7 @@ import sys
 import tempfile
 import textwrap
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 
@@ -19,29 +19,35 @@ import netCDF4
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.results import CONFIGURATION
 from icha.planning.software import BY_TAMAAS, TAMAAS
-from icha.publication.deposit_files import CHECKSUMS, COMPUTED, read_file
+from icha.publication.deposit_files import CHECKSUMS, COMPUTED, SOURCE, copy_file, read_file
 from icha.publication.environment import differences
-from icha.publication.strangers_files import NO_LIMITS, looked_through, unpack
+from icha.publication.source import PROGRAM
+from icha.publication.strangers_files import Found, unpack
 from icha.support.checksums import sha256_of
+from icha.support.hdf5 import refuse_data_elsewhere
 from icha.support.in_words import counted
+from icha.support.program import own_workflow, package_of
 from icha.support.values import NAME_PATTERN
 
 SMALLEST = "smallest"
-# Of the program in a deposit: what says its version, and those of all packages.
-PROGRAM, LOCK = "source/pyproject.toml", "source/uv.lock"
+# Of the program in a deposit: what says its version, those of all packages, and what installs them.
+PYPROJECT, LOCK, _MAKEFILE = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock", f"{SOURCE}/Makefile"
 # What it takes to run that program.
-OWN_SOURCE = ("source/Snakefile", "source/Makefile", LOCK)
+OWN_SOURCE = (f"{SOURCE}/Snakefile", _MAKEFILE, LOCK)
 # In the folder of a rerun: what it is of, the deposit's files if it is a zip, the project with or without its source.
-_BEGUN, _UNPACKED, _PROJECT, _DATA = CHECKSUMS, "deposit", "source", "data"
-# Variables that are passed on: of language, numerical libraries and network, and where packages and certificates are.
+# The deposit's program may write to its source alone, so that nothing else here is anything but what we made of it.
+_BEGUN, _UNPACKED, PROJECT, _DATA = "rerun-of.sha256", "deposit", SOURCE, "data"
+# Variables that are passed on: of language, numerical libraries and certificates, and how large a data file may be.
 _PASSED = re.compile(
-    r"HOME|LANG|LANGUAGE|LC_\w+|PATH|TERM|TMPDIR|TZ|(MKL|OMP|OPENBLAS)_\w+|"
-    r"(ALL|HTTPS?|NO)_PROXY|(all|https?|no)_proxy|SSL_CERT_(FILE|DIR)|(REQUESTS|CURL)_CA_BUNDLE|"
-    r"PIP_(CERT|EXTRA_INDEX_URL|FIND_LINKS|INDEX_URL|NO_INDEX)|"
-    r"UV_(CACHE_DIR|DEFAULT_INDEX|EXTRA_INDEX_URL|FIND_LINKS|INDEX|INDEX_URL|OFFLINE|SYSTEM_CERTS)"
+    r"HOME|ICHA_INPUT_MB|LANG|LANGUAGE|LC_\w+|PATH|TERM|TMPDIR|TZ|(MKL|OMP|OPENBLAS)_\w+|"
+    r"NO_PROXY|no_proxy|SSL_CERT_(FILE|DIR)|(REQUESTS|CURL)_CA_BUNDLE|"
+    r"PIP_(CERT|NO_INDEX)|UV_(CACHE_DIR|OFFLINE|SYSTEM_CERTS)"
 )
-# An address with a user name or a password in it.
-_SECRET = re.compile(r"://[^/\s]*@")
+# Addresses of proxies and packages, which are passed on if no user name or password is before an @ in them.
+_ADDRESS = re.compile(
+    r"(ALL|HTTPS?)_PROXY|(all|https?)_proxy|PIP_(EXTRA_INDEX_URL|FIND_LINKS|INDEX_URL)|"
+    r"UV_(DEFAULT_INDEX|EXTRA_INDEX_URL|FIND_LINKS|INDEX|INDEX_URL)"
+)
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
 # Characters of a reason that are told.
 _LONGEST = 120
@@ -51,69 +57,82 @@ class Refused(ValueError):
     """A rerun that cannot be begun; the message says why, and what can."""
 
 
-def campaign_of(deposit: Path, sizes: Mapping[str, int], needed: Iterable[str]) -> dict:
+def campaign_of(deposit: Found, needed: Iterable[str]) -> dict:
     """The configuration of a deposit that has the files needed, with the name of its campaign; else `Refused`."""
     for file in (CONFIGURATION, *needed):
-        if file not in sizes:
-            raise Refused(f"{deposit}: has no {file}, so it cannot be computed again")
-    if not any(name.split("/")[0] in COMPUTED for name in sizes):
-        raise Refused(f"{deposit}: has no results, so there is nothing to compare with")
+        if file not in deposit.sizes:
+            raise Refused(f"{deposit.path}: has no {file}, so it cannot be computed again")
+    if not any(name.split("/")[0] in COMPUTED for name in deposit.sizes):
+        raise Refused(f"{deposit.path}: has no results, so there is nothing to compare with")
     with tempfile.TemporaryDirectory() as scratch:
         file = Path(scratch, CONFIGURATION)
         try:
             file.write_bytes(read_file(deposit, CONFIGURATION))
             content = read_yaml(file)
         except ValueError as error:
-            raise Refused(f"{deposit}: {str(error).replace(str(file), CONFIGURATION)}") from None
+            raise Refused(f"{deposit.path}: {str(error).replace(str(file), CONFIGURATION)}") from None
     name = content.get("name")
     if not (isinstance(name, str) and re.fullmatch(NAME_PATTERN, name)):
-        raise Refused(f"{deposit}: {CONFIGURATION}: name: {name!r}: is no name of a campaign")
+        raise Refused(f"{deposit.path}: {CONFIGURATION}: name: {name!r}: is no name of a campaign")
     return content
 
 
-def unlike_installed(deposit: Path) -> list[str]:
+def unlike_installed(deposit: Found) -> list[str]:
     """In what the program of a deposit is not the one installed, a line each: version, versions of packages."""
     try:
-        made_by = tomllib.loads(read_file(deposit, PROGRAM).decode("utf-8"))["project"]["version"]
+        made_by = tomllib.loads(read_file(deposit, PYPROJECT).decode("utf-8"))["project"]["version"]
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise Refused(f"{deposit}: {PROGRAM}: has no version of the program") from None
-    try:
-        wrong = differences(read_file(deposit, LOCK).decode("utf-8"))
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise Refused(f"{deposit}: {LOCK}: is no lock file of uv") from None
-    own = version("icha")
+        raise Refused(f"{deposit.path}: {PYPROJECT}: has no version of the program") from None
+    own, wrong = version("icha"), unlike_lock(deposit)
     return [*([] if made_by == own else [f"  icha: {own} is installed, {made_by} made the deposit"]), *wrong]
 
 
-def changed_modules(deposit: Path) -> int:
-    """How many modules of the package in a deposit are not those of the package that is installed."""
-    package, prefix = Path(__file__).parents[1], "source/icha/"
+def unlike_lock(deposit: Found) -> list[str]:
+    """Packages that are installed in another version than in the lock file of a deposit, a line each."""
+    try:
+        return differences(read_file(deposit, LOCK).decode("utf-8"))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise Refused(f"{deposit.path}: {LOCK}: is no lock file of uv") from None
+
+
+def changed_files(deposit: Found) -> int:
+    """How many files of the program in a deposit are not those of the program that is installed: package, workflow."""
     lines = read_file(deposit, CHECKSUMS).decode("utf-8").splitlines()
-    theirs = {name.removeprefix(prefix): digest for digest, _, name in (line.partition("  ") for line in lines)
-              if name.startswith(prefix) and name.endswith(".py")}  # fmt: skip
-    ours = {path.relative_to(package).as_posix(): sha256_of(path) for path in package.rglob("*.py")}
+    listed = (line.partition("  ")[::2] for line in lines)
+    theirs = {name.removeprefix(f"{SOURCE}/"): digest for digest, name in listed if name.startswith(f"{SOURCE}/")}
+    theirs = {name: digest for name, digest in theirs.items() if f"{name}/".startswith(tuple(f"{p}/" for p in PROGRAM))}
+    ours = {name: sha256_of(file) for name, file in _installed_files()}
     return sum(theirs.get(name) != ours.get(name) for name in {*theirs, *ours})
 
 
-def asked_runs(only: Iterable[str], deposit: Path, sizes: Mapping[str, int]) -> list[str]:
+def _installed_files() -> Iterator[tuple[str, Path]]:
+    """The files of the program that is installed, with their names in the repository."""
+    workflow = own_workflow()
+    for part in PROGRAM:
+        top = package_of(workflow) if part == "icha" else workflow / part
+        for file in [top] if top.is_file() else top.rglob("*"):
+            if file.is_file() and "__pycache__" not in file.parts:
+                yield (Path(part) / file.relative_to(top)).as_posix(), file
+
+
+def asked_runs(only: Iterable[str], deposit: Found) -> list[str]:
     """Paths of the runs that are asked for by name, or by `SMALLEST`.
 
     Parameters
     ----------
     only : names, `study/surface/seed1/slope1/material`.
-    deposit : a deposit that is whole.
-    sizes : bytes of its files by their paths.
+    deposit : the files of a deposit that is whole.
 
     Raises
     ------
     Refused
         If there is no such run, or if it holds no data.
     """
-    there = sorted(name for name in sizes if _RUN.fullmatch(name))
+    there = sorted(name for name in deposit.sizes if _RUN.fullmatch(name))
     found = []
     for asked in only:
         if asked == SMALLEST and there:
-            path = _smallest(deposit, there, sizes)
+            path = _smallest(deposit, there)
         else:
             path = f"runs/{asked.removeprefix('runs/').removesuffix('.nc')}.nc"
         if path not in there:
@@ -134,8 +153,9 @@ def asked_runs(only: Iterable[str], deposit: Path, sizes: Mapping[str, int]) -> 
     return list(dict.fromkeys(found))
 
 
-def _smallest(deposit: Path, runs: list[str], sizes: Mapping[str, int]) -> str:
+def _smallest(deposit: Found, runs: list[str]) -> str:
     """The complete run that, with its surface, has the fewest bytes."""
+    sizes = deposit.sizes
     for run in sorted(runs, key=lambda run: sizes[run] + sizes.get(surface_of(run), 0)):
         steps, failure = _outcome(deposit, run)
         if steps and not failure:
@@ -146,14 +166,18 @@ def _smallest(deposit: Path, runs: list[str], sizes: Mapping[str, int]) -> str:
     )
 
 
-def _outcome(deposit: Path, run: str) -> tuple[int, str]:
+def _outcome(deposit: Found, run: str) -> tuple[int, str]:
     """Number of steps of a run, and why it is incomplete; an empty text if it is complete."""
-    try:
-        with netCDF4.Dataset(run, memory=read_file(deposit, run, math.inf)) as file:
-            steps = file.dimensions.get("step")
-            return (len(steps) if steps is not None else 0), str(getattr(file, "incomplete", ""))
-    except OSError as error:
-        raise Refused(f"{deposit}: {run}: is no run: {error}") from None
+    with tempfile.TemporaryDirectory() as scratch:
+        copy = Path(scratch, "run.nc")
+        copy_file(deposit, run, copy)
+        try:
+            refuse_data_elsewhere(copy)
+            with netCDF4.Dataset(copy) as file:
+                steps = file.dimensions.get("step")
+                return (len(steps) if steps is not None else 0), str(getattr(file, "incomplete", ""))
+        except (OSError, ValueError, RuntimeError) as error:  # the last one for what the library cannot read
+            raise Refused(f"{deposit.path}: {run}: is no run: {error}") from None
 
 
 def surface_of(run: str) -> str:
@@ -162,39 +186,41 @@ def surface_of(run: str) -> str:
     return f"surfaces/{surface}/{seed}.nc"
 
 
-def begin(folder: Path, deposit: Path) -> None:
+def begin(folder: Path, deposit: Found) -> None:
     """Make the folder, or find in it a rerun of the same deposit that has been begun; `Refused` if it is another's."""
-    checksums = read_file(deposit, CHECKSUMS)
-    if deposit.is_dir() and folder.is_relative_to(deposit.resolve()):
+    of = f"{hashlib.sha256(read_file(deposit, CHECKSUMS)).hexdigest()}\n"
+    if deposit.path.is_dir() and folder.is_relative_to(deposit.path.resolve()):
         raise Refused(f"--folder {folder}: is in the deposit, which is not written to; allowed: another one")
     begun = folder / _BEGUN
     if begun.is_file():
-        if begun.read_bytes() != checksums:
+        if begun.read_text(encoding="ascii", errors="replace") != of:
             raise Refused(f"--folder {folder}: belongs to another deposit; allowed: a new or empty folder")
         return
     folder.mkdir(parents=True, exist_ok=True)
     if any(folder.iterdir()):
         raise Refused(f"--folder {folder}: has other files in it; allowed: a new or empty folder")
-    begun.write_bytes(checksums)
+    begun.write_text(of, encoding="ascii")
 
 
-def prepare(folder: Path, deposit: Path, *, own_source: bool) -> tuple[Path, Path]:
+def prepare(folder: Path, deposit: Found, *, own_source: bool) -> tuple[Path, Path]:
     """The project of the rerun, with the configuration and its files in it, and the deposit as a folder.
 
     With its own source the project is that; else it is nothing but data.
     """
-    project, original = folder / (_PROJECT if own_source else _DATA), deposit
-    if not deposit.is_dir():
+    from icha.configuration.named_files import FOLDER as INPUTS
+
+    project, original = folder / (PROJECT if own_source else _DATA), deposit.path
+    if not deposit.path.is_dir():
         original = folder / _UNPACKED
-        with _whole_folder(original) as part, looked_through(deposit, NO_LIMITS) as found:
+        with _whole_folder(original) as part:
             if part:
-                unpack(found, part)
+                unpack(deposit, part)
     with _whole_folder(project) as part:
         if part:
             if own_source:
-                _copy_files(original / "source", part)
-            _copy_files(original / "inputs", part / "inputs")
-            shutil.copyfile(original / CONFIGURATION, part / CONFIGURATION)
+                _copy_files(deposit, SOURCE, part)
+            _copy_files(deposit, INPUTS, part / INPUTS)
+            copy_file(deposit, CONFIGURATION, part / CONFIGURATION)
     return project, original
 
 
@@ -222,24 +248,33 @@ def _whole_folder(folder: Path):
     part.rename(folder)
 
 
-def _copy_files(source: Path, target: Path) -> None:
-    """Copy the contents of files, and not that nobody may write to them."""
-    for file in source.rglob("*"):
-        if file.is_file():
-            (target / file.relative_to(source)).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file, target / file.relative_to(source))
+def _copy_files(deposit: Found, folder: str, target: Path) -> None:
+    """Copy the contents of the files in a folder of a deposit, and not that nobody may write to them."""
+    for name in deposit.sizes:
+        if name.startswith(f"{folder}/"):
+            copy_file(deposit, name, target / name.removeprefix(f"{folder}/"))
 
 
-def environment_target(project: Path, campaign: Mapping) -> str:
-    """The target of the project's Makefile that installs all that its campaign needs; older ones have one for all."""
-    makefile = (project / "Makefile").read_text(encoding="utf-8", errors="replace")
+def environment_target(deposit: Found, campaign: Mapping) -> str:
+    """The target of the Makefile in a deposit that installs all that its campaign needs; older ones have one for all.
+
+    The deposit's own, for the copy in the project may be another by now.
+    """
+    try:
+        makefile = read_file(deposit, _MAKEFILE).decode("utf-8", errors="replace")
+    except ValueError as error:
+        raise Refused(f"{deposit.path}: {error}") from None
     has_it = re.search(rf"^{TAMAAS}:", makefile, re.MULTILINE)
     return TAMAAS if has_it and any(campaign.get(section) for section in BY_TAMAAS) else "environment"
 
 
 def surroundings() -> dict[str, str]:
     """The environment variables of the rerun: those of the caller that are known to be needed and hold no secret."""
-    kept = {name: value for name, value in os.environ.items() if _PASSED.fullmatch(name) and not _SECRET.search(value)}
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if _PASSED.fullmatch(name) or (_ADDRESS.fullmatch(name) and "@" not in value)
+    }
     own = Path(sys.prefix).resolve()
     if sys.prefix != sys.base_prefix:
         path = kept.get("PATH", os.defpath).split(os.pathsep)

@@ -16,6 +16,7 @@ looks different and no number does, that is a remark and no difference.
 
 import json
 import os
+import textwrap
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -45,6 +46,8 @@ NOISE = {
 }
 _DRAWN = (".png", ".pdf", ".html")
 _BLOCK = 1 << 20
+# Characters of an error that are told.
+_LONGEST = 300
 
 
 class Item(NamedTuple):
@@ -107,20 +110,30 @@ def compare_folders(
     deposit, rerun : folders with `dataset/`, `runs/`, … in them.
     paths : the files that are compared, relative to both; all of `COMPUTED` that are in either if left out.
     """
-    deposit, rerun = Path(deposit), Path(rerun)
+    deposit, rerun = Path(deposit).resolve(), Path(rerun).resolve()
     paths = sorted({*_results(deposit), *_results(rerun)} if paths is None else {*paths})
-    return Comparison(tuple(compare_files(deposit / path, rerun / path, path) for path in paths))
+    return Comparison(tuple(_compare_files(deposit / path, rerun / path, path) for path in paths))
 
 
 def _results(folder: Path) -> Iterator[str]:
     for name in COMPUTED:
         top = folder / name
-        files = [top] if top.is_file() else top.rglob("*") if top.is_dir() else ()
-        yield from (file.relative_to(folder).as_posix() for file in files if file.is_file())
+        files = top.rglob("*") if top.is_dir() and not top.is_symlink() else [top]
+        yield from (file.relative_to(folder).as_posix() for file in files if file.is_file() or file.is_symlink())
 
 
-def compare_files(deposit: Path, rerun: Path, path: str) -> File:
-    """Compare two files, of which `path` is the name in the result."""
+def _compare_files(deposit: Path, rerun: Path, path: str) -> File:
+    """Compare two files, of which `path` is the name in the results; whatever is wrong with one makes it different."""
+    try:
+        return _compared(deposit, rerun, path)
+    except Exception as error:  # whatever the content of a file may lead to
+        return File(path, DIFFERENT, f"cannot be compared: {textwrap.shorten(repr(error), _LONGEST, placeholder=' …')}")
+
+
+def _compared(deposit: Path, rerun: Path, path: str) -> File:
+    for file, whose in ((deposit, "deposit"), (rerun, "rerun")):
+        if file.resolve() != file:  # to the other one's, for instance
+            return File(path, DIFFERENT, f"the {whose}'s is a link, or in a folder that is one")
     if not deposit.is_file():
         return File(path, EXTRA, "the deposit has no such file")
     if not rerun.is_file():
@@ -154,8 +167,6 @@ def _compare_datasets(deposit, rerun, path):
             except (OSError, ValueError) as error:
                 return File(path, DIFFERENT, f"the {whose}'s cannot be opened: {error}")
         items = tuple(_compare_groups(*opened, ""))
-    except RuntimeError as error:  # the library's, for what it cannot read
-        return File(path, DIFFERENT, f"one of the two cannot be read: {error}")
     finally:
         for dataset in opened:
             dataset.close()
@@ -323,10 +334,7 @@ def _compare_checks(deposit, rerun, path) -> File:
     def taken(file):
         return {(check["subject"], check["name"]): check for check in json.loads(file.read_text(encoding="utf-8"))}
 
-    try:
-        a, b = taken(deposit), taken(rerun)
-    except (ValueError, TypeError, KeyError):
-        return File(path, DIFFERENT, "other bytes")
+    a, b = taken(deposit), taken(rerun)
     items = []
     for key in dict.fromkeys([*a, *b]):
         name = ": ".join(filter(None, key))
@@ -427,4 +435,4 @@ def write_json(comparison: Comparison, path: str | os.PathLike) -> None:
         ],
     }
     with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -1,14 +1,12 @@
 """What a deposit says of itself, in the metadata that a repository shows; nobody has checked it."""
 
 import json
-from pathlib import Path
 
-from icha.publication.deposit_files import read_file
-
-METADATA = ".zenodo.json"
+from icha.publication.deposit_files import ZENODO, read_file
+from icha.publication.strangers_files import Found
 
 
-def metadata_of(deposit: Path) -> dict:
+def metadata_of(deposit: Found) -> dict:
     """The metadata of a deposit that is whole.
 
     Raises
@@ -17,7 +15,7 @@ def metadata_of(deposit: Path) -> dict:
         If they are not what they should be: text and lists of mappings by their names.
     """
     try:
-        metadata = json.loads(read_file(deposit, METADATA))
+        metadata = json.loads(read_file(deposit, ZENODO))
         if not isinstance(metadata, dict):
             raise ValueError("not a mapping")
         for name in ("title", "version", "license", "doi", "description"):
@@ -28,7 +26,7 @@ def metadata_of(deposit: Path) -> dict:
             if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
                 raise ValueError(f"{name} is no list of mappings")
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"{METADATA}: {str(error) or 'is nested too deeply'}") from None
+        raise ValueError(f"{ZENODO}: {str(error) or 'is nested too deeply'}") from None
     return metadata
 
 

@@ -1,11 +1,12 @@
 """Folders and zips that strangers made: looked through before anything in them is read, and read within limits.
 
-Whatever a name, a kind of file or a size may do to us ends here. `looked_through` gives the files and all that is wrong
-with them; who goes on only where nothing is wrong, reads files that lie in the deposit, no links or devices, no more
-bytes than are declared, and no more than `LIMITS` allow for the size of the zip.
+Whatever a name, a kind of file or a size may do to us ends here. `looked_through` gives the files, and all that is
+wrong with them. Where nothing is, they lie in the deposit, are no links or devices, and have no more bytes than are
+declared, and together no more than `LIMITS` allow for the size of the zip.
 """
 
 import contextlib
+import itertools
 import os
 import re
 import shutil
@@ -25,6 +26,8 @@ _BLOCK = 1 << 20
 _LONGEST_PART, _LONGEST = 255, 1000
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _ENCRYPTED = 0x1
+# Bytes before the name in the header of an entry.
+_HEADER = 30
 
 
 class Limits(NamedTuple):
@@ -42,8 +45,9 @@ LARGE, NO_LIMITS = "--large", Limits(float("inf"), float("inf"), 0)
 
 
 class Found(NamedTuple):
-    """The files of a folder or a zip: their sizes by their paths, what is wrong with them, how one is opened."""
+    """The files in a folder or zip, `path`: their sizes by their paths, what is wrong with them, how one is opened."""
 
+    path: Path
     sizes: dict[str, int]
     flaws: list[str]
     open: Callable[[str], AbstractContextManager[BinaryIO]]
@@ -64,11 +68,11 @@ def looked_through(path: Path, limits: Limits = LIMITS) -> Iterator[Found]:
     if not path.is_file():
         raise ValueError("is neither a folder nor a file")
     with zipfile.ZipFile(path) as archive:
-        yield _in_zip(archive, path.stat().st_size, limits)
+        yield _in_zip(path, archive, limits)
 
 
 def flaw_of_name(name: str) -> str:
-    """Why a path is not one in a deposit on every system; empty if it is."""
+    """Why a path is not one in a deposit, which leads to the same place on Linux, macOS and in zips; empty if it is."""
     parts = name.split("/")
     if name.startswith("/") or re.match("[A-Za-z]:", name):
         return "is an absolute path"
@@ -92,10 +96,10 @@ def _in_folder(folder: Path, limits: Limits) -> Found:
         else:
             flaws.append(f"{printable(name)}: is no file of its own")
         if len(sizes) + len(flaws) > limits.files:
-            return Found({}, [_too_many(f"more than {limits.files:,}", limits)], _nothing)
+            return Found(folder, {}, [_too_many(f"more than {limits.files:,}", limits)], _nothing)
     flaws += [f"{printable(name)}: the name {flaw}" for name in sizes if (flaw := flaw_of_name(name))]
     sizes = dict(sorted(sizes.items()))
-    return Found(sizes, [*sorted(flaws), *_clashes(sizes)], lambda name: (folder / name).open("rb"))
+    return Found(folder, sizes, [*sorted(flaws), *_clashes(sizes)], lambda name: (folder / name).open("rb"))
 
 
 def _walk(folder: Path) -> Iterator[tuple[str, os.stat_result]]:
@@ -110,10 +114,10 @@ def _walk(folder: Path) -> Iterator[tuple[str, os.stat_result]]:
                 yield f"{inside}{entry.name}", entry.stat(follow_symlinks=False)
 
 
-def _in_zip(archive: zipfile.ZipFile, size: int, limits: Limits) -> Found:
-    entries = archive.infolist()
+def _in_zip(path: Path, archive: zipfile.ZipFile, limits: Limits) -> Found:
+    entries, nothing = archive.infolist(), Found(path, {}, [], _nothing)
     if len(entries) > limits.files:
-        return Found({}, [_too_many(f"{len(entries):,}", limits)], _nothing)
+        return nothing._replace(flaws=[_too_many(f"{len(entries):,}", limits)])
     flaws = [f"{printable(entry.orig_filename)}: {flaw}" for entry in entries if (flaw := _flaw_of_entry(entry))]
     tops = {entry.filename.partition("/")[0] for entry in entries}
     files = [entry for entry in entries if not entry.is_dir()]
@@ -121,27 +125,28 @@ def _in_zip(archive: zipfile.ZipFile, size: int, limits: Limits) -> Found:
         held = [printable(top) for top in sorted(tops)[:5]] + ["…"] * (len(tops) > 5)
         flaws = [f"holds {', '.join(held) or 'nothing'}; allowed: a single folder, the deposit"]
     if flaws:
-        return Found({}, flaws, _nothing)
+        return nothing._replace(flaws=flaws)
     there: dict[str, zipfile.ZipInfo] = {}
     for entry in files:
         name = entry.filename.partition("/")[2]
         if name in there:
             flaws.append(f"{name}: is there more than once")
         there[name] = entry
-    if flaw := _flaw_of_sizes(files, size, limits):
-        return Found({}, [*flaws, flaw], _nothing)
+    if flaw := _flaw_of_sizes(entries, path.stat().st_size, limits):
+        return nothing._replace(flaws=[*flaws, flaw])
     sizes = {name: entry.file_size for name, entry in there.items()}
-    return Found(sizes, [*flaws, *_clashes(sizes)], lambda name: archive.open(there[name]))
+    return Found(path, sizes, [*flaws, *_clashes(sizes)], lambda name: archive.open(there[name]))
 
 
 def _flaw_of_entry(entry: zipfile.ZipInfo) -> str:
-    mode = entry.external_attr >> 16 if entry.create_system == 3 else 0
+    # Whatever system it says that it is of: programs that unpack do not agree on which of them have modes.
+    mode = entry.external_attr >> 16
     kind = stat.S_IFDIR if entry.is_dir() else stat.S_IFREG
     for name in (entry.orig_filename, entry.filename):
         if flaw := flaw_of_name(name.removesuffix("/")):
             return f"the name {flaw}"
     if stat.S_IFMT(mode) not in (0, kind):
-        return "is a link, a device or another thing that is no file"
+        return "is a link, a device or something else that is no file"
     if mode & (stat.S_ISUID | stat.S_ISGID | stat.S_ISVTX):
         return f"has the mode {stat.S_IMODE(mode):04o}; allowed: no special bits"
     if entry.flag_bits & _ENCRYPTED or entry.compress_type not in _METHODS:
@@ -149,11 +154,17 @@ def _flaw_of_entry(entry: zipfile.ZipInfo) -> str:
     return ""
 
 
-def _flaw_of_sizes(files: list[zipfile.ZipInfo], size: int, limits: Limits) -> str:
-    unpacked, packed = sum(entry.file_size for entry in files), sum(entry.compress_size for entry in files)
-    most = limits.ratio * size + limits.allowance
-    if packed > size:
-        return f"its files overlap: they take {in_words.size(packed)}, and the zip has {in_words.size(size)}"
+def _flaw_of_sizes(entries: list[zipfile.ZipInfo], size: int, limits: Limits) -> str:
+    """What is wrong with the entries of a zip of so many bytes, together; empty if nothing is."""
+    end = 0
+    for entry in sorted(entries, key=lambda entry: entry.header_offset):
+        if entry.header_offset < end:
+            return "its files overlap: some bytes of it belong to two of them"
+        # Of the header at least; how much more it has does not matter.
+        end = entry.header_offset + _HEADER + len(entry.orig_filename) + entry.compress_size
+    if end > size:
+        return f"its files take {in_words.size(end)}, and the zip has {in_words.size(size)}"
+    unpacked, most = sum(entry.file_size for entry in entries), limits.ratio * size + limits.allowance
     if unpacked > most:
         return (
             f"unpacks from {in_words.size(size)} to {in_words.size(unpacked)}; allowed: {limits.ratio} times its size "
@@ -170,11 +181,13 @@ def _clashes(names) -> list[str]:
         if folded in seen:
             found.append(f"{printable(name)}: is {printable(seen[folded])} on some systems")
         seen[folded] = name
-    for folded, name in seen.items():
-        above = (folded[:k] for k, character in enumerate(folded) if character == "/")
-        found += [
-            f"{printable(seen[each])}: is a file, and the folder of {printable(name)}" for each in above if each in seen
-        ]
+    # What lies in a folder comes right after its name, so that names have not to be held against all others.
+    ordered = sorted(seen, key=lambda folded: folded.replace("/", "\0"))
+    found += [
+        f"{printable(seen[above])}: is a file, and the folder of {printable(seen[name])}"
+        for above, name in itertools.pairwise(ordered)
+        if name.startswith(f"{above}/")
+    ]
     return found
 
 

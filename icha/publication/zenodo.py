@@ -134,10 +134,10 @@ class Zenodo:
     def new_version(self, number: str) -> Draft:
         """Make a draft of a new version of a published record; it begins with the files of the one before."""
         content = self._call("POST", f"/api/deposit/depositions/{quote(number, safe='')}/actions/newversion")
-        address = content.get("links", {}).get("latest_draft")
+        address = _text(_mapping(content, "links"), "latest_draft")
         if not address:
             raise ZenodoError(f"{self.address} does not say where the draft of the new version of {number} is")
-        found = urlsplit(address).path.rstrip("/").rpartition("/")[2]
+        found = address.rstrip("/").rpartition("/")[2]
         if found == number:
             raise ZenodoError(
                 f"{self.address} gives no draft of a new version of {number}; if there is one already, continue it "
@@ -177,25 +177,26 @@ class Zenodo:
     def publish(self, draft: Draft) -> Published:
         """Publish a draft, for good."""
         content = self._call("POST", f"/api/deposit/depositions/{draft.number}/actions/publish")
-        links = content.get("links", {})
-        page = links.get("record_html") or links.get("html") or f"{self.address}/records/{draft.number}"
-        return Published(page, content.get("doi") or draft.doi)
+        links = _mapping(content, "links")
+        page = _text(links, "record_html") or _text(links, "html") or f"{self.address}/records/{draft.number}"
+        return Published(page, _text(content, "doi") or draft.doi)
 
-    def _draft(self, content) -> Draft:
-        links, metadata = content.get("links", {}), content.get("metadata", {})
-        number, bucket = content.get("id"), links.get("bucket", "")
-        if number is None or not bucket:
+    def _draft(self, content: Mapping) -> Draft:
+        links, metadata = _mapping(content, "links"), _mapping(content, "metadata")
+        number, bucket = _text(content, "id"), _text(links, "bucket")
+        if not number or not bucket:
             raise ZenodoError(f"{self.address} does not answer as Zenodo does: a draft without number or bucket")
         if not bucket.startswith(f"{self.address}/"):
             # The token goes to nobody else.
             raise ZenodoError(f"{self.address} wants the files to be sent to another server: {bucket}")
         files = tuple(
-            Uploaded(str(file.get("id", "")), file.get("filename") or file.get("key", ""), _plain_md5(file))
-            for file in content.get("files") or ()
+            Uploaded(_text(file, "id"), _text(file, "filename") or _text(file, "key"), _plain_md5(file))
+            for file in _list(content, "files")
+            if isinstance(file, dict)
         )
-        doi = (metadata.get("prereserve_doi") or {}).get("doi") or metadata.get("doi", "")
-        page = links.get("html") or f"{self.address}/uploads/{number}"
-        return Draft(str(number), page, bucket.removeprefix(self.address).rstrip("/"), doi, files)
+        doi = _text(_mapping(metadata, "prereserve_doi"), "doi") or _text(metadata, "doi")
+        page = _text(links, "html") or f"{self.address}/uploads/{number}"
+        return Draft(number, page, bucket.removeprefix(self.address).rstrip("/"), doi, files)
 
     def _call(self, method: str, path: str, also: tuple[int, ...] = (), **content) -> dict:
         """Send a request; return its JSON, or {} where there is none."""
@@ -207,9 +208,12 @@ class Zenodo:
             raise ZenodoError(self._unreachable(error)) from None
         if answer.ok and not answer.is_redirect:
             try:
-                return answer.json() if answer.content else {}
-            except ValueError:
+                said = answer.json() if answer.content else {}
+            except (ValueError, RecursionError):
                 raise ZenodoError(f"{self.address} does not answer as Zenodo does: no JSON from {path}") from None
+            if not isinstance(said, dict):
+                raise ZenodoError(f"{self.address} does not answer as Zenodo does: no mapping from {path}")
+            return said
         if answer.status_code in also:
             return {}
         raise ZenodoError(self._refusal(method, path, answer))
@@ -254,14 +258,14 @@ class Zenodo:
         """What the server says of it: its message, and what is wrong with which field."""
         try:
             content = answer.json()
-        except ValueError:
+        except (ValueError, RecursionError):
             return f": {self._plain(answer.reason)}" if answer.reason else ""
         if not isinstance(content, dict):
             return ""
         lines = [self._plain(content.get("message", ""))]
-        for error in content.get("errors") or ():
+        for error in _list(content, "errors"):
             if isinstance(error, dict):
-                told = error.get("message") or ", ".join(map(str, error.get("messages") or ()))
+                told = error.get("message") or ", ".join(map(str, _list(error, "messages")))
                 lines.append(f"{error.get('field', '')}: {told}")
             else:
                 lines.append(str(error))
@@ -272,6 +276,24 @@ class Zenodo:
         """Text of the server's, short and without the token, should it send that back."""
         text = " ".join(str(text if text is not None else "").split()).replace(self._token, "…")
         return text if len(text) <= 300 else f"{text[:299]}…"
+
+
+def _mapping(content: Mapping, key: str) -> Mapping:
+    """A mapping in an answer; empty if there is none."""
+    value = content.get(key)
+    return value if isinstance(value, dict) else {}
+
+
+def _list(content: Mapping, key: str) -> list:
+    """A list in an answer; empty if there is none."""
+    value = content.get(key)
+    return value if isinstance(value, list) else []
+
+
+def _text(content: Mapping, key: str) -> str:
+    """A text or number in an answer, as text; empty if there is none."""
+    value = content.get(key)
+    return str(value) if isinstance(value, str | int) else ""
 
 
 def _plain_md5(content: Mapping) -> str:

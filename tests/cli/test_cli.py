@@ -446,8 +446,8 @@ def test_what_is_in_the_place_of_a_folder_is_named(tmp_path, monkeypatch, place,
         obstacle.write_text("something else")
     refused = icha("run", "smoke")
     assert refused.exit_code == 2
-    what = f"{place} is a link to nowhere, which is not there" if link else f"{place} is a file, and no folder"
-    assert f"Error: {what}: " in refused.output and "File exists" not in refused.output
+    what = "a link to nowhere, which is not there, or not to be reached" if link else "a file, and no folder"
+    assert f"Error: {place} is {what}: " in refused.output and "File exists" not in refused.output
 
 
 TINY = """

@@ -204,7 +204,7 @@ def test_the_table_of_jobs_of_snakemake_is_read():
         "anew: 2 figure, 1 report page"
     )
     assert _planned("Building DAG\nNothing to be done\n").startswith("Nothing would run")
-    again = "to be made again: results/tiny/b.nc, for it was made with other settings"
+    again = "to be made again: results/tiny/b.nc (it was made with other settings)"
     assert _planned(f"{again}\nBuilding DAG\nNothing to be done\n").splitlines()[0] == again
     assert "Nothing would run" not in _planned(f"damaged, {again}\nNothing to be done\n")
 

@@ -1,6 +1,6 @@
 """The page on the layout is true, and folders import in its order only."""
 
-import importlib
+import importlib.util
 import os
 import re
 import shutil
@@ -40,6 +40,13 @@ def test_all_that_is_named_is_there():
             importlib.import_module(name)
         except ModuleNotFoundError:
             assert hasattr(importlib.import_module(module), last), name
+
+
+def test_the_page_on_the_model_names_modules_that_are_there():
+    page = (REPOSITORY / "docs/model.md").read_text(encoding="utf-8")
+    named = re.findall(r"`([\w.]+)`", " ".join(re.findall(r" \[(`[^\]]+`)\]", page)))
+    assert len(named) > 25
+    assert not [name for name in named if importlib.util.find_spec(f"icha.{name}") is None]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from conftest import REPOSITORY
 
 VULNERABLE = {"id": "GHSA-planted", "modified": "2024-01-01T00:00:00Z"}
 RANGES = [{"type": "ECOSYSTEM", "events": [{"introduced": "0"}, {"fixed": "99"}]}]
-ADVICE = VULNERABLE | {"published": "2024-01-01T00:00:00Z", "summary": "planted", "details": "planted"}
+ADVICE = VULNERABLE | {"published": "2024-01-01T00:00:00Z", "summary": "Request failed", "details": "planted"}
 ADVICE |= {"affected": [{"package": {"name": "jinja2", "ecosystem": "PyPI"}, "ranges": RANGES}]}
 
 

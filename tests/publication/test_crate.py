@@ -15,7 +15,8 @@ from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import Author
 from icha.datasets.model_paper import MODEL_PAPER
-from icha.publication.crate import METADATA, Job, write_crate
+from icha.publication.crate import Job, write_crate
+from icha.publication.deposit_files import CRATE
 
 SCRIPTS = "source/workflow/scripts"
 SCAN = "inputs/scan 1 µm.npy"
@@ -55,7 +56,7 @@ OTHERS += ("source/icha/path/follow.py",)
 
 def checksums_of(folder):
     """What `sha256sum` would say of all files."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != METADATA)
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != CRATE)
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
@@ -76,7 +77,7 @@ def deposit(tmp_path_factory):
 @pytest.fixture(scope="module")
 def entities(deposit):
     """What the crate says, by identifiers."""
-    graph = json.loads((deposit / METADATA).read_bytes())["@graph"]
+    graph = json.loads((deposit / CRATE).read_bytes())["@graph"]
     assert len({entity["@id"] for entity in graph}) == len(graph)
     return {entity["@id"]: entity for entity in graph}
 
@@ -99,7 +100,7 @@ def test_whatever_is_named_is_described(entities):
     for entity in entities.values():
         for key, value in entity.items():
             for name in references(value):
-                outside = entity["@id"] == METADATA and key == "conformsTo" and name.startswith("https://w3id.org/")
+                outside = entity["@id"] == CRATE and key == "conformsTo" and name.startswith("https://w3id.org/")
                 assert name in entities or outside, (entity["@id"], key, name)
 
 
@@ -197,7 +198,7 @@ def test_who_made_it_under_which_licence_and_who_paid(entities):
 
 
 def test_no_time_no_name_made_at_random_and_no_place_of_this_machine(deposit):
-    text = (deposit / METADATA).read_text(encoding="utf-8")
+    text = (deposit / CRATE).read_text(encoding="utf-8")
     assert not re.search(r"\d\d:\d\d", text)
     assert set(re.findall(r"\d{4}-\d\d-\d\d", text)) - {ORCID[:10]} == {"2026-01-31"}
     assert not re.search(r"[0-9a-f]{8}-[0-9a-f]{4}-", text)
@@ -215,7 +216,7 @@ def test_the_paper_of_the_model_is_cited_beside_what_the_publication_names(entit
     # Whoever wrote it and made the data is the same person, with all that is said of them.
     given, family = MODEL_PAPER.authors[0]
     own = LEAST.model_copy(update={"authors": [Author(family_names=family, given_names=given, affiliation="Here")]})
-    graph = json.loads((written(tmp_path, own) / METADATA).read_bytes())["@graph"]
+    graph = json.loads((written(tmp_path, own) / CRATE).read_bytes())["@graph"]
     (person,) = (entity for entity in graph if entity.get("familyName") == family)
     assert person["affiliation"] == {"@id": "#organisation/Here"}
 
@@ -227,7 +228,7 @@ def test_the_same_deposit_has_the_same_bytes(deposit, tmp_path):
     )
     command = [sys.executable, "-c", code, tmp_path, Path(__file__).parent, Path(__file__).parents[1]]
     subprocess.run(command, check=True, env={"PYTHONHASHSEED": "7", "LC_ALL": "C"})
-    assert (tmp_path / METADATA).read_bytes() == (deposit / METADATA).read_bytes()
+    assert (tmp_path / CRATE).read_bytes() == (deposit / CRATE).read_bytes()
 
 
 def test_jobs_that_make_no_sense_are_refused(deposit):
@@ -260,9 +261,9 @@ def test_it_is_a_provenance_run_crate_and_can_be_read(name, deposit, tmp_path):
 @pytest.mark.slow
 def test_a_crate_that_lacks_something_is_refused(deposit, tmp_path):
     folder = shutil.copytree(deposit, tmp_path / "deposit")
-    content = json.loads((folder / METADATA).read_bytes())
+    content = json.loads((folder / CRATE).read_bytes())
     content["@graph"] = [entity for entity in content["@graph"] if entity["@id"] != "source/Snakefile#run"]
-    (folder / METADATA).write_text(json.dumps(content))
+    (folder / CRATE).write_text(json.dumps(content))
     (folder / "dataset/mine.nc").unlink()
     done = validated(sealed(folder), "roc-validator")
     assert done.returncode == 1, done.stdout + done.stderr

@@ -39,7 +39,7 @@ from icha.planning.plan import whole_cost
 from icha.publication import deposit as deposits
 from icha.publication import dictionary
 from icha.publication.deposit import make_deposit
-from icha.publication.deposit_files import contents, verify_deposit
+from icha.publication.deposit_files import verify_deposit, whole_deposit
 from icha.publication.dictionary import data_dictionary, kind_of
 from icha.publication.source import committed_source
 from icha.support.checksums import write_checksum
@@ -139,7 +139,8 @@ def recorded_jobs(project, results, files):
 
 def deposited(project, published):
     """The files of the results that were published."""
-    there = {path for path in contents(published) if not path.startswith("source/")}
+    with whole_deposit(published) as found:
+        there = {path for path in found.sizes if not path.startswith("source/")}
     return sorted(path for path in there if (project / "results/tiny" / path).is_file())
 
 
@@ -549,7 +550,8 @@ def test_computed_again_it_has_the_same_bytes(own_source, published, tmp_path):
         *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
         *("report.html", "checks.json", "verdict.txt"),
     }
-    assert len(files) == sum(file.endswith((".nc", ".png", ".pdf")) for file in contents(published)) + 3
+    with whole_deposit(published) as found:
+        assert len(files) == sum(file.endswith((".nc", ".png", ".pdf")) for file in found.sizes) + 3
     assert {file["verdict"] for file in files} == {"identical"} and not any(file["variables"] for file in files)
 
 

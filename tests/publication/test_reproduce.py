@@ -15,11 +15,10 @@ import netCDF4
 import numpy as np
 import pytest
 import yaml
-from typer.testing import CliRunner
+from reproduced import caller, lock
 
-from icha.cli import app
-from icha.publication.deposit_files import verify_deposit
-from icha.publication.rerun import environment_target
+from icha.publication.deposit_files import verify_deposit, whole_deposit
+from icha.publication.rerun import Refused, environment_target
 
 NAME = "mine-1.0.0"
 # Nothing is isolated, so that a test can plant something; `LC_` is a beginning of names that are passed on.
@@ -56,6 +55,7 @@ for path in [*surfaces, *asked] or files:
             time.sleep(60)
     except KeyboardInterrupt:
         time.sleep(0.5)
+        print("\\n".join(3000 * [100 * "."]), flush=True)  # more than a pipe holds
         pathlib.Path("ended").touch()
         sys.exit(1)
 (results / "verdict.txt").write_text("passed")
@@ -79,7 +79,7 @@ def made(tmp_path_factory):
         "inputs/number.txt": "1.5",
         "source/Snakefile": "",
         "source/Makefile": MAKEFILE,
-        "source/uv.lock": lock(version("numpy")),
+        "source/uv.lock": lock(),
         "source/program.py": PROGRAM,
         "README.md": "# Mine\n",
     }.items():
@@ -92,10 +92,6 @@ def made(tmp_path_factory):
     shutil.copytree(work / "results/mine", deposit, dirs_exist_ok=True)
     seal(deposit)
     return deposit
-
-
-def lock(numpy):
-    return f'[[package]]\nname = "numpy"\nversion = "{numpy}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
 
 
 def seal(deposit):
@@ -117,16 +113,12 @@ def deposit(made, tmp_path):
 
 @pytest.fixture
 def reproduce(monkeypatch, tmp_path, capfd):
-    """Call the command; return its exit status and all that it and its programs said."""
-    (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    """Call the command for the deposit's own source, with something planted; return exit status and what was said."""
+    called = caller(monkeypatch, capfd, tmp_path / "temporary")
 
-    def call(*arguments, planted="", how=OWN):
+    def call(*arguments, planted=""):
         monkeypatch.setenv("LC_PLANTED", planted)
-        done = CliRunner().invoke(app, ["reproduce", *map(str, arguments), *how])
-        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-        out, err = capfd.readouterr()
-        return done.exit_code, done.output + out + err
+        return called(*arguments, *OWN)
 
     call.temporary = tmp_path / "temporary"
     return call
@@ -157,8 +149,17 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, made, r
     ],
 )
 def test_the_environment_is_the_one_that_the_campaign_needs(asked, targets, target, tmp_path):
-    (tmp_path / "Makefile").write_text("".join(f"{each}:\n\t@true\n" for each in targets.split()))
-    assert environment_target(tmp_path, yaml.safe_load(asked)) == target
+    (tmp_path / "source").mkdir()
+    (tmp_path / "source/Makefile").write_text("".join(f"{each}:\n\t@true\n" for each in targets.split()))
+    with whole_deposit(tmp_path) as found:
+        assert environment_target(found, yaml.safe_load(asked)) == target
+
+
+def test_a_makefile_that_is_too_large_is_refused(made):
+    with whole_deposit(made) as found:
+        larger = found._replace(sizes=found.sizes | {"source/Makefile": 10**9})
+        with pytest.raises(Refused, match="source/Makefile: has 1 GB; allowed: "):
+            environment_target(larger, {})
 
 
 def test_nothing_of_the_caller_s_environment_gets_in(made, reproduce, tmp_path, monkeypatch):
@@ -204,6 +205,17 @@ def test_differences_are_told_by_variable(planted, status, told, made, reproduce
     assert len(kept) == status
     if kept:
         assert f"what was computed again: {kept[0]}/source/results/mine" in said
+
+
+def test_a_table_is_told_even_if_it_cannot_be_written(made, reproduce, tmp_path):
+    (tmp_path / "folder").mkdir()
+    status, said = reproduce(made, "--json", tmp_path / "folder")
+    assert status == 1 and "identical: 6 files, every value" in said and "Is a directory" in said
+
+
+def test_what_runs_is_told_to_begin_anyway_if_we_are(made, reproduce, tmp_path):
+    assert reproduce(made, "--anyway", "--folder", tmp_path / "again")[0] == 0
+    assert calls(tmp_path / "again")[0][0] == ["run", "config.used.yaml", "all", "--anyway"]
 
 
 def test_single_runs(made, reproduce, tmp_path):
@@ -276,11 +288,18 @@ def test_wrong_use_is_refused_before_anything_is_done(made, reproduce, tmp_path)
     (tmp_path / "other/file").write_text("mine")
     status, said = reproduce(made, "--folder", tmp_path / "other")
     assert status == 2 and "has other files in it" in said
-    (tmp_path / "other/file").rename(tmp_path / "other/SHA256SUMS")
+    (tmp_path / "other/file").rename(tmp_path / "other/rerun-of.sha256")
     status, said = reproduce(made, "--folder", tmp_path / "other")
     assert status == 2 and "belongs to another deposit" in said
-    assert [path.name for path in (tmp_path / "other").iterdir()] == ["SHA256SUMS"]
+    assert [path.name for path in (tmp_path / "other").iterdir()] == ["rerun-of.sha256"]
     assert list(reproduce.temporary.iterdir()) == []
+
+
+def test_a_deposit_that_is_unpacked_is_no_folder_of_a_rerun(deposit, reproduce):
+    """Even of itself: it is not written to."""
+    status, said = reproduce(deposit.with_name(f"{NAME}.zip"), "--folder", deposit)
+    assert status == 2 and "has other files in it" in said
+    assert verify_deposit(deposit) == []
 
 
 def test_an_environment_that_cannot_be_installed(made, reproduce, tmp_path):
@@ -303,6 +322,11 @@ def test_the_environment_that_is_here_has_to_agree_with_the_lock_file(deposit, r
     seal(deposit)
     status, said = reproduce(deposit, "--environment", "here")
     assert status == 2 and f"numpy: {version('numpy')} is installed, 0.1 is locked" in said
+    for content in (b"package = [1]", b"\xff"):
+        (deposit / "source/uv.lock").write_bytes(content)
+        seal(deposit)
+        status, said = reproduce(deposit, "--environment", "here")
+        assert status == 2 and "source/uv.lock: is no lock file of uv" in said
     assert list(reproduce.temporary.iterdir()) == []
 
 

@@ -10,14 +10,22 @@ import socket
 import subprocess
 import sys
 import threading
+import zipfile
 from importlib.metadata import version
+from types import SimpleNamespace
 
+import h5py
+import netCDF4
+import numpy as np
 import pytest
-from typer.testing import CliRunner
+from conftest import REPOSITORY
+from reproduced import caller, lock
 
-from icha.cli import app
+from icha.publication.deposit_files import whole_deposit
 from icha.publication.isolation import BWRAP, isolated, works
-from icha.publication.rerun import surroundings
+from icha.publication.rerun import changed_files, surroundings
+from icha.publication.source import PROGRAM as PARTS
+from icha.support.checksums import sha256_of
 
 CAMPAIGN = """
 name: tiny
@@ -67,11 +75,6 @@ made.mkdir(parents=True, exist_ok=True)
 """
 
 
-def lock(numpy=None):
-    numpy = numpy or version("numpy")
-    return f'[[package]]\nname = "numpy"\nversion = "{numpy}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
-
-
 @pytest.fixture
 def deposit(tmp_path):
     """A function that makes a deposit with other contents of some files; `None` leaves one out."""
@@ -104,21 +107,30 @@ def deposit(tmp_path):
 
 @pytest.fixture
 def reproduce(monkeypatch, tmp_path, capfd):
-    """Call the command; return its exit status and all that was said. Nothing may stay of what is refused."""
-    (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    return caller(monkeypatch, capfd, tmp_path / "temporary")
 
-    def call(*arguments):
-        done = CliRunner().invoke(app, ["reproduce", *map(str, arguments)])
-        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-        out, err = capfd.readouterr()
-        if done.exit_code == 2:
-            assert list((tmp_path / "temporary").iterdir()) == []
-        said = done.output + out + err
-        assert not set("\x1b\u202e") & set(said)
-        return done.exit_code, said
 
-    return call
+@pytest.mark.slow
+def test_a_deposit_is_computed_without_anything_in_it_being_run(deposit, reproduce, tmp_path):
+    """Whatever Python, Snakemake or make might take from it would leave a mark."""
+    leaves_a_mark = f"open({str(tmp_path / 'mark')!r}, 'a').write('x')\n"
+    names = ("Snakefile", "icha/__init__.py", "sitecustomize.py", "workflow/rules/runs.smk", "workflow/scripts/job.py")
+    names += ("workflow/scripts/run_sweep.py", "numpy.py")
+    places = (f"{folder}{name}" for folder in ("source/", "inputs/", "") for name in names)
+    x = np.arange(32) / 32 * 2 * np.pi
+    np.save(tmp_path / "z.npy", np.cos(x) + np.cos(2 * x)[:, None])
+    with netCDF4.Dataset(tmp_path / "soft.nc", "w") as file:
+        file.createDimension("step", 1)
+    run = "load/plate/seed0/slope0.5/soft"
+    own = deposit(
+        **dict.fromkeys(places, leaves_a_mark),
+        **{"inputs/z.npy": (tmp_path / "z.npy").read_bytes(), f"runs/{run}.nc": (tmp_path / "soft.nc").read_bytes()},
+    )
+    status, said = reproduce(own, "--only", run, "--folder", tmp_path / "again")
+    assert not (tmp_path / "mark").exists()
+    assert status == 1 and "different: not everything is reproduced" in said, said
+    with netCDF4.Dataset(tmp_path / f"again/data/results/tiny/runs/{run}.nc") as file:
+        assert float(file["reduced_pressure"][-1]) == pytest.approx(1e-3)  # it was computed
 
 
 def test_nothing_of_a_deposit_is_run_unasked(deposit, reproduce, tmp_path):
@@ -207,11 +219,15 @@ def test_without_isolation_it_can_do_all_and_that_is_said(plan, deposit, reprodu
     assert (tmp_path / "outside").exists() and (tmp_path / "mark").exists()
 
 
-@pytest.mark.parametrize("asked", [[BWRAP], []])
-def test_bubblewrap_keeps_it_to_its_folder_and_off_the_network(asked, plan, deposit, reproduce, tmp_path):
+def need_bubblewrap():
     if not works(BWRAP):
         reason = "bubblewrap is not installed, or users may not use it here"
         (pytest.fail if os.environ.get("ICHA_REQUIRE_BWRAP") == "1" else pytest.skip)(reason)
+
+
+@pytest.mark.parametrize("asked", [[BWRAP], []])
+def test_bubblewrap_keeps_it_to_its_folder_and_off_the_network(asked, plan, deposit, reproduce, tmp_path):
+    need_bubblewrap()
     folder = tmp_path / "again"
     makefile = MAKEFILE.replace('"$(MARK)"', "mark")
     own = deposit(**{"inputs/plan.json": plan, "source/Makefile": makefile})
@@ -226,10 +242,43 @@ def test_bubblewrap_keeps_it_to_its_folder_and_off_the_network(asked, plan, depo
             "network": network,
             "secret": False,
             "usr": False,
-            "home": str(folder / "home"),
+            "home": str(folder / "source/.home"),
             "terminal": False,
         }
     assert not (tmp_path / "outside").exists()
+
+
+def test_what_is_isolated_leaves_nothing_that_we_would_follow_or_take_for_ours(deposit, reproduce, tmp_path):
+    """What lies in the folder of a rerun is read and written by us, with no isolation; its source alone is its own."""
+    need_bubblewrap()
+    (tmp_path / "victim").write_text("mine")
+    (tmp_path / "secret").write_text("hush")
+    # What links may lead to, and what may be in the way of the second call.
+    makefile = f"""
+environment:
+	-ln -sfn {tmp_path}/victim ../environment.log
+	-mkdir -p ../deposit/source ../data
+	-ln -s {tmp_path}/secret ../deposit/source/stolen
+	-cp ../rerun-of.sha256 ../data/verdict.txt
+	-mv ../source ../old
+	false
+"""
+    own = deposit(**{"source/Makefile": makefile})
+    for _ in range(2):
+        status, said = reproduce(own, *OWN, BWRAP, "--folder", tmp_path / "again")
+        assert status == 1 and "the environment could not be installed" in said, said
+        assert sorted(os.listdir(tmp_path / "again")) == ["environment.log", "rerun-of.sha256", "source"]
+        assert not (tmp_path / "again/environment.log").is_symlink()
+    assert (tmp_path / "victim").read_text() == "mine"
+    assert not list(tmp_path.glob("again/**/stolen"))
+
+
+def test_results_that_are_a_link_are_none(deposit, reproduce, tmp_path):
+    program = f"#!{sys.executable}\nimport os\nos.mkdir('results')\nos.symlink({str(tmp_path)!r}, 'results/tiny')\n"
+    makefile = "environment:\n\tmkdir -p .venv/bin; cp program.py .venv/bin/icha; chmod +x .venv/bin/icha\n"
+    own = deposit(**{"source/Makefile": makefile, "source/program.py": program})
+    status, said = reproduce(own, *OWN, "none")
+    assert status == 1 and "nothing was computed" in said
 
 
 @pytest.mark.parametrize("program", ["podman", "docker"])
@@ -252,8 +301,8 @@ def test_containers_have_no_network_and_one_folder(program, plan, deposit, repro
     assert info == ["info"]
     assert "--network=none" in run and "--network=none" not in install
     for called in (install, run):
-        assert {"--rm", "--read-only", "--cap-drop=all", f"--volume={folder}:{folder}"} <= set(called)
-        assert f"--workdir={folder}/source" in called and f"--env=HOME={folder}/home" in called
+        assert {"--rm", "--read-only", "--cap-drop=all", f"--volume={folder}/source:{folder}/source"} <= set(called)
+        assert f"--workdir={folder}/source" in called and f"--env=HOME={folder}/source/.home" in called
         assert sum(each.startswith(("--volume", "--mount", "-v")) for each in called) == 1
     status, said = reproduce(deposit(), *OWN, program, "--environment", "here")
     assert status == 2 and "allowed: bwrap, none" in said
@@ -263,18 +312,63 @@ def test_isolation_that_is_not_there_is_refused(deposit, reproduce, monkeypatch,
     monkeypatch.setattr(shutil, "which", lambda name: None)
     status, said = reproduce(deposit(), *OWN, "bwrap")
     assert status == 2 and "--isolation bwrap: is not installed, or cannot isolate here" in said
+    status, said = reproduce(deposit(), "--own-source", "--yes")
+    assert status == 2 and "needed: --isolation none as well" in said
     assert not (tmp_path / "mark").exists()
 
 
+def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, tmp_path, monkeypatch):
+    folder = deposit()
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        for file in folder.rglob("*"):
+            if file.is_file():
+                archive.write(file, f"tiny/{file.relative_to(folder)}")
+    monkeypatch.setattr("icha.publication.strangers_files.shutil.disk_usage", lambda path: SimpleNamespace(free=3))
+    status, said = reproduce(tmp_path / "a.zip")
+    assert status == 1 and "are needed, and 3 B are free" in said, said
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_whatever_differs_of_the_program_is_counted(tmp_path):
+    """Of the package and of the workflow, which decides as much."""
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", *PARTS],
+        **{"cwd": REPOSITORY, "capture_output": True, "text": True, "check": True},
+    ).stdout.splitlines()
+    sums = {name: sha256_of(REPOSITORY / name) for name in listed}
+
+    def changed(sums):
+        (tmp_path / "SHA256SUMS").write_text("".join(f"{digest}  source/{name}\n" for name, digest in sums.items()))
+        with whole_deposit(tmp_path) as found:
+            return changed_files(found)
+
+    assert changed(sums | {"docs/model.md": 64 * "0"}) == 0
+    others = dict.fromkeys(("Snakefile", "workflow/rules/runs.smk", "icha/references/literature.json"), 64 * "0")
+    assert changed(sums | others) == 3
+    del others["Snakefile"], sums["Snakefile"]
+    assert changed(sums | others | {"workflow/scripts/more.py": 64 * "0"}) == 4
+
+
 def test_variables_are_those_on_the_list(monkeypatch):
-    kept = {"HOME": "/h", "PATH": "/b", "LC_ALL": "C", "UV_INDEX": "https://index"}
+    kept = {"HOME": "/h", "PATH": "/opt/python@3.11", "LC_ALL": "de_DE@euro", "UV_INDEX": "https://index"}
     others = {"MY_TOKEN": "x", "HOMES": "x", "home": "x", "PIP_INDEX_URL": "https://me:pass@index"}
+    others |= {"HTTPS_PROXY": "me:pass@proxy:8080", "http_proxy": "me@proxy"}
     monkeypatch.setattr(os, "environ", kept | others)
     assert surroundings() == kept
 
 
 def test_a_command_that_is_not_isolated_stays_as_it_is(tmp_path):
-    assert isolated("none", ["a", "b"], tmp_path, tmp_path, {}, network=False) == ["a", "b"]
+    assert isolated("none", ["a", "b"], tmp_path, {}, network=False) == ["a", "b"]
+
+
+@pytest.mark.parametrize("where", ["pipe.nc", "other.nc"])
+def test_a_run_whose_data_are_elsewhere_is_not_followed(where, deposit, reproduce, tmp_path):
+    os.mkfifo(tmp_path / "pipe.nc")  # whoever opens it waits
+    with h5py.File(tmp_path / "run.nc", "w") as file:
+        file["step"] = h5py.ExternalLink(str(tmp_path / where), "/step")
+    own = deposit(**{"runs/load/plate/seed0/slope0.5/soft.nc": (tmp_path / "run.nc").read_bytes()})
+    status, said = reproduce(own, "--only", "load/plate/seed0/slope0.5/soft")
+    assert status == 2 and "soft.nc: is no run: 'step' is a link to another file" in said, said
 
 
 def test_what_is_called_a_run_and_is_none_is_said(deposit, reproduce):

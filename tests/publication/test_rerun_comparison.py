@@ -231,7 +231,7 @@ def test_files_that_are_missing_extra_damaged_or_drawn_otherwise(folders):
     spoilt[-2000:-1900] = bytes(100)
     (rerun / FILE).write_bytes(spoilt)
     (found,) = [file for file in compare_folders(deposit, rerun).files if file.path == FILE]
-    assert found.verdict == DIFFERENT and "cannot be read" in found.detail
+    assert found.verdict == DIFFERENT and "cannot be compared: RuntimeError" in found.detail
 
 
 def test_checks_have_to_be_passed_alike(tmp_path):
@@ -249,6 +249,54 @@ def test_checks_have_to_be_passed_alike(tmp_path):
     assert verdict(passed=False) == DIFFERENT
     assert verdict(limit=1.0) == DIFFERENT
     assert verdict(name="another") == DIFFERENT
+
+
+CHECK = {"name": "residual", "subject": "a/b", "value": 1e-12, "limit": 1e-8, "passed": True}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        json.dumps([{key: value for key, value in CHECK.items() if key != "value"}]),
+        json.dumps([CHECK | {"value": "q"}]),
+        json.dumps([CHECK | {"value": [1, 2, 3]}]),
+        json.dumps([CHECK | {"name": 3}]),
+        json.dumps([CHECK | {"name": "\ud800"}]),
+        json.dumps([1, 2, 3]),
+        100_000 * "[",
+        "\xff",
+    ],
+)
+def test_checks_that_are_none_are_different_and_end_nothing(content, tmp_path):
+    for folder, text in (("deposit", content), ("rerun", json.dumps([CHECK]))):
+        write(tmp_path / folder / FILE)
+        (tmp_path / folder / "checks.json").write_text(text, encoding="latin-1")
+    comparison = compare_folders(tmp_path / "deposit", tmp_path / "rerun")
+    assert [file.verdict for file in comparison.files] == [DIFFERENT, IDENTICAL]
+    table(comparison).encode()
+    write_json(comparison, tmp_path / "out.json")
+    assert json.loads((tmp_path / "out.json").read_text())["files"][0]["verdict"] == DIFFERENT
+
+
+def test_attributes_that_are_of_no_use_are_different_and_end_nothing(folders):
+    deposit, rerun = folders
+    write(deposit / FILE, lambda file: file["pressure"].setncattr("missing_value", "none"))
+    write(rerun / FILE)
+    (found,) = compare_folders(deposit, rerun).files
+    assert found.verdict == DIFFERENT
+
+
+@pytest.mark.parametrize("link", [FILE, "runs", "runs/load/rough", "checks.json"])
+def test_links_to_the_deposit_s_own_results_are_not_the_same_results(link, folders):
+    """Whoever runs the program of a stranger is left with what that has made, which may be links."""
+    deposit, rerun = folders
+    (deposit / "checks.json").write_text("[]")
+    shutil.copytree(deposit, rerun, dirs_exist_ok=True)
+    assert compare_folders(deposit, rerun).verdict == IDENTICAL
+    shutil.rmtree(rerun / link) if (rerun / link).is_dir() else (rerun / link).unlink()
+    (rerun / link).symlink_to(deposit / link)
+    assert compare_folders(deposit, rerun).verdict == DIFFERENT
+    assert compare_folders(deposit, rerun, [FILE, "checks.json"]).verdict == DIFFERENT
 
 
 def test_the_same_difference_in_many_files_is_one_line(tmp_path):

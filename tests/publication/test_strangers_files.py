@@ -127,6 +127,14 @@ def test_the_number_of_files_is_bounded(folder, tmp_path):
     assert "holds 2 files; allowed: 1, or more with --large" in said
 
 
+def test_no_more_than_a_hundred_flaws_are_told(folder):
+    for k in range(150):
+        (folder / f"added{k}").touch()
+    done = CliRunner().invoke(app, ["verify", str(folder)])
+    assert done.exit_code == 1 and "… and 50 more" in done.output and "not whole: 150 problems" in done.output
+    assert len(done.output.splitlines()) == 102
+
+
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_so_many_names_with_one_twice_do_not_take_their_number_squared(tmp_path, monkeypatch):
     names = [f"tiny/{k}" for k in range(3000)]
@@ -182,6 +190,39 @@ def test_entries_that_share_their_bytes_are_refused(tmp_path):
     assert "its files overlap" in said
 
 
+def test_entries_that_share_a_few_of_their_bytes_are_refused(tmp_path):
+    """One within another, where all of them together have less than the zip."""
+    inner = packed(tmp_path / "inner.zip", "tiny/a").read_bytes()
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("tiny/SHA256SUMS", "")
+        archive.writestr("tiny/outer", inner + bytes(1000))
+        outer = archive.getinfo("tiny/outer").header_offset + 30 + len("tiny/outer")
+        with zipfile.ZipFile(tmp_path / "inner.zip") as held:
+            entry = held.getinfo("tiny/a")
+        entry.header_offset += outer
+        archive.filelist.append(entry)
+    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
+        assert sum(entry.compress_size for entry in archive.infolist()) < (tmp_path / "a.zip").stat().st_size
+    (said,) = verify_deposit(tmp_path / "a.zip")
+    assert "its files overlap" in said
+
+
+def test_names_that_lie_deep_in_one_another_have_a_flaw_each_at_most(tmp_path):
+    deep = [f"tiny{k * '/a'}" for k in range(1, 400)]
+    names = [*deep, *(f"{deep[-1]}/{k}" for k in range(500))]
+    found = verify_deposit(packed(tmp_path / "a.zip", *names))
+    assert len(found) == len(deep) and all("is a file, and the folder of" in line for line in found)
+
+
+@pytest.mark.parametrize("system", [0, 3, 5, 19])
+def test_a_link_in_a_zip_is_one_whatever_system_it_is_said_to_be_of(system, tmp_path):
+    path = packed(tmp_path / "a.zip", "tiny/a", modes=[("tiny/a", stat.S_IFLNK | 0o777)])
+    content = bytearray(path.read_bytes())
+    content[content.rindex(b"PK\x01\x02") + 5] = system
+    path.write_bytes(content)
+    assert verify_deposit(path) == ["tiny/a: is a link, a device or something else that is no file"]
+
+
 def test_an_encrypted_file_is_said_to_be_one(tmp_path):
     path = packed(tmp_path / "a.zip", "tiny/a")
     content = bytearray(path.read_bytes())
@@ -190,9 +231,10 @@ def test_an_encrypted_file_is_said_to_be_one(tmp_path):
     assert verify_deposit(path) == ["tiny/a: is encrypted, or compressed by another method than deflate"]
 
 
-def test_a_large_text_is_not_read_as_a_whole(folder):
-    with pytest.raises(ValueError, match="a: has 4 B; allowed: 3 B"):
-        read_file(folder, "a", 3)
+def test_a_large_text_is_not_read_as_a_whole(folder, monkeypatch):
+    monkeypatch.setattr("icha.publication.deposit_files.LARGEST_TEXT", 3)
+    with looked_through(folder) as found, pytest.raises(ValueError, match="a: has 4 B; allowed: 3 B"):
+        read_file(found, "a")
 
 
 def test_unpacking_needs_room(folder, tmp_path, monkeypatch):

@@ -318,6 +318,11 @@ ELSEWHERE = "https://elsewhere.org/"
         (("POST", "depositions", refuse(302, Location=ELSEWHERE)), f"sends us on to {ELSEWHERE}"),
         (("POST", "depositions", refuse(200, {"id": 1, "links": {"bucket": ELSEWHERE}})), "another server"),
         (("POST", "depositions", refuse(200, {})), "does not answer as Zenodo does"),
+        (("POST", "depositions", refuse(200, [1])), "does not answer as Zenodo does"),
+        (("POST", "depositions", refuse(200, {"id": 1, "links": None})), "does not answer as Zenodo does"),
+        (("POST", "depositions", refuse(200, {"id": 1, "links": {"bucket": 3}})), "to be sent to another server"),
+        (("POST", "depositions", refuse(400, {"errors": 1})), "refuses it (400)"),
+        (("PUT", "depositions", refuse(200, "done")), "does not answer as Zenodo does"),
         (("POST", "depositions", refuse(500)), "has failed (500"),
         (("POST", "depositions", break_off), "broken off the connection"),
         (("PUT", "depositions", refuse(400, VALIDATION)), "metadata.creators: Missing data for required field.\n"),
@@ -340,6 +345,19 @@ def test_what_a_server_refuses_is_said_with_what_to_do(server, deposit, failure,
         assert set(server.files) == SENT
     else:
         assert "--draft" not in said
+
+
+@pytest.mark.parametrize("links", [None, [], {"latest_draft": 7}, {"latest_draft": "http://["}])
+def test_a_draft_of_a_new_version_that_is_nowhere(links, server, deposit):
+    server.failures += [("POST", "newversion", refuse(201, {"links": links})), ("GET", "depositions", refuse(404))]
+    status, said = upload(deposit, "--url", server.address, "--new-version-of", "7", "--yes")
+    assert status == 1 and "Error: " in said, said
+
+
+def test_a_publication_of_which_the_server_says_little(server, deposit):
+    server.failures.append(("POST", "publish", refuse(202, {"links": None, "doi": ["x"]})))
+    status, said = upload(deposit, "--url", server.address, "--publish", "--yes")
+    assert status == 0 and f"published: {server.address}/records/77" in said and "10.5072/zenodo.77" in said
 
 
 def test_what_fails_for_the_moment_is_tried_again(server, deposit, monkeypatch):

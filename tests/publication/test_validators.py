@@ -1,9 +1,11 @@
 """The validators of others see what is wrong with a deposit's files; those that cannot fail would say nothing."""
 
 import re
+import socket
 import subprocess
 import zipfile
 
+import h5py
 import netCDF4
 import pytest
 from outside_validators import REPOSITORY, python_of_validators, sealed, validated
@@ -46,6 +48,26 @@ def test_a_good_file_passes_in_a_folder_and_in_an_archive(kind, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     assert not failed(done)
     assert re.search(r"compliance-checker: passed; (\d+) of \1 points, 2 groups of 1 files", done.stdout), done.stdout
+
+
+def test_files_ask_for_nothing_beyond_themselves(tmp_path, monkeypatch):
+    """No network, whatever an attribute names, and no data in other files."""
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "kept"))
+    folder = deposit(tmp_path / "mine")
+    with netCDF4.Dataset(folder / "data.nc", "a") as data:
+        data.standard_name_vocabulary = "CF Standard Name Table v50"
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        monkeypatch.setenv("HTTPS_PROXY", f"http://127.0.0.1:{server.getsockname()[1]}")
+        server.settimeout(0)
+        done = validated(sealed(folder), *NAMES)
+        with pytest.raises(BlockingIOError):  # nobody has come
+            server.accept()
+    assert done.returncode == 0, done.stdout + done.stderr
+    with h5py.File(folder / "data.nc", "a") as file:
+        file["elsewhere"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
+    done = validated(sealed(folder), *NAMES)
+    assert done.returncode == 1 and "data.nc: 'elsewhere' is a link to another file" in done.stderr
+    assert "passed" not in done.stdout
 
 
 def test_a_unit_that_is_none_is_seen(tmp_path):

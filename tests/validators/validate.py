@@ -156,7 +156,7 @@ def _violations(validator, metadata: dict) -> list[str]:
 def check_conventions(folder: Path) -> Outcome:
     """compliance-checker: every group of every netCDF file keeps to CF 1.11; what it only recommends is a remark."""
     paths = sorted(folder.rglob("*.nc"))
-    with ProcessPoolExecutor() as processes:
+    with ProcessPoolExecutor(initializer=stay_off_the_network) as processes:
         answers = [answer for found in processes.map(_conventions_of, paths) for answer in found]
     problems, remarks = [], []
     for answer in answers:
@@ -200,6 +200,20 @@ def _conventions_of(path: Path) -> list[Conformance]:
                     told += [f"{result.name}: {message}" for message in result.msgs or ["failed"]]
             answers.append(Conformance(path / group.strip("/"), (score, out_of), problems, remarks))
     return answers
+
+
+def stay_off_the_network() -> None:
+    """From now on, connect this process to nothing but other processes here: files may ask for more.
+
+    The attribute `standard_name_vocabulary`, for one, has compliance-checker download a table.
+    """
+
+    def refuse(event, arguments):
+        abroad = event in ("socket.connect", "socket.sendto") and not isinstance(arguments[1], str | bytes)
+        if abroad or event == "socket.getaddrinfo":
+            raise PermissionError("validators have no network")
+
+    sys.addaudithook(refuse)
 
 
 def check_units(folder: Path) -> Outcome:
@@ -267,6 +281,7 @@ def main() -> int:
     """Validate what the command line names."""
     from icha.publication.deposit_files import verify_deposit
     from icha.publication.strangers_files import LARGE, LIMITS, NO_LIMITS, looked_through, unpack
+    from icha.support.hdf5 import refuse_data_elsewhere
     from icha.support.printable import printable
 
     parser = argparse.ArgumentParser(description="Put a deposit to the validators of others, without any network.")
@@ -289,6 +304,12 @@ def main() -> int:
         if not deposit.is_dir():
             folder = Path(scratch)
             unpack(found, folder)
+        for file in sorted(folder.rglob("*.nc")):
+            try:
+                refuse_data_elsewhere(file)
+            except (OSError, ValueError) as error:
+                sys.exit(f"{name}: {printable(file.relative_to(folder))}: {printable(error)}")
+        stay_off_the_network()
         return 0 if validate(folder, arguments.only, sys.maxsize if arguments.all else 5) else 1
 
 
