@@ -17,7 +17,7 @@ from icha.contact.failures import FullContact, NotConverged
 # Deviation of sqrt(G/dgamma) at which a front rests well enough to see where new contact forms.
 _NEARLY_AT_REST = 1e-3
 # The same where it is clear, and what is clear: by so much of the gap at which a cell lets go.
-_IN_SIGHT, _CLEARLY = 3e-2, 0.1
+_IN_SIGHT, _CLEARLY = 3e-2, 0.02
 # Rounds of new contacts: they end, but may be as many as there are cells.
 _MAX_ROUNDS = 1000
 # More of the surface than this in contact, and the rest follows.
@@ -82,7 +82,7 @@ def settled(
         del stages[:2]
 
     def mended(state, restless):
-        return relaxed_in_windows(space, front, separation, state, restless)
+        return relaxed_in_windows(space, front, separation, state, state.gap, restless)
 
     tried = np.zeros(space.size, dtype=bool)
     stage = rounds = 0
@@ -104,7 +104,8 @@ def settled(
             raise NotConverged(f"no equilibrium after {rounds - 1} rounds of new contacts")
         made = np.union1d(summits.contacts(within & ~tried[summits.cell], space.grid), new)
         tried[new] = True
-        contact = contact.with_closed(made)
+        closed = contact.with_closed(made)
+        contact = relaxed_in_windows(space, front, separation, closed, contact.gap, made) or closed
 
 
 def _within_reach(summits, state, margin):

@@ -38,9 +38,9 @@ _MAX_KRYLOV = 60
 COARSE, FINE = 1e-1, STIFFNESS_TOLERANCE[BOUNDARY_ELEMENTS]
 # The rows of the front, in the preconditioner: what is left of a bond beside the half-space.
 _NET = 0.6
-# A deviation of sqrt(G/dgamma) that keeps the whole front waiting, and of how much of it. Least damping of bonds where
-# it is larger: fronts run there, and a whole step would lead up.
-_RESTLESS, _FEW, _RUNNING = 0.03, 0.05, 0.2
+# A deviation of sqrt(G/dgamma) that is mended where it is. Least damping of bonds there: fronts run, and a whole step
+# would lead up.
+_RESTLESS, _RUNNING = 0.03, 0.2
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
 # Damping of the first step of a front of which more than this part is restless: without, it would lead far up.
 _FAR_DAMPING, _MANY = 0.2, 0.5
@@ -122,8 +122,8 @@ def front_at_rest(
 
     contact: if it is `Held`, at this separation. tolerance: of sqrt(G/dgamma) along the front. near: whether it is not
     far from rest. most_steps: after which it is returned as it is. beyond: of a window, what the contact outside
-    adds to the mean fraction around every cell, a field. mended: where few cells, (m,), of a contact are far from rest,
-    the contact with these at rest, if a short way leads there.
+    adds to the mean fraction around every cell, a field. mended: where cells, (m,), of a contact are far from rest, the
+    contact with these nearer to it, if a short way leads there.
 
     Raises
     ------
@@ -145,10 +145,9 @@ def front_at_rest(
             search = replace(search, state=given.at(state, enough))
             continue
         restless = now.free & (np.abs(now.intensity - 1) > _RESTLESS)
-        part_restless = np.count_nonzero(restless) / max(np.count_nonzero(now.front), 1)
-        if number == 0 and part_restless > _MANY:
+        if number == 0 and np.count_nonzero(restless) > _MANY * np.count_nonzero(now.front):
             search = replace(search, damping=_FAR_DAMPING)
-        if search.all_moved and 0 < part_restless <= _FEW:
+        if search.all_moved and restless.any():
             search = _after_mending(given, search, mended(state, now.cells[restless]), coarse)
             if search.state is not state:
                 continue
@@ -163,7 +162,7 @@ class _Search:
     """How far a front on its way to rest has come.
 
     damping: of bonds in the next step. most_off: of the displacement, over the gap at which a cell is free, at most.
-    all_moved: whether the whole front has moved since a few of its cells were mended.
+    all_moved: whether the whole front has moved since it was mended where it was far from rest.
     """
 
     state: Held
@@ -173,12 +172,12 @@ class _Search:
 
 
 def _after_mending(given, search, contact, coarse):
-    """The search after few cells were mended, which gave a contact or None; at its state if that is not lower."""
+    """The search after restless cells were mended, which gave a contact or None; at its state if that is not lower."""
     search = replace(search, all_moved=False)
     if contact is None:
         return search
     new = given.at(contact, min(coarse, 0.1 * _GAP_TO_FRONT))
-    return replace(search, state=new) if given.is_lower(new, search.state) else search
+    return replace(search, state=new, damping=0.0) if given.is_lower(new, search.state) else search
 
 
 def _after_one_step(given, search, now, enough, coarse):

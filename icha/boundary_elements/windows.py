@@ -1,104 +1,160 @@
-"""Fronts that are far from rest in a few places come to rest there, in windows around them; nothing else moves.
+"""Fronts that are far from rest in some places come to rest there, in windows around them; nothing else moves.
 
-After two or three of Newton's steps nearly all of a front is at rest, and steps of the whole contact go on for the sake
-of some cells: where contact has just been made, where two patches meet. What happens there
-does not concern the rest before it is done.
+Where contact has just been made, where two patches meet, or everywhere after a long way: what happens at a place hardly
+concerns others before it is done. Transforms of a window are so much shorter than those of the whole that nearly all of
+a front comes nearly to rest in them, and steps of the whole contact are left with what places do to one another.
 """
 
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
 from scipy.ndimage import find_objects, label, maximum_filter
 
-from icha.boundary_elements.elasticity import Contact, Held, Topography
+from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
 from icha.boundary_elements.regions import among, merged, region
 from icha.contact.failures import FullContact, NotConverged
+from icha.support.parallel import blocks, on_cores
 
-# Cells a side of a window; half of it may move. So far around a cell that is not at rest others move with it.
-_SIDE, _AROUND = 64, 5
-# All windows together, over the whole grid: more are no short way.
-_PART = 0.2
+# Cells a side of windows, half of which may move. What is too wide for them is cut into pieces.
+_SIDES, _PIECE = (64, 128, 256), 64
+# Cells of windows that are solved together: few enough to stay in the cache, and to be done when they are at rest.
+_TOGETHER = 65_536
 # Deviation of sqrt(G/dgamma) in windows; all of the front comes to rest afterwards.
 _TOLERANCE = 1e-3
-# Of Newton's steps at most, after which windows are as near to rest as they are.
-_STEPS = 12
+
+
+class _Way(NamedTuple):
+    """How far around a cell that is not at rest others move with it, if windows are no more than a part of the grid.
+
+    steps: of Newton's, at most, after which windows are as near to rest as they are.
+    """
+
+    around: int
+    part: float
+    steps: int
+
+
+# Few places get more of both.
+_WAYS = (_Way(20, 0.05, 60), _Way(5, 0.5, 20))
 
 
 def relaxed_in_windows(
     space: HalfSpace,
     front: Front,
     separation: float,
-    state: Held,
+    contact: Contact,
+    gap: np.ndarray,
     restless: np.ndarray,
 ) -> Contact | None:
     """The contact after its front has come nearer to rest around restless cells (m,), where these lie in windows.
 
-    None if there are no such windows, or no way to rest in them.
+    gap: of the contact as its pressures are, (n, n). None if there are no such windows, or no way to rest in them.
     """
-    windows, free = _windows(region(restless, space.shape))
-    if not len(windows):
+    for way in _WAYS:
+        windows = _windows(region(restless, space.shape), way.around)
+        if sum(cells.size for cells, _ in windows) <= way.part * space.size:
+            break
+    else:
         return None
-    cells = windows[free]
-    touching, at = among(cells, state.cells)
-    inside = np.flatnonzero(free)[touching]
-    contact = Contact(inside, state.fraction[at], state.pressure[at])
-    small = HalfSpace(windows.shape, *_kernel(space.grid))
+    near = neighbours(space, contact.cells, contact.fraction.astype(np.float32)).ravel()
+    kernels = {side: _kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}
 
-    # What pressures outside displace is there for good, as if the surface had it; what may not move is far away.
-    own = small.displacement(inside, contact.pressure)
-    far = separation - 10 * COMPLIANCE * front.strength - 2 * np.abs(own).max()
-    level = np.where(free, own + separation - state.gap.ravel()[windows], far)
-    around = neighbours(space, state.cells, state.fraction.astype(np.float32)).ravel()[windows]
-    around = around - neighbours(small, inside, contact.fraction)
-    try:
-        rest = front_at_rest(
-            small, front, Topography.of(level), separation, contact, _TOLERANCE, most_steps=_STEPS, beyond=around
-        )
-    except (NotConverged, FullContact):
+    def at_rest(some):
+        cells, free = some
+        small = HalfSpace(cells.shape, *kernels[cells.shape[-1]])
+        return _at_rest(small, front, separation, contact, gap, near, cells, free, way.steps)
+
+    found = on_cores(at_rest, windows)
+    moved = np.zeros(space.size, dtype=bool)
+    for (cells, free), rest in zip(windows, found, strict=True):
+        if rest is not None:
+            moved[cells[free]] = True
+    if not moved.any():
         return None
-    moved = region(cells, (space.size,))
-    staying = ~moved[state.cells]
+    cells, fraction, pressure = map(np.concatenate, zip(*filter(None, found), strict=True))
+    order, staying = np.argsort(cells), ~moved[contact.cells]
     return Contact(
         *merged(
-            state.cells[staying],
-            windows.ravel()[rest.cells],
-            (state.fraction[staying], rest.fraction),
-            (state.pressure[staying], rest.pressure),
+            contact.cells[staying],
+            cells[order],
+            (contact.fraction[staying], fraction[order]),
+            (contact.pressure[staying], pressure[order]),
         )
     )
 
 
-def _windows(restless):
-    """Cells of the whole grid in each window, (t, w, w), and which of them may move there: in one window each."""
+def _at_rest(small, front, separation, contact, gap, near, windows, free, most_steps):
+    """Cells in contact of the whole grid in some windows, their fractions and pressures, near rest; None if not found.
+
+    near: mean fraction of contact around every cell of the whole grid.
+    """
+    cells = windows[free]
+    touching, at = among(cells, contact.cells)
+    inside = np.flatnonzero(free)[touching]
+    start = Contact(inside, contact.fraction[at], contact.pressure[at])
+
+    # What pressures outside displace is there for good, as if the surface had it; what may not move is far away.
+    own = small.displacement(inside, start.pressure)
+    far = separation - 10 * COMPLIANCE * front.strength - 2 * np.abs(own).max()
+    level = Topography.of(np.where(free, own + separation - gap.ravel()[windows], far))
+    beyond = near[windows] - neighbours(small, inside, start.fraction)
+    try:
+        rest = front_at_rest(small, front, level, separation, start, _TOLERANCE, most_steps=most_steps, beyond=beyond)
+    except (NotConverged, FullContact):
+        return None
+    return windows.ravel()[rest.cells], rest.fraction, rest.pressure
+
+
+def _windows(restless, around):
+    """Windows, some together: cells of the whole grid, (t, w, w), and which may move there, in one window each."""
     grid = len(restless)
-    labels, _ = label(maximum_filter(restless.view(np.uint8), 2 * _AROUND + 1, mode="wrap"))
-    way = np.arange(_SIDE)
-    cells, owner = [], []
-    for number, box in enumerate(find_objects(labels), 1):
-        if max(side.stop - side.start for side in box) <= _SIDE // 2:
-            rows, columns = ((side.start + side.stop - _SIDE) // 2 + way for side in box)
-            cells.append(np.add.outer(rows % grid * grid, columns % grid))
-            owner.append(number)
-    if not 0 < len(cells) * _SIDE**2 <= _PART * grid**2:
-        return np.zeros((0, _SIDE, _SIDE), int), np.zeros((0, _SIDE, _SIDE), bool)
-    windows = np.stack(cells)
-    return windows, labels.ravel()[windows] == np.array(owner)[:, None, None]
+    labels, _ = label(maximum_filter(restless.view(np.uint8), 2 * around + 1, mode="wrap"))
+    boxes = _cut(labels, find_objects(labels))
+    width = np.array([max(side.stop - side.start for side in box) for box in boxes], int)
+    windows, narrower = [], 0
+    for side in _SIDES:
+        numbers = np.flatnonzero((narrower < width) & (width <= side // 2))
+        narrower, way = side // 2, np.arange(side)
+        for some in blocks(len(numbers), _TOGETHER // side**2):
+            cells = []
+            for number in numbers[some]:
+                rows, columns = ((one.start + one.stop - side) // 2 + way for one in boxes[number])
+                cells.append(np.add.outer(rows % grid * grid, columns % grid))
+            cells = np.stack(cells)
+            windows.append((cells, labels.ravel()[cells] == 1 + numbers[some][:, None, None]))
+    return windows
+
+
+def _cut(labels, boxes):
+    """The boxes after those too wide for any window are cut into pieces, which get labels of their own."""
+    pieces = []
+    for number, box in enumerate(boxes, 1):
+        if max(side.stop - side.start for side in box) <= _SIDES[-1] // 2:
+            continue
+        for row in range(box[0].start, box[0].stop, _PIECE):
+            for column in range(box[1].start, box[1].stop, _PIECE):
+                piece = slice(row, row + _PIECE), slice(column, column + _PIECE)
+                mine = labels[piece] == number
+                if mine.any():
+                    pieces.append(piece)
+                    labels[piece][mine] = len(boxes) + len(pieces)
+    return boxes + pieces
 
 
 @cache
-def _kernel(grid: int):
+def _kernel(grid: int, side: int):
     """Compliance, by precision, and stiffness of a window of a grid: exact between cells half of it apart."""
-    side = HalfSpace.of(_SIDE)
     qx, qy = 2 * np.pi * scipy.fft.rfftfreq(grid), 2 * np.pi * scipy.fft.fftfreq(grid)
     q = np.hypot(qy[:, None], qx)
     q[0, 0] = np.inf
-    way = np.rint(scipy.fft.fftfreq(_SIDE) * _SIDE).astype(int)
+    way = np.rint(scipy.fft.fftfreq(side) * side).astype(int)
     rows = np.cos(np.outer(way, qy)) @ (2 / q) / grid
     table = scipy.fft.irfft(rows, n=grid, axis=1)[:, way % grid]
-    return in_both_precisions(scipy.fft.rfft2(table).real), side.stiffness
+    return in_both_precisions(scipy.fft.rfft2(table).real), HalfSpace.of(side).stiffness

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter
 
 from icha.boundary_elements import windows as module
 from icha.boundary_elements.contact import BoundaryElements
@@ -14,21 +15,37 @@ from icha.references.short_range.rough_contacts import SOFT, rough
 GRID = 160
 
 
-def test_displacements_in_a_window_are_those_of_the_whole_surface():
+@pytest.mark.parametrize("around", [5, 20])
+def test_displacements_in_a_window_are_those_of_the_whole_surface(around):
     restless = np.zeros((320, 320), dtype=bool)
     restless[60:66, 1] = restless[3, 100] = True
-    cells, free = module._windows(restless)
-    assert len(cells) > 1 and free.any(axis=(1, 2)).all()
     rng = np.random.default_rng(1)
     whole = HalfSpace.of(320)
-    small = HalfSpace(cells.shape, *module._kernel(320))
-    for window, inside in zip(cells, free, strict=True):
-        pressure = rng.normal(size=np.count_nonzero(inside))
-        order = np.argsort(window[inside])
-        expected = np.empty(len(order))
-        expected[order] = whole.displacement(window[inside][order], pressure[order], window[inside][order])
-        own = np.flatnonzero(inside)
-        np.testing.assert_allclose(small.displacement(own, pressure, own), expected, rtol=0, atol=1e-12)
+    count = 0
+    for cells, free in module._windows(restless, around):
+        small = HalfSpace(cells.shape, *module._kernel(320, cells.shape[-1]))
+        pressure = rng.normal(size=np.count_nonzero(free))
+        own = np.flatnonzero(free)
+        found = small.on_grid(own, small.displacement(own, pressure, own))
+        values = small.on_grid(own, pressure)
+        for window, inside, displaced, pressed in zip(cells, free, found, values, strict=True):
+            order = np.argsort(window[inside])
+            at = window[inside][order]
+            expected = whole.displacement(at, pressed[inside][order], at)
+            np.testing.assert_allclose(displaced[inside][order], expected, rtol=0, atol=1e-12)
+            count += 1
+    assert count >= 3
+
+
+def test_every_cell_near_a_restless_one_may_move_in_one_window_however_wide_the_restless_region_is():
+    restless = np.zeros((700, 700), dtype=bool)
+    restless[300, :] = restless[100:460, 240] = restless[650, 20] = True
+    times = np.zeros(restless.size, int)
+    for cells, free in module._windows(restless, 5):
+        assert cells.shape == free.shape and cells.shape[-1] in (64, 128)
+        np.add.at(times, cells[free], 1)
+    near = maximum_filter(restless, 11, mode="wrap")
+    np.testing.assert_array_equal(times.reshape(700, 700), near)
 
 
 @pytest.mark.parametrize("shape", [(64, 64), (3, 64, 64)])
@@ -58,7 +75,7 @@ def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_mov
     restless = before.cells[before.free & (np.abs(before.intensity - 1) > 0.03)]
     assert len(restless) and before.error > 0.1
 
-    mended = module.relaxed_in_windows(contact.space, contact.front, u, disturbed, restless)
+    mended = module.relaxed_in_windows(contact.space, contact.front, u, disturbed, disturbed.gap, restless)
     np.testing.assert_array_equal(mended.cells, state.cells)
     far = np.all(np.minimum(apart, GRID - apart) > 12, axis=0)
     np.testing.assert_array_equal(mended.fraction[far], state.fraction[far])
