@@ -35,6 +35,14 @@ WITHOUT_A_SPOT_TO_LET_GO = Case(
     "asperities",
 )
 
+# Where its area is asked for, a front jumps within its patch and the surfaces are farther apart than before.
+FRONT_THAT_JUMPS_WITHIN_ITS_PATCH = Case(
+    Topography("step", grid=9, size=0.0, seed=0, period=PERIOD, height=1e-6, boundary="periodic"),
+    (1e6, 0.13863554287061428, 1e-6),
+    {"area_fractions": [0.0016557699634695293, 0.01832314422371211], "max_step": 0.5, "unload": True},
+    "boundary_elements",
+)
+
 
 def pytest_generate_tests(metafunc):
     """One test for each series."""
@@ -74,6 +82,7 @@ def test_every_case_ends(series, bounded):
     @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 2), derandomize=False)
     @given(cases())
     @example(WITHOUT_A_SPOT_TO_LET_GO)
+    @example(FRONT_THAT_JUMPS_WITHIN_ITS_PATCH)
     def ends(case):
         bounded()
         completed.append(False)

@@ -153,12 +153,14 @@ def _loading(run) -> Iterator[Finding]:
             "largest fall of the nominal pressure within the first loading, between stops or where nothing unites, "
             "over its maximum",
         )
-    rise, rise_at_events = _rises_of_separation(loading)
+    # Within a patch a front may jump as well, as fronts of cells do, and only the area tells.
+    rise, rise_at_events = _rises_of_separation(loading, or_wider=adhesive and by_cells)
     yield (
         "separation falls",
         rise / height,
         TARGET_LIMIT,
-        "largest rise of the mean separation within the first loading where nothing jumps in or unites, over h_rms",
+        "largest rise of the mean separation within the first loading where nothing jumps in, unites or, of cells with "
+        "adhesion, becomes wider, over h_rms",
     )
     if not adhesive:
         yield (
@@ -192,10 +194,15 @@ def _fall_in_loading(loading, name):
     return max(map(_fall, parts)) / (float(np.max(np.abs(values))) or 1.0)
 
 
-def _rises_of_separation(loading):
-    """Largest rise of the mean separation from step to step, m: where nothing jumps in or unites, and elsewhere."""
+def _rises_of_separation(loading, *, or_wider):
+    """Largest rise of the mean separation from step to step, m: where nothing jumps in or unites, and elsewhere.
+
+    or_wider: where the area grows, something happened, too: surfaces that come apart without a jump lose contact.
+    """
     rise = np.diff(loading["mean_separation"])
     happened = np.diff(loading["jump_in_count"]) + np.diff(loading["coalescence_count"]) != 0
+    if or_wider:
+        happened |= np.diff(loading["contact_area_fraction"]) > 0
     return tuple(float(np.max(rise[where], initial=0.0)) for where in (~happened, happened))
 
 

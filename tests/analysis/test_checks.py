@@ -99,6 +99,20 @@ def test_a_jump_in_may_push_surfaces_apart_that_keep_an_area():
     assert "separation falls" not in failed(run)
 
 
+@pytest.mark.parametrize(
+    ("model", "area", "fails"),
+    [("boundary_elements", 1.1, False), ("boundary_elements", 0.9, True), ("asperities", 1.1, True)],
+)
+def test_a_front_of_cells_may_jump_within_its_patch_and_then_the_area_grows(model, area, fails):
+    run = small.run(material="soft").copy(deep=True)
+    run.attrs["contact_model"] = model
+    for name in ("jump_in_count", "coalescence_count"):
+        run[name].values[...] = 0
+    run["mean_separation"].values[4] = 1.1 * run["mean_separation"].values[3]
+    run["contact_area_fraction"].values[4] = area * run["contact_area_fraction"].values[3]
+    assert ("separation falls" in failed(run)) == fails
+
+
 @pytest.mark.parametrize("material", ["soft", "hertz"])
 def test_runs_that_come_back_pass(material):
     run = cyclic.run(material=material, between=2)
