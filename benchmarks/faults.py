@@ -704,10 +704,21 @@ def restored(reference: Reference, others: Place, what: str, way: str) -> Trial:
         record = KINDS["checksum record"]
         for path in (run, record, *([KINDS["Snakemake's record"]] if "all its records" in what else [])):
             shutil.copy2(others.folder / path, place.folder / path)
+    if "no records" in what:
+        # A deposit needs records of how all was made. This is said, and how to have them.
+        status, said = place.run(way)
+        wrong = [] if status and NO_RECORD in said else [f"it did not say what to do: {last_words(said)}"]
+        targets, place.targets = place.targets, ("all",)
+        status, _ = place.run(way, *(["--"] if way == "icha run" else []), "--touch", "--forceall")
+        wrong += ["records could not be made"] if status else []
+        place.targets = targets
+        wrong += reference.goes_on(place, way)
+        return _end(place, Trial("other settings", what, REFUSED, sentence(said, NO_RECORD), tuple(wrong)))
     wrong = reference.goes_on(place, way)
     return _end(place, Trial("other settings", what, WENT_ON, violations=tuple(wrong)))
 
 
+NO_RECORD = "there is no record of how it was made"
 RESTORED = ("all restored", "all restored, no records", "one run restored", "one run restored with all its records")
 
 

@@ -72,7 +72,8 @@ damage; the job that reads the file finds it.""",
 Snakemake is killed while it computes with another modulus, and the next call is given at once. Or results of another
 modulus are put in the place of those that were asked for, as from a backup: all of them or one run, with and without
 the records that Snakemake and ICHA keep. Every result knows what was asked of its job, and from which content of which
-other results it was made; both are compared with what is asked for and with what is there.""",
+other results it was made; both are compared with what is asked for and with what is there. Without Snakemake's records
+a deposit is refused, and the message says how to have them written again.""",
     "two at once": """## Two calls at once
 
 Two calls of one campaign in one folder, the second after a random pause; and calls of two campaigns in one folder.""",

@@ -81,8 +81,8 @@ def _record(records: Path, name: str) -> dict[str, Any]:
     except json.JSONDecodeError:
         what = "the record cannot be read"
     raise ValueError(
-        f"{name}: {what} of how it was made in {records}, so its origin cannot be published; remove this file and run "
-        "the campaign again, which makes it anew"
+        f"{name}: {what} of how it was made in {records}, so its origin cannot be published; needed: "
+        "`icha run CONFIGURATION -- --touch --forceall` once, which records it of all results and computes nothing"
     )
 
 

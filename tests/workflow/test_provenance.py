@@ -86,7 +86,7 @@ def test_when_the_jobs_were_run_changes_nothing(recorded_jobs, tmp_path):
 def test_a_result_without_a_record_is_named_and_what_to_do(recorded_jobs, tmp_path):
     records = recorded(tmp_path)
     unknown = f"{RESULTS}/report.html"
-    with pytest.raises(ValueError, match=rf"^{unknown}: there is no record of how it was made.*remove this file and"):
+    with pytest.raises(ValueError, match=rf"^{unknown}: there is no record of how it was made.*-- --touch --forceall"):
         recorded_jobs(records, MADE | {unknown: "report.html"}, GIVEN, scripts=WORKFLOW / "scripts")
     with pytest.raises(ValueError, match=r"surfaces/a/seed1.nc: there is no record|fig.pdf: there is no record"):
         recorded_jobs(tmp_path / "nothing", MADE, GIVEN, scripts=WORKFLOW / "scripts")

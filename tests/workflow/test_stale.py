@@ -3,7 +3,7 @@
 import json
 import os
 import shutil
-from base64 import urlsafe_b64encode
+from base64 import urlsafe_b64decode, urlsafe_b64encode
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,9 +19,9 @@ RUNS = [f"runs/load/rough/seed{seed}/slope1/bare.nc" for seed in (1, 2)]
 NOTHING = "Nothing to be done"
 
 
-def campaign(project, modulus):
+def campaign(project, modulus, *options):
     (project / CONFIGURATION).write_text(CAMPAIGN.replace("25 MPa", f"{modulus} MPa"))
-    return snakemake(project, "dataset", configuration=CONFIGURATION)
+    return snakemake(project, "dataset", *options, configuration=CONFIGURATION)
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +100,14 @@ def test_results_of_other_settings_are_made_again(finished, tmp_path, whose, now
 def test_unchanged_results_without_the_workflows_records_are_left_alone(finished, tmp_path):
     project = shutil.copytree(finished[0], tmp_path / "project", symlinks=True)
     records_lost(finished[0], project)
+    assert NOTHING in campaign(project, 25).stdout
+    # As a deposit asks for where there are none: what made the results is recorded, and they stay as they are.
+    records = project / ".snakemake/metadata"
+    assert not any(records.iterdir())
+    assert campaign(project, 25, "--touch", "--forceall").returncode == 0
+    named = {urlsafe_b64decode(file.name).decode() for file in records.iterdir()}
+    assert {f"results/small/{path}" for path in (*RUNS, "dataset/small.nc")} <= named
+    assert damaged(project / "results/small", thorough=True) == []
     assert NOTHING in campaign(project, 25).stdout
 
 
