@@ -7,11 +7,14 @@ Contact Mechanics, 1985, sec. 13.2); its mean displaces nothing, for separations
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.fft
 
+from icha.boundary_elements.nearby import TILE, Tiles, modes_nearby
 from icha.support.parallel import blocks, on_cores
 
 # The inverse of the kernel for the mean, in parts of that of the longest wave.
@@ -63,12 +66,17 @@ class HalfSpace:
         """
         return self.filtered(cells, pressure, self.compliance[pressure.dtype], at)
 
-    def pressure(self, cells: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Approximate pressures in E* on cells (k,), rising, that displace them so if nothing else is displaced.
+    def nearly_inverse(self, cells: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """What gives approximate pressures in E* on cells (k,), rising, that displace these so, and nothing else.
 
-        Their mean is arbitrary and only serves the conditioning.
+        For the conditioning only. On large grids with little contact it sums over cells nearby, for an inverse reaches
+        less far than the half-space does.
         """
-        return self.filtered(cells, displacement, self.stiffness, cells)
+        large = len(self.shape) == 2 and self.size * np.float32().itemsize >= _CACHE
+        tiles = Tiles.of(cells, self.grid) if large else None
+        if tiles is None:
+            return lambda displacement: self.filtered(cells, displacement, self.stiffness, cells)
+        return lambda displacement: tiles.sums(displacement, _stiffness_nearby())
 
     def filtered(
         self, cells: np.ndarray, values: np.ndarray, factor: np.ndarray, at: np.ndarray | None = None
@@ -90,6 +98,13 @@ class HalfSpace:
         field = np.zeros(self.shape, kind)
         field.ravel()[cells] = values
         return field
+
+
+@cache
+def _stiffness_nearby():
+    """Modes of the inverse of the kernel, q/2, as far as tiles let it reach."""
+    qx, qy = 2 * np.pi * scipy.fft.rfftfreq(TILE), 2 * np.pi * scipy.fft.fftfreq(TILE)
+    return modes_nearby(scipy.fft.irfft2(np.hypot(qy[:, None], qx) / 2, s=(TILE, TILE)))
 
 
 def in_both_precisions(field: np.ndarray) -> dict[np.dtype, np.ndarray]:

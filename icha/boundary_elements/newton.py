@@ -299,6 +299,7 @@ class Linearised:
         self.own = front.strengths(around[self.at_front]).astype(np.float32)
         self.fraction = fraction[self.at_front].astype(np.float32)
         self.soft = (1 + damping[self.at_front]).astype(np.float32)
+        self.inverse = space.nearly_inverse(cells)
         self.weights = neighbour_weights(cells[self.at_front], space.shape)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
@@ -345,6 +346,6 @@ class Linearised:
         return moved
 
     def _nearly_inverse(self, right):
-        result = self.space.pressure(self.cells, np.where(self.closed, right, np.float32(0)))
+        result = self.inverse(np.where(self.closed, right, np.float32(0)))
         result[self.at_front] = right[self.at_front] / np.float32(_NET * COMPLIANCE)
         return result
