@@ -18,12 +18,14 @@ from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
-from icha.boundary_elements.regions import among, merged, region
+from icha.boundary_elements.regions import among, merged
 from icha.contact.failures import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
 # Cells a side of windows, half of which may move. What is too wide for them is cut into pieces.
 _SIDES, _PIECE = (64, 128, 256), 64
+# Cells a side of the blocks of which what may move is made.
+_BLOCK = 4
 # Cells of windows that are solved together: few enough to stay in the cache, and to be done when they are at rest.
 _TOGETHER = 65_536
 # Deviation of sqrt(G/dgamma) in windows; all of the front comes to rest afterwards.
@@ -31,7 +33,7 @@ _TOLERANCE = 1e-3
 
 
 class _Way(NamedTuple):
-    """How far around a cell that is not at rest others move with it, if windows are no more than a part of the grid.
+    """So far, at least, around a cell that is not at rest others move, too, if windows are no more than a part of all.
 
     steps: of Newton's, at most, after which windows are as near to rest as they are.
     """
@@ -42,7 +44,7 @@ class _Way(NamedTuple):
 
 
 # Few places get more of both.
-_WAYS = (_Way(20, 0.05, 60), _Way(5, 0.5, 20))
+_WAYS = (_Way(20, 0.05, 60), _Way(4, 0.5, 20))
 
 
 def relaxed_in_windows(
@@ -58,7 +60,7 @@ def relaxed_in_windows(
     gap: of the contact as its pressures are, (n, n). None if there are no such windows, or no way to rest in them.
     """
     for way in _WAYS:
-        windows = _windows(region(restless, space.shape), way.around)
+        windows = _windows(restless, space.grid, way.around)
         if sum(cells.size for cells, _ in windows) <= way.part * space.size:
             break
     else:
@@ -112,35 +114,39 @@ def _at_rest(small, front, separation, contact, gap, near, windows, free, most_s
     return windows.ravel()[rest.cells], rest.fraction, rest.pressure
 
 
-def _windows(restless, around):
+def _windows(restless, grid, around):
     """Windows, some together: cells of the whole grid, (t, w, w), and which may move there, in one window each."""
-    grid = len(restless)
-    labels, _ = label(maximum_filter(restless.view(np.uint8), 2 * around + 1, mode="wrap"))
+    rough = np.zeros(2 * [-(-grid // _BLOCK)], np.uint8)
+    row, column = np.divmod(restless, grid)
+    rough[row // _BLOCK, column // _BLOCK] = 1
+    labels, _ = label(maximum_filter(rough, 2 * -(-around // _BLOCK) + 1, mode="wrap"))
     boxes = _cut(labels, find_objects(labels))
-    width = np.array([max(side.stop - side.start for side in box) for box in boxes], int)
+    width = _BLOCK * np.array([max(side.stop - side.start for side in box) for box in boxes], int)
     windows, narrower = [], 0
     for side in _SIDES:
         numbers = np.flatnonzero((narrower < width) & (width <= side // 2))
         narrower, way = side // 2, np.arange(side)
         for some in blocks(len(numbers), _TOGETHER // side**2):
-            cells = []
+            cells, free = [], []
             for number in numbers[some]:
-                rows, columns = ((one.start + one.stop - side) // 2 + way for one in boxes[number])
-                cells.append(np.add.outer(rows % grid * grid, columns % grid))
-            cells = np.stack(cells)
-            windows.append((cells, labels.ravel()[cells] == 1 + numbers[some][:, None, None]))
+                middle = ((one.start + one.stop) * _BLOCK // 2 for one in boxes[number])
+                rows, columns = ((at - side // 2 + way) % grid for at in middle)
+                cells.append(np.add.outer(rows * grid, columns))
+                free.append(labels[np.ix_(rows // _BLOCK, columns // _BLOCK)] == number + 1)
+            windows.append((np.stack(cells), np.stack(free)))
     return windows
 
 
 def _cut(labels, boxes):
-    """The boxes after those too wide for any window are cut into pieces, which get labels of their own."""
+    """The boxes, of blocks, after those too wide for any window are cut into pieces, which get labels of their own."""
+    widest, step = _SIDES[-1] // 2 // _BLOCK, _PIECE // _BLOCK
     pieces = []
     for number, box in enumerate(boxes, 1):
-        if max(side.stop - side.start for side in box) <= _SIDES[-1] // 2:
+        if max(side.stop - side.start for side in box) <= widest:
             continue
-        for row in range(box[0].start, box[0].stop, _PIECE):
-            for column in range(box[1].start, box[1].stop, _PIECE):
-                piece = slice(row, row + _PIECE), slice(column, column + _PIECE)
+        for row in range(box[0].start, box[0].stop, step):
+            for column in range(box[1].start, box[1].stop, step):
+                piece = slice(row, row + step), slice(column, column + step)
                 mine = labels[piece] == number
                 if mine.any():
                     pieces.append(piece)

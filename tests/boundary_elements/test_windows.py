@@ -15,14 +15,14 @@ from icha.references.short_range.rough_contacts import SOFT, rough
 GRID = 160
 
 
-@pytest.mark.parametrize("around", [5, 20])
+@pytest.mark.parametrize("around", [4, 20])
 def test_displacements_in_a_window_are_those_of_the_whole_surface(around):
     restless = np.zeros((320, 320), dtype=bool)
     restless[60:66, 1] = restless[3, 100] = True
     rng = np.random.default_rng(1)
     whole = HalfSpace.of(320)
     count = 0
-    for cells, free in module._windows(restless, around):
+    for cells, free in module._windows(np.flatnonzero(restless), 320, around):
         small = HalfSpace(cells.shape, *module._kernel(320, cells.shape[-1]))
         pressure = rng.normal(size=np.count_nonzero(free))
         own = np.flatnonzero(free)
@@ -37,15 +37,18 @@ def test_displacements_in_a_window_are_those_of_the_whole_surface(around):
     assert count >= 3
 
 
-def test_every_cell_near_a_restless_one_may_move_in_one_window_however_wide_the_restless_region_is():
-    restless = np.zeros((700, 700), dtype=bool)
+@pytest.mark.parametrize("grid", [700, 701])
+def test_every_cell_near_a_restless_one_may_move_in_one_window_however_wide_the_restless_region_is(grid):
+    restless = np.zeros((grid, grid), dtype=bool)
     restless[300, :] = restless[100:460, 240] = restless[650, 20] = True
     times = np.zeros(restless.size, int)
-    for cells, free in module._windows(restless, 5):
+    for cells, free in module._windows(np.flatnonzero(restless), grid, 4):
         assert cells.shape == free.shape and cells.shape[-1] in (64, 128)
         np.add.at(times, cells[free], 1)
-    near = maximum_filter(restless, 11, mode="wrap")
-    np.testing.assert_array_equal(times.reshape(700, 700), near)
+    assert times.max() == 1
+    # Across the edges less far, where the last block is smaller.
+    near, far = (maximum_filter(restless, 2 * most + 1, mode=mode) for most, mode in ((4, "constant"), (7, "wrap")))
+    assert times.reshape(grid, grid)[near].all() and not times.reshape(grid, grid)[~far].any()
 
 
 @pytest.mark.parametrize("shape", [(64, 64), (3, 64, 64)])
@@ -77,6 +80,6 @@ def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_mov
 
     mended = module.relaxed_in_windows(contact.space, contact.front, u, disturbed, disturbed.gap, restless)
     np.testing.assert_array_equal(mended.cells, state.cells)
-    far = np.all(np.minimum(apart, GRID - apart) > 12, axis=0)
+    far = np.all(np.minimum(apart, GRID - apart) > 26, axis=0)
     np.testing.assert_array_equal(mended.fraction[far], state.fraction[far])
     assert np.abs(mended.fraction - state.fraction).max() < 0.05 < np.abs(fraction - state.fraction).max()
