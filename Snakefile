@@ -55,6 +55,15 @@ onstart:
     origin.note_versions()
 
 
+# Of jobs that were killed while this call went on: the next one may have nothing to do.
+onsuccess:
+    here.remove_left_over()
+
+
+onerror:
+    here.remove_left_over()
+
+
 # On a cluster these are run where Snakemake runs, and not submitted: targets, and what is soon done.
 localrules:
     all,

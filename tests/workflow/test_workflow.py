@@ -244,6 +244,26 @@ def test_killed_runs_are_finished_with_the_same_bytes(smoke, tmp_path):
     assert not [file for file in (project / "results").rglob("*.part")]
 
 
+def test_what_a_killed_job_leaves_goes_with_the_call_that_goes_on_without_it(project):
+    left = project / "results/smoke/publish/.smoke-1.0.0.zip.0a1b2c3d.part"
+    left.parent.mkdir(exist_ok=True)
+    (project / "results/smoke/verdict.txt").unlink()
+    record = project / "results/smoke/checksums/verdict.txt.json"
+    before = record.stat().st_mtime_ns
+    command, environment = snakemake_command()
+    environment["PYTHONPATH"] = modules_of(project)
+    with subprocess.Popen(
+        command, cwd=project, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    ) as run:
+        # The job that makes it has begun, so the call has looked for what others left.
+        while record.stat().st_mtime_ns == before and run.poll() is None:
+            time.sleep(0.002)
+        left.write_bytes(b"a part")
+        said, _ = run.communicate()
+    assert run.returncode == 0, said
+    assert not left.exists()
+
+
 def test_two_calls_at_once_are_refused(project):
     (project / "results/smoke/verdict.txt").unlink()
     holds = "import campaign_lock, sys; print(campaign_lock.hold_lock('.snakemake/smoke.lock')); sys.stdin.read()"
