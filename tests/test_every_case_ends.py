@@ -43,6 +43,14 @@ FRONT_THAT_JUMPS_WITHIN_ITS_PATCH = Case(
     "boundary_elements",
 )
 
+# One of its steps in is two on the way back.
+LOOP_WITH_A_STEP_IN_TWO = Case(
+    Topography("spike", grid=16, size=0.0, seed=0, period=PERIOD, height=1e-5, boundary="periodic"),
+    (1e6, 0.0, 1e-9),
+    {"mean_separations": [2.1289e-05], "max_step": 0.5, "snapshots": [("area_fraction", 0.02)], "unload": True},
+    "boundary_elements",
+)
+
 
 def pytest_generate_tests(metafunc):
     """One test for each series."""
@@ -83,6 +91,7 @@ def test_every_case_ends(series, bounded):
     @given(cases())
     @example(WITHOUT_A_SPOT_TO_LET_GO)
     @example(FRONT_THAT_JUMPS_WITHIN_ITS_PATCH)
+    @example(LOOP_WITH_A_STEP_IN_TWO)
     def ends(case):
         bounded()
         completed.append(False)

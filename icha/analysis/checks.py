@@ -346,13 +346,16 @@ def _loop(run) -> Iterator[Finding]:
         yield (
             "loop closes",
             abs(loss) / scale,
-            IDENTITY_LIMIT + _error_of_work(run) / scale + UNBALANCED_WORK * _met_one_way(run),
+            IDENTITY_LIMIT + _error_of_work(run) / scale + 3 * UNBALANCED_WORK * _met_one_way(run),
             "hysteresis loss without adhesion or union by rule, where nothing is irreversible, over the largest work",
         )
 
 
 def _met_one_way(run):
-    """At how many separations a path was on a later leg and not on the first: there both integrals differ."""
+    """At how many separations a path was on a later leg and not on the first.
+
+    There one step of the first is two of the other, and each of the three knows its work only so well.
+    """
     first, later = (np.unique(run["mean_separation"][run["leg"] == 0]), run["mean_separation"][run["leg"] > 0])
     same = 10 * RESIDUAL_TOLERANCE * float(run["rms_height"])
     after = np.searchsorted(first, later)
