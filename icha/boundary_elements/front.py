@@ -27,6 +27,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.nearby import TILE, Tiles
 
 # Compliance of the last row of a straight contact, with the kernel 2/q, over h/E*. The front's own is larger by a
 # factor at which circular spots, wherever in their cells, follow JKR (docs/short_range.md).
@@ -55,6 +56,11 @@ def _neighbour_modes(grid: int, kind: np.dtype) -> np.ndarray:
 
 def neighbours(space: HalfSpace, cells: np.ndarray, fraction: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
     """w*f: mean fraction of contact around cells (m,), rising, or around all; of fractions on cells (k,), rising."""
+    near = space.nearly(at) if at is not None else None
+    if isinstance(near, Tiles):
+        everywhere = np.zeros(len(at), fraction.dtype)
+        everywhere[np.searchsorted(at, cells)] = fraction
+        return near.sums(everywhere, _neighbour_modes(TILE, fraction.dtype))
     return space.filtered(cells, fraction, _neighbour_modes(space.grid, fraction.dtype), at)
 
 

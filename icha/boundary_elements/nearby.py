@@ -1,16 +1,32 @@
-"""Sums over cells nearby, tile by tile where there is contact: short kernels need no transform of the whole."""
+"""The half-space for cells in contact, nearly: what is near by tiles where there is contact, what is far on a coarse grid.
+
+The kernel of the half-space is split as in `icha.half_space.ewald`: 2/q = (2/q) erf(q/2a) + (2/q) erfc(q/2a). The first
+part has a short reach, and is summed tile by tile. The second is smooth, and goes over a grid that is coarser by a
+factor, with splines there and back (R. W. Hockney & J. W. Eastwood, Computer Simulation Using Particles, 1988, ch. 8).
+The inverse has a short reach altogether. Tiles are few where there is little contact, and no transform is that of the
+whole grid.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.fft
+from scipy.interpolate import BSpline
+from scipy.special import erf, erfc
 
+from icha.boundary_elements.transforms import filtered
 from icha.support.parallel import blocks, on_cores
 
 # Cells a side of a tile, and around its own cells those that reach into it. So far, less than, does a kernel.
 TILE, REACH = 128, 16
+# The coarse grid's cells in those of the grid, and the order of its splines: as far as REACH, at most.
+COARSER, _ORDER = 4, 4
+_NODES = TILE // COARSER
+# What splits the kernel, per cell: at this, both what is cut off and what the coarse grid misses are small.
+_ALPHA = 2.3 / REACH
 # All tiles together, over the whole grid: more are no short way. So many are transformed at a time, in the cache.
 _PART, _TOGETHER = 0.5, 8
 
@@ -19,20 +35,28 @@ _PART, _TOGETHER = 0.5, 8
 class Tiles:
     """Cells of a periodic grid, (k,), rising, by the square tiles in which they or their neighbours lie.
 
-    count: of tiles. which: cells by their number in the list, (m,), for every tile into which they reach, and place:
-    where there, counted through all tiles. own: place of every cell in its own tile, (k,).
+    count: of tiles. reaching: cells that reach into the tiles. own: those that each tile has for itself. nodes: of the
+    coarse grid, counted through, that tiles cover, rising, (m,). covered: which of these every tile does, (count,
+    _NODES, _NODES).
     """
 
+    grid: int
     count: int
-    which: np.ndarray
-    place: np.ndarray
-    own: np.ndarray
+    reaching: _Placed
+    own: _Placed
+    nodes: np.ndarray
+    covered: np.ndarray
+
+    # Largest error of displacements, over the largest displacement.
+    error = 1e-3
 
     @classmethod
     def of(cls, cells: np.ndarray, grid: int) -> Tiles | None:
         """The tiles of cells, counted through a grid of so many a side; None if these are no short way."""
+        if grid % COARSER:
+            return None
         many = -(-grid // (TILE - 2 * REACH))
-        starts = np.arange(many) * grid // many
+        starts = COARSER * (np.arange(many) * (grid // COARSER) // many)
         position = np.divmod(cells, grid)
         down, across = (np.searchsorted(starts, along, "right") - 1 for along in position)
         tiles, own = np.unique(down * many + across, return_inverse=True)
@@ -47,33 +71,162 @@ class Tiles:
             return other, position[axis] - starts[other] - turns * grid + REACH
 
         rows, columns = ([along(axis, tile, way) for way in (-1, 0, 1)] for axis, tile in enumerate((down, across)))
-        which, place = [], []
+        which, into, place = [], [], []
         for below, row in rows:
             for right, column in columns:
-                into = number[below * many + right]
-                there = np.flatnonzero((into >= 0) & (row >= 0) & (row < TILE) & (column >= 0) & (column < TILE))
+                tile = number[below * many + right]
+                there = np.flatnonzero((tile >= 0) & (row >= 0) & (row < TILE) & (column >= 0) & (column < TILE))
                 which.append(there)
-                place.append((into[there] * TILE + row[there]) * TILE + column[there])
-        own = (own * TILE + rows[1][1]) * TILE + columns[1][1]
-        return cls(len(tiles), np.concatenate(which), np.concatenate(place), own)
+                into.append(tile[there])
+                place.append(row[there] * TILE + column[there])
+        reaching = _Placed.of(len(tiles), *map(np.concatenate, (which, into, place)))
+        placed = _Placed.of(len(tiles), np.arange(len(cells)), own, rows[1][1] * TILE + columns[1][1])
+        coarse = grid // COARSER
+        corner = (starts[along] - REACH for along in np.divmod(tiles, many))
+        row, column = ((first[:, None] // COARSER + np.arange(_NODES)) % coarse for first in corner)
+        nodes, covered = np.unique(row[:, :, None] * coarse + column[:, None, :], return_inverse=True)
+        return cls(grid, len(tiles), reaching, placed, nodes, covered.reshape(len(tiles), _NODES, _NODES))
 
     def sums(self, values: np.ndarray, modes: np.ndarray) -> np.ndarray:
-        """At every cell, (k,), the sum of the values (k,) of those around it, times a kernel given by its `modes`."""
-        field = np.zeros((self.count, TILE, TILE), values.dtype)
-        field.ravel()[self.place] = values[self.which]
+        """At every cell, (k,), the sum of the values (k,) of those around it, times a kernel given by its modes.
+
+        modes: of a tile, (TILE, TILE//2 + 1), in the precision of the values.
+        """
+        found = np.empty_like(values)
+        self._add_near(modes, values, found)
+        return found
+
+    def inverse(self, displacement: np.ndarray) -> np.ndarray:
+        """Pressures in E* that displace the cells about so, (k,), and nothing else: a preconditioner."""
+        return self.sums(displacement, _inverse_modes())
+
+    def displacement(self, pressure: np.ndarray) -> np.ndarray:
+        """What pressures in E* displace the cells, (k,), in cells, to an accuracy of `error`. Single precision."""
+        near, far = _displacement_modes(self.grid)
+        found, patches = np.empty_like(pressure), np.empty((self.count, _NODES, _NODES), np.float32)
+
+        def spread(some):
+            patches[some] = _spread(_spread(self.own.field(some, pressure)))
+
+        on_cores(spread, blocks(self.count, _TOGETHER))
+        shares = np.bincount(self.covered.ravel(), patches.ravel()).astype(np.float32)
+        smooth = filtered(self.grid // COARSER, self.nodes, shares, far, self.nodes)
+        self._add_near(near, pressure, found, smooth[self.covered])
+        return found
+
+    def _add_near(self, modes, values, found, patches=None):
+        """Sums over cells nearby, by the modes of a kernel, and what the coarse grid has in the tiles: to `found`."""
 
         def summed(some):
-            field[some] = scipy.fft.irfft2(
-                scipy.fft.rfft2(field[some], workers=1) * modes, s=(TILE, TILE), overwrite_x=True, workers=1
-            )
+            field = scipy.fft.rfft2(self.reaching.field(some, values), workers=1) * modes
+            field = scipy.fft.irfft2(field, s=(TILE, TILE), overwrite_x=True, workers=1)
+            if patches is not None:
+                field += _interpolated(_interpolated(patches[some]))
+            which, place = self.own.of_tiles(some)
+            found[which] = field.ravel()[place]
 
         on_cores(summed, blocks(self.count, _TOGETHER))
-        return field.ravel()[self.own]
 
 
-def modes_nearby(kernel: np.ndarray) -> np.ndarray:
-    """Modes, in single precision, of a kernel (TILE, TILE) that begins at [0, 0], is even, and is cut off smoothly."""
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """Cells of a list by tiles, one tile after the other: their numbers in the list, their places in the tile, (m,).
+
+    first: of every tile, (t + 1,).
+    """
+
+    which: np.ndarray
+    place: np.ndarray
+    first: np.ndarray
+
+    @classmethod
+    def of(cls, count, which, tile, place):
+        order = np.argsort(tile.astype(np.uint16 if count < 2**16 else int), kind="stable")
+        first = np.concatenate([[0], np.cumsum(np.bincount(tile, minlength=count))])
+        return cls(which[order], (tile * TILE**2 + place)[order], first)
+
+    def of_tiles(self, some):
+        """Cells of some tiles, by their numbers, and their places in these."""
+        mine = slice(self.first[some.start], self.first[some.stop])
+        return self.which[mine], self.place[mine] - some.start * TILE**2
+
+    def field(self, some, values):
+        """The values (k,) of cells in some tiles, (t, TILE, TILE)."""
+        field = np.zeros((some.stop - some.start, TILE, TILE), values.dtype)
+        which, place = self.of_tiles(some)
+        field.ravel()[place] = values[which]
+        return field
+
+
+# A spline of the coarse grid, at the nodes of the grid from the first that it covers.
+_HALF = _ORDER * COARSER // 2
+_SPLINE = BSpline.basis_element(np.arange(_ORDER + 1) - _ORDER / 2)(np.arange(-_HALF, _HALF) / COARSER)
+
+
+def _spread(field):
+    """What is on the nodes of the grid along the last axis, (..., TILE), as shares of coarse ones, along the first but one.
+
+    What is nearer to an edge than REACH is not wanted, and is none.
+    """
+    coarse = np.zeros((*field.shape[:-1], _NODES), np.float32)
+    for way, share in zip(range(-_HALF, _HALF), _SPLINE.astype(np.float32), strict=True):
+        turns, at = divmod(way, COARSER)
+        into, out = _overlap(turns)
+        coarse[..., into] += share * field[..., at::COARSER][..., out]
+    return np.swapaxes(coarse, -1, -2)
+
+
+def _interpolated(coarse):
+    """The splines of coarse nodes along the last axis, (..., _NODES), on the nodes of the grid; axes change places."""
+    field = np.zeros((*coarse.shape[:-1], TILE), np.float32)
+    for way, share in zip(range(-_HALF, _HALF), _SPLINE.astype(np.float32), strict=True):
+        turns, at = divmod(way, COARSER)
+        into, out = _overlap(turns)
+        field[..., at::COARSER][..., out] += share * coarse[..., into]
+    return np.swapaxes(field, -1, -2)
+
+
+def _overlap(turns):
+    """Of nodes and those so many farther, both within a tile."""
+    return slice(max(-turns, 0), _NODES - max(turns, 0)), slice(max(turns, 0), _NODES + min(turns, 0))
+
+
+@cache
+def _inverse_modes():
+    """Modes of the inverse of the kernel, q/2, cut off smoothly."""
     way = scipy.fft.fftfreq(TILE) * TILE
     distance = np.minimum(np.hypot(way[:, None], way) / REACH, 1.0)
     # H. Wendland, Adv. Comput. Math. 4 (1995) 389: with it what is positive definite remains so.
-    return scipy.fft.rfft2(kernel * (1 - distance) ** 4 * (1 + 4 * distance)).real.astype(np.float32)
+    smooth = (1 - distance) ** 4 * (1 + 4 * distance)
+    return scipy.fft.rfft2(scipy.fft.irfft2(_wave_numbers(TILE) / 2) * smooth).real.astype(np.float32)
+
+
+@cache
+def _displacement_modes(grid):
+    """Modes of the kernel's part nearby, of a tile, and of that far away, of the coarse grid with its splines."""
+    many = 8 * TILE
+    q = _wave_numbers(many)
+    q[0, 0] = 1.0
+    modes = 2 / q * erf(q / (2 * _ALPHA))
+    modes[0, 0] = at_zero = 2 / (np.sqrt(np.pi) * _ALPHA)
+    way = scipy.fft.fftfreq(TILE) * TILE
+    table = scipy.fft.irfft2(modes)[np.ix_(way.astype(int), way.astype(int))]
+    near = scipy.fft.rfft2(np.where(np.hypot(way[:, None], way) <= REACH, table, 0.0)).real.astype(np.float32)
+
+    coarse = grid // COARSER
+    q = _wave_numbers(coarse) / COARSER
+    q[0, 0] = 1.0
+    far = 2 / q * erfc(q / (2 * _ALPHA))
+    far[0, 0] = -at_zero
+    spline = np.zeros(grid)
+    spline[np.arange(-_HALF, _HALF)] = _SPLINE
+    # What splines make of a wave of the coarse grid, and of those that it cannot tell from it.
+    waves = (scipy.fft.fft(spline).real ** 2).reshape(COARSER, coarse)
+    nearest = np.rint(scipy.fft.fftfreq(coarse) * coarse).astype(int)
+    of_wave = (scipy.fft.fft(spline).real ** 2)[nearest] / waves.sum(axis=0) ** 2 * COARSER
+    return near, (far * np.outer(of_wave, of_wave[: coarse // 2 + 1])).astype(np.float32)
+
+
+def _wave_numbers(grid):
+    """Wave numbers q of a grid, (n, n//2 + 1), per cell."""
+    return 2 * np.pi * np.hypot(scipy.fft.fftfreq(grid)[:, None], scipy.fft.rfftfreq(grid))

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.boundary_elements.elasticity import NOTHING, Contact, Held, Topography, held, intensity
 from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_weights
-from icha.boundary_elements.kernel import HalfSpace
+from icha.boundary_elements.kernel import HalfSpace, Whole
 from icha.boundary_elements.regions import adjacent, merged, region
 from icha.contact.failures import NotConverged
 from icha.contact.models import BOUNDARY_ELEMENTS
@@ -34,6 +35,9 @@ _NEAR, _SAME_ENERGY = 1e-5, 1e-12
 _FINER = 0.03
 _MAX_STEPS = 400
 _MAX_KRYLOV = 60
+# How far the error of the half-space lies below an accuracy for which it does not count; what a round without it gains
+# at least, or there are no more.
+_FAR_BELOW, _LEAST_GAIN = 10, 0.5
 # Of the linear equations: never better than needed, and never worse.
 COARSE, FINE = 1e-1, STIFFNESS_TOLERANCE[BOUNDARY_ELEMENTS]
 # The rows of the front, in the preconditioner: what is left of a bond beside the half-space.
@@ -41,6 +45,8 @@ _NET = 0.6
 # A deviation of sqrt(G/dgamma) that is mended where it is. Least damping of bonds there: fronts run, and a whole step
 # would lead up.
 _RESTLESS, _RUNNING = 0.03, 0.2
+# The same where there are no more such cells than this part of the front.
+_UNEASY, _FEW = 1e-3, 0.01
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
 # Damping of the first step of a front of which more than this part is restless: without, it would lead far up.
 _FAR_DAMPING, _MANY = 0.2, 0.5
@@ -142,9 +148,9 @@ def front_at_rest(
             if state.off <= enough * given.critical_opening:
                 return state
             # The pressures are still those of a coarse beginning, and the error theirs.
-            search = replace(search, state=given.at(state, enough))
+            search = replace(search, state=given.at(state, enough, state))
             continue
-        restless = now.free & (np.abs(now.intensity - 1) > _RESTLESS)
+        restless = _restless(now)
         if number == 0 and np.count_nonzero(restless) > _MANY * np.count_nonzero(now.front):
             search = replace(search, damping=_FAR_DAMPING)
         if search.all_moved and restless.any():
@@ -155,6 +161,13 @@ def front_at_rest(
     if most_steps:
         return search.state
     raise NotConverged(f"the front did not come to rest (sqrt(G/dgamma) is off by {now.error:.1e})")
+
+
+def _restless(now):
+    """Which cells of the front are far from rest: farther than nearly all others, or than it is good for any."""
+    off = np.where(now.free, np.abs(now.intensity - 1), 0.0)
+    few = np.count_nonzero(off > _UNEASY) <= _FEW * np.count_nonzero(now.front)
+    return off > (_UNEASY if few else _RESTLESS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +189,7 @@ def _after_mending(given, search, contact, coarse):
     search = replace(search, all_moved=False)
     if contact is None:
         return search
-    new = given.at(contact, min(coarse, 0.1 * _GAP_TO_FRONT))
+    new = given.at(contact, min(coarse, 0.1 * _GAP_TO_FRONT), search.state)
     return replace(search, state=new, damping=0.0) if given.is_lower(new, search.state) else search
 
 
@@ -190,7 +203,7 @@ def _after_one_step(given, search, now, enough, coarse):
     if step is None:
         if state.off > enough * given.critical_opening:
             # Perhaps only since the pressures, and with them the intensities, are not good enough.
-            state = given.at(state, max(enough, _FINER * state.off / given.critical_opening))
+            state = given.at(state, max(enough, _FINER * state.off / given.critical_opening), state)
         return replace(search, state=state, damping=_more(damping))
     off = max(enough, min(search.most_off, now.error * min(_GAP_TO_FRONT, max(now.error, FINE))))
     smallest = _SMALLEST_STEP if search.most_off <= _NEAR else 1.0
@@ -202,7 +215,7 @@ def _after_one_step(given, search, now, enough, coarse):
         return _Search(state, coarse, damping)
     if search.most_off > _NEAR:
         # Energies of coarse pressures are not to be trusted that far.
-        search = replace(search, state=given.at(state, max(enough, _NEAR)), most_off=_NEAR)
+        search = replace(search, state=given.at(state, max(enough, _NEAR), state), most_off=_NEAR)
     return replace(search, damping=_more(4 * damping))
 
 
@@ -221,9 +234,13 @@ class _Given:
         """Of a bond: the gap at which a cell is free, in cells."""
         return COMPLIANCE * self.front.strength
 
-    def at(self, contact, off):
-        """A contact in elastic equilibrium; its displacement is accurate to this part of the critical opening."""
-        return held(self.space, self.topography, self.separation, contact, off * self.critical_opening, self.beyond)
+    def at(self, contact, off, since=None):
+        """A contact in elastic equilibrium; its displacement is accurate to this part of the critical opening.
+
+        since: another one that is not far away.
+        """
+        tolerance = off * self.critical_opening
+        return held(self.space, self.topography, self.separation, contact, tolerance, beyond=self.beyond, since=since)
 
     def energy(self, state):
         """Elastic energy less that of adhesion, in E* cells^3."""
@@ -243,7 +260,7 @@ def _lower_along(given, state, now, step, off, smallest):
     change, pressed = step
     part = 1.0
     while part >= smallest:
-        new = given.at(now.moved(part * change, part * pressed), off)
+        new = given.at(now.moved(part * change, part * pressed), off, state)
         if given.is_lower(new, state):
             return new, part
         part /= 2
@@ -272,7 +289,7 @@ def _step(space, front, now, damping, accuracy):
     # To the tension that the law wants at the present fraction, and from there with the law.
     strengths = front.strengths(now.around)
     missing = np.where(now.front, strengths * now.fraction + now.pressure, 0.0)
-    moved = space.displacement(now.cells, missing.astype(np.float32), now.cells)
+    moved = linear.near.displacement(missing.astype(np.float32))
     bond = np.where(now.front, COMPLIANCE * strengths * (1 - now.fraction), 0.0)
     change, pressure = linear.solve(moved + bond - now.gap, accuracy)
     return change, pressure - missing
@@ -299,7 +316,7 @@ class Linearised:
         self.own = front.strengths(around[self.at_front]).astype(np.float32)
         self.fraction = fraction[self.at_front].astype(np.float32)
         self.soft = (1 + damping[self.at_front]).astype(np.float32)
-        self.inverse = space.nearly_inverse(cells)
+        self.near = space.nearly(cells)
         self.weights = neighbour_weights(cells[self.at_front], space.shape)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
@@ -310,17 +327,20 @@ class Linearised:
         NotConverged
             If they are not finite.
         """
-        size = (len(self.cells), len(self.cells))
         # Of order one, or squares of what is left at last would be nothing in single precision on flat surfaces.
         scale = 2.0 ** np.frexp(np.abs(right).max(initial=0.0))[1]
-        solution, _ = gmres(
-            LinearOperator(size, self._displaced, dtype=np.float32),
-            (right / scale).astype(np.float32),
-            M=LinearOperator(size, self._nearly_inverse, dtype=np.float32),
-            rtol=accuracy,
-            restart=_MAX_KRYLOV,
-            maxiter=1,
-        )
+        right = (right / scale).astype(np.float32)
+        wanted = np.linalg.norm(right)
+        solution, left, off = np.zeros_like(right), right, wanted
+        while not off <= accuracy * wanted:
+            before = off
+            solution = solution + self._nearly_solved(left, max(accuracy * wanted / off, self.near.error))
+            if accuracy >= _FAR_BELOW * self.near.error:
+                break
+            left = right - self._displaced(Whole(self.space, self.cells), solution)
+            off = np.linalg.norm(left)
+            if not off <= _LEAST_GAIN * before:
+                break
         if not np.isfinite(solution).all():
             raise NotConverged(f"the linear equations of {len(self.cells)} cells have no finite solution")
         pressure, _, _ = self._spread(solution)
@@ -339,13 +359,25 @@ class Linearised:
         pressure[self.at_front] = -pull
         return pressure, stronger, pull
 
-    def _displaced(self, unknowns):
+    def _nearly_solved(self, right, accuracy):
+        size = (len(self.cells), len(self.cells))
+        solution, _ = gmres(
+            LinearOperator(size, partial(self._displaced, self.near), dtype=np.float32),
+            right,
+            M=LinearOperator(size, self._nearly_inverse, dtype=np.float32),
+            rtol=accuracy,
+            restart=_MAX_KRYLOV,
+            maxiter=1,
+        )
+        return solution
+
+    def _displaced(self, half_space, unknowns):
         pressure, stronger, pull = self._spread(unknowns)
-        moved = self.space.displacement(self.cells, pressure, self.cells)
+        moved = half_space.displacement(pressure)
         moved[self.at_front] += np.float32(COMPLIANCE) * (self.soft * pull - stronger)
         return moved
 
     def _nearly_inverse(self, right):
-        result = self.inverse(np.where(self.closed, right, np.float32(0)))
+        result = self.near.inverse(np.where(self.closed, right, np.float32(0)))
         result[self.at_front] = right[self.at_front] / np.float32(_NET * COMPLIANCE)
         return result

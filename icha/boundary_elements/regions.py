@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from scipy.ndimage import maximum_filter
+
+# Cells a side of the blocks that lie around others. So many to a cell of contact, and a list of these is quicker than a
+# field.
+_BLOCK, _MANY = 4, 200
 
 
 def region(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -15,17 +22,34 @@ def region(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 def widened(inside: np.ndarray) -> np.ndarray:
     """The cells of a region and those that share an edge with one of them."""
     wide = inside.copy()
-    for axis in (-2, -1):
-        for way in (-1, 1):
-            wide |= np.roll(inside, way, axis)
+    for one, other in ((slice(1, None), slice(-1)), (slice(1), slice(-1, None))):
+        wide[..., one, :] |= inside[..., other, :]
+        wide[..., other, :] |= inside[..., one, :]
+        wide[..., one] |= inside[..., other]
+        wide[..., other] |= inside[..., one]
     return wide
 
 
 def beside(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """The cells that share an edge with one of those given, and are none of them: rising, (m,)."""
+    if _MANY * len(cells) < math.prod(shape):
+        near = np.unique(adjacent(cells, shape[-1]))
+        return near[~among(near, cells)[0]]
     wide = widened(region(cells, shape))
     wide.ravel()[cells] = False
     return np.flatnonzero(wide)
+
+
+def around(cells: np.ndarray, grid: int) -> np.ndarray:
+    """The cells of a grid, (k,), and those up to five cells away or some more: rising, (m,)."""
+    many = -(-grid // _BLOCK)
+    rough = np.zeros((many, many), dtype=bool)
+    row, column = np.divmod(cells, grid)
+    rough[row // _BLOCK, column // _BLOCK] = True
+    row, column = np.nonzero(maximum_filter(rough, 5, mode="wrap"))
+    way = np.arange(_BLOCK)
+    rows, columns = _BLOCK * row[:, None, None] + way[:, None], _BLOCK * column[:, None, None] + way
+    return np.sort((rows * grid + columns)[(rows < grid) & (columns < grid)])
 
 
 def adjacent(cells: np.ndarray, grid: int) -> np.ndarray:

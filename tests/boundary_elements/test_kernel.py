@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from icha.boundary_elements import kernel
+from icha.boundary_elements import transforms
 from icha.boundary_elements.kernel import HalfSpace
 
 
@@ -18,9 +18,9 @@ def test_fields_by_blocks_are_those_of_the_whole_grid(grid, largest, kind, monke
     values = rng.normal(size=300).astype(kind)
     whole = [space.filtered(cells, values, space.compliance[np.dtype(kind)], where) for where in (None, at)]
     # Blocks of a few rows and columns, of which the last ones are smaller.
-    monkeypatch.setattr(kernel, "_CACHE", 2 * 5 * grid * values.itemsize)
-    monkeypatch.setattr(kernel, "_COLUMNS", 7)
-    monkeypatch.setattr(kernel, "_LARGE", largest)
+    monkeypatch.setattr(transforms, "CACHE", 2 * 5 * grid * values.itemsize)
+    monkeypatch.setattr(transforms, "_COLUMNS", 7)
+    monkeypatch.setattr(transforms, "_LARGE", largest)
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     by_blocks = [space.filtered(cells, values, space.compliance[np.dtype(kind)], where) for where in (None, at)]
     for one, other in zip(whole, by_blocks, strict=True):

@@ -1,12 +1,14 @@
-"""Sums over cells nearby, tile by tile, against sums one by one; and what they do to the equations of contact."""
+"""The half-space by tiles and a coarse grid, against sums one by one and the whole; and contacts that come of both."""
 
 import numpy as np
 import pytest
 
-from icha.boundary_elements import kernel, nearby
-from icha.boundary_elements.elasticity import solve_bonds
+from icha import Material, SelfAffineSpectrum
+from icha.boundary_elements import nearby
+from icha.boundary_elements.contact import BoundaryElements
 from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.nearby import REACH, TILE, Tiles, modes_nearby
+from icha.boundary_elements.nearby import REACH, TILE, Tiles
+from icha.contact.model import PRESSURE
 
 
 def patches(grid, rng, count):
@@ -17,39 +19,58 @@ def patches(grid, rng, count):
     return np.flatnonzero(inside)
 
 
-@pytest.mark.parametrize("grid", [700, 768, 1001])
+@pytest.mark.parametrize("grid", [700, 768, 1000])
 def test_sums_nearby_are_those_of_cells_one_by_one(grid):
     rng = np.random.default_rng(grid)
     way = np.fft.fftfreq(TILE) * TILE
-    whole = np.exp(-np.hypot(way[:, None], way) / 5)
+    kernel = np.exp(-np.hypot(way[:, None], way) / 5) * (np.hypot(way[:, None], way) < REACH)
     cells = patches(grid, rng, 6)
-    values = rng.normal(size=len(cells)).astype(np.float32)
+    values = rng.normal(size=len(cells))
     tiles = Tiles.of(cells, grid)
-    assert 1 < tiles.count and len(tiles.which) > len(cells)
-    found = tiles.sums(values, modes_nearby(whole))
+    assert 1 < tiles.count and len(tiles.reaching.which) > len(cells)
+    found = tiles.sums(values, np.fft.rfft2(kernel).real)
 
-    cut = np.fft.irfft2(modes_nearby(whole), s=(TILE, TILE))
-    assert np.abs(cut[REACH:-REACH]).max() < 1e-7
     row, column = np.divmod(cells, grid)
     for at in rng.choice(len(cells), 200, replace=False):
         down, right = ((along - along[at] + grid // 2) % grid - grid // 2 for along in (row, column))
         near = np.maximum(np.abs(down), np.abs(right)) < REACH
-        assert found[at] == pytest.approx(float(np.sum(cut[down[near], right[near]] * values[near])), abs=1e-5)
+        assert found[at] == pytest.approx(float(np.sum(kernel[down[near], right[near]] * values[near])), abs=1e-12)
+
+
+@pytest.mark.parametrize("grid", [800, 1004])
+@pytest.mark.parametrize("all_at_once", [False, True], ids=["at random", "all alike"])
+def test_displacements_are_those_of_the_whole_to_the_error_that_is_told(grid, all_at_once):
+    rng = np.random.default_rng(grid)
+    cells = patches(grid, rng, 6)
+    pressure = (np.ones(len(cells)) if all_at_once else rng.normal(size=len(cells))).astype(np.float32)
+    tiles, exact = Tiles.of(cells, grid), HalfSpace.of(grid).displacement(cells, pressure, cells)
+    assert np.abs(tiles.displacement(pressure) - exact).max() < tiles.error * np.abs(exact).max()
 
 
 def test_where_cells_are_everywhere_there_are_no_tiles():
     assert Tiles.of(np.arange(0, 700**2, 97), 700) is None
 
 
-def test_pressures_are_the_same_with_an_inverse_of_short_reach(monkeypatch):
-    grid, rng = 800, np.random.default_rng(3)
-    space, cells = HalfSpace.of(grid), patches(800, rng, 6)
-    wanted = rng.normal(size=len(cells))
+def test_a_grid_that_the_coarse_one_does_not_fit_has_no_tiles():
+    assert Tiles.of(np.arange(10), 1001) is None
+
+
+@pytest.mark.parametrize("adhesion", [0.0, 0.05])
+def test_contacts_are_the_same_with_tiles_and_without(adhesion, monkeypatch):
+    spectrum = SelfAffineSpectrum(100e-6, 20e-6, short_wavelength=2e-6, hurst=0.8, rms_slope=1.0)
+    surface, material = spectrum.realise(800, seed=5), Material(25e6, adhesion, 2e-9)
     results, used = [], []
     of = Tiles.of
-    monkeypatch.setattr(kernel.Tiles, "of", lambda *given: used.append(of(*given)) or used[-1])
+    monkeypatch.setattr(Tiles, "of", lambda *given: used.append(of(*given)) or used[-1])
     for part in (nearby._PART, 0.0):
         monkeypatch.setattr(nearby, "_PART", part)
-        results.append(solve_bonds(space, cells, np.full(len(cells), 0.5), wanted, np.zeros(len(cells)), 1e-9)[0])
-    assert used[0] is not None and used[1] is None
-    np.testing.assert_allclose(results[0], results[1], rtol=0, atol=1e-7)
+        contact = BoundaryElements.of(surface, material)
+        state = contact.untouched()
+        for closer in (0.1, 0.3, 0.45):
+            state = contact.equilibrium(state, contact.untouched().separation - closer * surface.rms_height)
+        results.append((contact.pressure(state), contact.area_fraction(state), contact.slope(PRESSURE, state)))
+        assert any(tiles is not None for tiles in used) == (part > 0)
+        used.clear()
+    assert results[0][1] > 0
+    np.testing.assert_allclose(results[0][:2], results[1][:2], rtol=1e-7)
+    assert results[0][2] == pytest.approx(results[1][2], rel=1e-3)
