@@ -58,12 +58,15 @@ class Tiles:
         many = -(-grid // (TILE - 2 * REACH))
         starts = COARSER * (np.arange(many) * (grid // COARSER) // many)
         position = np.divmod(cells, grid)
-        down, across = (np.searchsorted(starts, along, "right") - 1 for along in position)
-        tiles, own = np.unique(down * many + across, return_inverse=True)
+        tile_of = np.searchsorted(starts, np.arange(grid), "right") - 1
+        down, across = (tile_of[along] for along in position)
+        number = np.full(many**2, -1)
+        number[down * many + across] = 0
+        tiles = np.flatnonzero(number == 0)
         if len(tiles) * TILE**2 > _PART * grid**2:
             return None
-        number = np.full(many**2, -1)
         number[tiles] = np.arange(len(tiles))
+        own = number[down * many + across]
 
         def along(axis, tile, way):
             """Which tile lies so many farther, and where its window has the cells, if it has them."""
@@ -106,7 +109,7 @@ class Tiles:
         found, patches = np.empty_like(pressure), np.empty((self.count, _NODES, _NODES), np.float32)
 
         def spread(some):
-            patches[some] = _spread(_spread(self.own.field(some, pressure)))
+            patches[some] = _spread(self.own.field(some, pressure))
 
         on_cores(spread, blocks(self.count, _TOGETHER))
         shares = np.bincount(self.covered.ravel(), patches.ravel()).astype(np.float32)
@@ -121,7 +124,7 @@ class Tiles:
             field = scipy.fft.rfft2(self.reaching.field(some, values), workers=1) * modes
             field = scipy.fft.irfft2(field, s=(TILE, TILE), overwrite_x=True, workers=1)
             if patches is not None:
-                field += _interpolated(_interpolated(patches[some]))
+                field += _interpolated(patches[some])
             which, place = self.own.of_tiles(some)
             found[which] = field.ravel()[place]
 
@@ -158,37 +161,26 @@ class _Placed:
         return field
 
 
-# A spline of the coarse grid, at the nodes of the grid from the first that it covers.
+# A spline of the coarse grid, on the nodes of the grid around; and those of all coarse nodes of a tile, on its nodes.
 _HALF = _ORDER * COARSER // 2
 _SPLINE = BSpline.basis_element(np.arange(_ORDER + 1) - _ORDER / 2)(np.arange(-_HALF, _HALF) / COARSER)
+_SPLINES = np.zeros((TILE + 2 * _HALF, _NODES), np.float32)
+for _node in range(_NODES):
+    _SPLINES[COARSER * _node : COARSER * _node + 2 * _HALF, _node] = _SPLINE
+_SPLINES = _SPLINES[_HALF:-_HALF]
 
 
+# In products of matrices so small that no library shares them out among threads, which might change bytes.
 def _spread(field):
-    """What is on the nodes of the grid along the last axis, (..., TILE), as shares of coarse ones, along the first but one.
-
-    What is nearer to an edge than REACH is not wanted, and is none.
-    """
-    coarse = np.zeros((*field.shape[:-1], _NODES), np.float32)
-    for way, share in zip(range(-_HALF, _HALF), _SPLINE.astype(np.float32), strict=True):
-        turns, at = divmod(way, COARSER)
-        into, out = _overlap(turns)
-        coarse[..., into] += share * field[..., at::COARSER][..., out]
-    return np.swapaxes(coarse, -1, -2)
+    """What is on the nodes of tiles, (t, TILE, TILE), by shares of coarse ones, (t, _NODES, _NODES)."""
+    rows = (field.reshape(-1, _NODES, TILE) @ _SPLINES).reshape(-1, TILE, _NODES)
+    return _SPLINES.T @ rows
 
 
 def _interpolated(coarse):
-    """The splines of coarse nodes along the last axis, (..., _NODES), on the nodes of the grid; axes change places."""
-    field = np.zeros((*coarse.shape[:-1], TILE), np.float32)
-    for way, share in zip(range(-_HALF, _HALF), _SPLINE.astype(np.float32), strict=True):
-        turns, at = divmod(way, COARSER)
-        into, out = _overlap(turns)
-        field[..., at::COARSER][..., out] += share * coarse[..., into]
-    return np.swapaxes(field, -1, -2)
-
-
-def _overlap(turns):
-    """Of nodes and those so many farther, both within a tile."""
-    return slice(max(-turns, 0), _NODES - max(turns, 0)), slice(max(turns, 0), _NODES + min(turns, 0))
+    """The splines of coarse nodes, (t, _NODES, _NODES), on the nodes of tiles, (t, TILE, TILE)."""
+    rows = _SPLINES @ coarse
+    return (rows.reshape(-1, _NODES, _NODES) @ _SPLINES.T).reshape(-1, TILE, TILE)
 
 
 @cache
