@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.boundary_elements.elasticity import Contact, Held, Topography
+from icha.boundary_elements.elastic_equilibrium import Held
+from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import front_at_rest

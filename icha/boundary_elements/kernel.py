@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.fft
@@ -67,8 +68,8 @@ class HalfSpace:
         """
         return self.filtered(cells, pressure, self.compliance[pressure.dtype], at, out)
 
-    def nearly(self, cells: np.ndarray) -> Tiles | Whole:
-        """What pressures on cells (k,), rising, displace these, and back: for equations that are solved step by step."""
+    def nearly(self, cells: np.ndarray) -> Nearly:
+        """What pressures on cells (k,), rising, displace these, and back: for equations solved step by step."""
         large = len(self.shape) == 2 and self.size * np.float32().itemsize >= transforms.CACHE
         return (Tiles.of(cells, self.grid) if large else None) or Whole(self, cells)
 
@@ -99,23 +100,35 @@ class HalfSpace:
         return field
 
 
+class Nearly(Protocol):
+    """The half-space for some of its cells, (k,), in single precision.
+
+    error: of displacements, at most, over the largest displacement.
+    """
+
+    error: float
+
+    def displacement(self, pressure: np.ndarray) -> np.ndarray:
+        """What pressures in E* displace the cells, (k,), in cells."""
+
+    def inverse(self, displacement: np.ndarray) -> np.ndarray:
+        """Pressures in E* that displace the cells about so, (k,), and nothing else: a preconditioner."""
+
+
 @dataclass(frozen=True, eq=False)
 class Whole:
-    """The half-space for some of its cells, (k,), rising; in single precision, by transforms of all of it.
-
-    error: of displacements, over the largest displacement: none.
-    """
+    """The half-space for some of its cells, (k,), rising, by transforms of all of it: exact."""
 
     space: HalfSpace
     cells: np.ndarray
     error: float = 0.0
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
-        """What pressures in E* displace the cells, (k,), in cells."""
+        """As of `Nearly`."""
         return self.space.displacement(self.cells, pressure, self.cells)
 
     def inverse(self, displacement: np.ndarray) -> np.ndarray:
-        """Pressures in E* that displace the cells about so, (k,), and nothing else: a preconditioner."""
+        """As of `Nearly`."""
         return self.space.filtered(self.cells, displacement, self.space.stiffness, self.cells)
 
 

@@ -1,4 +1,4 @@
-"""The half-space for cells in contact, nearly: what is near by tiles where there is contact, what is far on a coarse grid.
+"""The half-space for cells in contact, nearly: by tiles what is near, on a coarse grid what is far.
 
 The kernel of the half-space is split as in `icha.half_space.ewald`: 2/q = (2/q) erf(q/2a) + (2/q) erfc(q/2a). The first
 part has a short reach, and is summed tile by tile. The second is smooth, and goes over a grid that is coarser by a

@@ -15,7 +15,8 @@ from functools import partial
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from icha.boundary_elements.elasticity import NOTHING, Contact, Held, Topography, held, intensity
+from icha.boundary_elements.elastic_equilibrium import Held, held, intensity
+from icha.boundary_elements.elasticity import NOTHING, Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_weights
 from icha.boundary_elements.kernel import HalfSpace, Whole
 from icha.boundary_elements.regions import adjacent, merged, region

@@ -40,7 +40,7 @@ def beside(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return np.flatnonzero(wide)
 
 
-def around(cells: np.ndarray, grid: int) -> np.ndarray:
+def surroundings(cells: np.ndarray, grid: int) -> np.ndarray:
     """The cells of a grid, (k,), and those up to five cells away or some more: rising, (m,)."""
     many = -(-grid // _BLOCK)
     rough = np.zeros((many, many), dtype=bool)

@@ -27,8 +27,8 @@ def filtered(
     """A field that has values (k,) on cells, rising, of a grid and is zero elsewhere, times factors (n, n//2 + 1).
 
 
-    In the precision of the values; given at cells (m,), rising, or everywhere, in the place of a field `out` if there is
-    one. Rows and columns are transformed while they are in the cache, and empty rows not at all.
+    In the precision of the values; given at cells (m,), rising, or everywhere, in the place of `out` if there is one.
+    Rows and columns are transformed while they are in the cache, and empty rows not at all.
     """
     each = on_cores if grid >= _LARGE else _one_by_one
     modes = _modes(grid, np.result_type(values.dtype, np.complex64))

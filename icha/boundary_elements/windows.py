@@ -18,7 +18,7 @@ from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
-from icha.boundary_elements.regions import among, around, merged
+from icha.boundary_elements.regions import among, merged, surroundings
 from icha.contact.failures import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
@@ -65,7 +65,7 @@ def relaxed_in_windows(
             break
     else:
         return None
-    near, places = np.zeros(space.size, np.float32), around(contact.cells, space.grid)
+    near, places = np.zeros(space.size, np.float32), surroundings(contact.cells, space.grid)
     near[places] = neighbours(space, contact.cells, contact.fraction.astype(np.float32), places)
     kernels = {side: _kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}
 

@@ -6,7 +6,8 @@ from scipy.ndimage import maximum_filter
 
 from icha.boundary_elements import windows as module
 from icha.boundary_elements.contact import BoundaryElements
-from icha.boundary_elements.elasticity import Contact, held
+from icha.boundary_elements.elastic_equilibrium import held
+from icha.boundary_elements.elasticity import Contact
 from icha.boundary_elements.front import COMPLIANCE, neighbour_weights, neighbours
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import moving
