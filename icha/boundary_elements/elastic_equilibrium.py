@@ -211,7 +211,7 @@ class _Nearby:
     def of(cls, whole, touching, since, gap):
         """The cells around a contact, given another with its gap everywhere or None; None if tiles are no short way."""
         space = whole.space
-        if not len(touching.cells) or not isinstance(space.nearly(touching.cells), Tiles):
+        if not space.is_large or not len(touching.cells):
             return None
         places = surroundings(np.union1d(touching.cells, since.cells), space.grid)
         tiles = space.nearly(places)

@@ -55,6 +55,11 @@ class HalfSpace:
         """Number of cells."""
         return math.prod(self.shape)
 
+    @property
+    def is_large(self) -> bool:
+        """Whether it is one grid that does not fit the cache."""
+        return len(self.shape) == 2 and self.size * np.float32().itemsize >= transforms.CACHE
+
     def displacement(
         self,
         cells: np.ndarray,
@@ -70,8 +75,7 @@ class HalfSpace:
 
     def nearly(self, cells: np.ndarray) -> Nearly:
         """What pressures on cells (k,), rising, displace these, and back: for equations solved step by step."""
-        large = len(self.shape) == 2 and self.size * np.float32().itemsize >= transforms.CACHE
-        return (Tiles.of(cells, self.grid) if large else None) or Whole(self, cells)
+        return (Tiles.of(cells, self.grid) if self.is_large else None) or Whole(self, cells)
 
     def filtered(
         self,
