@@ -22,7 +22,7 @@ LESS = {"separation_step: 0.3": "separation_step: 0.5", "[1.0e-2, 3.16e-2]\n    
 # How many random cases a test tries: as many as one waits for, unless --hypothesis-profile asks for thorough ones. They
 # are the same ones each time, so that no change fails by chance.
 settings.register_profile("fast", max_examples=40, deadline=None, derandomize=True, database=None)
-settings.register_profile("thorough", settings.get_profile("fast"), max_examples=1000)
+settings.register_profile("thorough", settings.get_profile("fast"), max_examples=400)
 settings.load_profile("fast")
 
 # Files with the longest tests of all, the longest first: begun last, they would keep one core waiting. With "worksteal"
