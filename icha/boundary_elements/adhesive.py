@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.boundary_elements.elastic_equilibrium import Held
+from icha.boundary_elements.elastic_equilibrium import Held, held
 from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front
 from icha.boundary_elements.kernel import HalfSpace
@@ -19,6 +19,8 @@ from icha.contact.failures import FullContact, NotConverged
 _NEARLY_AT_REST = 1e-3
 # The same where it is clear, and what is clear: by so much of the gap at which a cell lets go.
 _IN_SIGHT, _CLEARLY = 3e-2, 0.02
+# Accuracy of displacements, over that gap, at which this can be seen.
+_ROUGHLY = 1e-2
 # Rounds of new contacts: they end, but may be as many as there are cells.
 _MAX_ROUNDS = 1000
 # More of the surface than this in contact, and the rest follows.
@@ -75,15 +77,19 @@ def settled(
     NotConverged
         If an equilibrium is not found.
     """
-    margin = _CLEARLY * COMPLIANCE * front.strength
+    opening = COMPLIANCE * front.strength
+    margin = _CLEARLY * opening
     stages = [(_IN_SIGHT, margin), (_NEARLY_AT_REST, 0.0), (tolerance, 0.0)]
     if tolerance > _NEARLY_AT_REST:
         stages[1:] = [(tolerance, margin)]
     if near:
         del stages[:2]
 
+    def in_windows(contact, gap, restless):
+        return relaxed_in_windows(space, front, separation, contact, gap, restless)
+
     def mended(state, restless):
-        return relaxed_in_windows(space, front, separation, state, state.gap, restless)
+        return in_windows(state, state.gap, restless)
 
     tried = np.zeros(space.size, dtype=bool)
     stage = rounds = 0
@@ -92,21 +98,38 @@ def settled(
         contact = front_at_rest(space, front, topography, separation, contact, accuracy, near=near, mended=mended)
         if np.sum(contact.fraction) > _NEARLY_ALL * space.size:
             raise FullContact("the contact runs over the whole surface")
-        within, overlapping = _within_reach(summits, contact, beyond)
-        seeds = np.union1d(summits.cell[within], overlapping)
-        new = seeds[~tried[seeds]]
+        made, new, within = _new_contact(summits, contact, beyond, tried)
         if not len(new):
             stage += 1
             if stage == len(stages):
-                return contact, len(seeds)
+                return contact, within
             continue
-        stage, rounds = 0, rounds + 1
-        if rounds > _MAX_ROUNDS:
-            raise NotConverged(f"no equilibrium after {rounds - 1} rounds of new contacts")
-        made = np.union1d(summits.contacts(within & ~tried[summits.cell], space.grid), new)
-        tried[new] = True
-        closed = contact.with_closed(made)
-        contact = relaxed_in_windows(space, front, separation, closed, contact.gap, made) or closed
+        stage = 0
+        # What comes within reach of new contact, clearly, makes contact before the whole comes to rest.
+        while len(new):
+            rounds += 1
+            if rounds > _MAX_ROUNDS:
+                raise NotConverged(f"no equilibrium after {rounds - 1} rounds of new contacts")
+            tried[new] = True
+            closed = contact.with_closed(made)
+            relaxed = in_windows(closed, contact.gap, made)
+            if relaxed is None:
+                contact = closed
+                break
+            contact = held(space, topography, separation, relaxed, _ROUGHLY * opening, since=contact)
+            made, new, _ = _new_contact(summits, contact, margin, tried)
+
+
+def _new_contact(summits, state, margin, tried):
+    """Contact within reach by more than a margin (cells) that was not tried: its cells, and those that count as tried.
+
+    And how many are within reach, tried or not.
+    """
+    within, overlapping = _within_reach(summits, state, margin)
+    seeds = np.union1d(summits.cell[within], overlapping)
+    new = seeds[~tried[seeds]]
+    jumping = within & ~tried[summits.cell]
+    return np.union1d(summits.contacts(jumping, state.gap.shape[-1]), new), new, len(seeds)
 
 
 def _within_reach(summits, state, margin):
