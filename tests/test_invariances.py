@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.boundary_elements import kernel
+from icha.boundary_elements import transforms
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.path.limits import UNRESOLVED_LOSS
 
@@ -192,8 +192,8 @@ def test_threads_change_no_bit(model, data):
     found = set()
     with pytest.MonkeyPatch.context() as patch:
         # Boundary elements work on small grids by blocks and threads, as on large ones.
-        patch.setattr(kernel, "_CACHE", 1000)
-        patch.setattr(kernel, "_LARGE", 0)
+        patch.setattr(transforms, "CACHE", 1000)
+        patch.setattr(transforms, "_LARGE", 0)
         for threads in ("1", "3"):
             patch.setenv("OMP_NUM_THREADS", threads)
             again = Surface(surface.heights, PERIOD)
