@@ -84,9 +84,9 @@ validation hysteresis:
 test: tamaas
 	pytest -n $(CORES) --dist worksteal -m "not slow"
 
-# Tests of random cases are run again, with more of them.
+# Tests of random cases are run again, with more of them. One process more than there are cores, for many tests wait.
 test-all: test audit
-	pytest -n $(CORES) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough --series $(SERIES)
+	pytest -n $$(($(CORES) + 1)) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough --series $(SERIES)
 
 random-cases: SERIES = 1-20
 random-cases: environment

@@ -104,7 +104,7 @@ def test_units_drop_out(model, data, lengths, pressures):
 
 
 @pytest.mark.slow
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(contacts(ASPERITIES, ADHERING), st.floats(-4, 4), st.floats(-3, 3))
 def test_units_drop_out_of_a_loop(contact, lengths, pressures):
     surface, material = contact

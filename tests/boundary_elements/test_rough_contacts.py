@@ -74,7 +74,7 @@ def test_attraction_of_shorter_and_shorter_range_tends_to_the_limit():
 
 
 # Small grids are worked on by blocks and threads, as large ones are.
-BY_THREADS = "import runpy; from icha.boundary_elements import transforms; transforms.CACHE, transforms._LARGE = 1000, 0; "
+BY_THREADS = "import runpy; from icha.boundary_elements import transforms as t; t.CACHE, t._LARGE = 1000, 0; "
 BY_THREADS += "runpy.run_module('icha.references.short_range.rough_contacts', run_name='__main__')"
 
 
@@ -137,7 +137,7 @@ def test_an_area_of_few_cells_is_met_to_two_of_them():
     assert caught.value.dataset.step_target == [0.02]
 
 
-@pytest.mark.parametrize("slope", [1.0, 1e-6, 1e-9])
+@pytest.mark.parametrize("slope", [1.0, 1e-9])
 def test_no_load_is_as_little_on_flat_surfaces_as_on_steep_ones(slope):
     steep = rough(48, 6)
     factor = slope / steep.rms_slope
