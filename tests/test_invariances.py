@@ -193,7 +193,7 @@ def test_threads_change_no_bit(model, data):
     with pytest.MonkeyPatch.context() as patch:
         # Boundary elements work on small grids by blocks and threads, as on large ones.
         patch.setattr(transforms, "CACHE", 1000)
-        patch.setattr(transforms, "_LARGE", 0)
+        patch.setattr(transforms, "LARGE", 0)
         for threads in ("1", "3"):
             patch.setenv("OMP_NUM_THREADS", threads)
             again = Surface(surface.heights, PERIOD)

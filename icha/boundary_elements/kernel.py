@@ -57,8 +57,8 @@ class HalfSpace:
 
     @property
     def is_large(self) -> bool:
-        """Whether it is one grid that does not fit the cache."""
-        return len(self.shape) == 2 and self.size * np.float32().itemsize >= transforms.CACHE
+        """Whether it is one grid whose transforms take longer than finding out what is where."""
+        return len(self.shape) == 2 and self.grid >= transforms.LARGE
 
     def displacement(
         self,
@@ -75,7 +75,8 @@ class HalfSpace:
 
     def nearly(self, cells: np.ndarray) -> Nearly:
         """What pressures on cells (k,), rising, displace these, and back: for equations solved step by step."""
-        return (Tiles.of(cells, self.grid) if self.is_large else None) or Whole(self, cells)
+        beyond_cache = len(self.shape) == 2 and self.size * np.float32().itemsize >= transforms.CACHE
+        return (Tiles.of(cells, self.grid) if beyond_cache else None) or Whole(self, cells)
 
     def filtered(
         self,

@@ -28,7 +28,7 @@ _NODES = TILE // COARSER
 # What splits the kernel, per cell: at this, both what is cut off and what the coarse grid misses are small.
 _ALPHA = 2.3 / REACH
 # All tiles together, over the whole grid: more are no short way. So many are transformed at a time, in the cache.
-_PART, _TOGETHER = 1.0, 8
+_PART, _TOGETHER = 0.6, 8
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from icha.support.parallel import blocks, on_cores
 
 # Bytes of a field from which it pays to transform some rows or columns at a time, so many columns; nodes a side from
 # which several threads do.
-CACHE, _COLUMNS, _LARGE = 2_000_000, 32, 2048
+CACHE, _COLUMNS, LARGE = 2_000_000, 32, 2048
 # Modes of the last transform, by grid and precision: new memory can take longer than the transform.
 _kept = threading.local()
 
@@ -30,7 +30,7 @@ def filtered(
     In the precision of the values; given at cells (m,), rising, or everywhere, in the place of `out` if there is one.
     Rows and columns are transformed while they are in the cache, and empty rows not at all.
     """
-    each = on_cores if grid >= _LARGE else _one_by_one
+    each = on_cores if grid >= LARGE else _one_by_one
     modes = _modes(grid, np.result_type(values.dtype, np.complex64))
     found = np.empty((grid, grid) if at is None else len(at), values.dtype) if out is None else out
     rows = blocks(grid, max(CACHE // (2 * grid * values.itemsize), 1))

@@ -20,7 +20,7 @@ def test_fields_by_blocks_are_those_of_the_whole_grid(grid, largest, kind, monke
     # Blocks of a few rows and columns, of which the last ones are smaller.
     monkeypatch.setattr(transforms, "CACHE", 2 * 5 * grid * values.itemsize)
     monkeypatch.setattr(transforms, "_COLUMNS", 7)
-    monkeypatch.setattr(transforms, "_LARGE", largest)
+    monkeypatch.setattr(transforms, "LARGE", largest)
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     by_blocks = [space.filtered(cells, values, space.compliance[np.dtype(kind)], where) for where in (None, at)]
     for one, other in zip(whole, by_blocks, strict=True):

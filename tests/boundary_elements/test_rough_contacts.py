@@ -74,7 +74,7 @@ def test_attraction_of_shorter_and_shorter_range_tends_to_the_limit():
 
 
 # Small grids are worked on by blocks and threads, as large ones are.
-BY_THREADS = "import runpy; from icha.boundary_elements import transforms as t; t.CACHE, t._LARGE = 1000, 0; "
+BY_THREADS = "import runpy; from icha.boundary_elements import transforms as t; t.CACHE, t.LARGE = 1000, 0; "
 BY_THREADS += "runpy.run_module('icha.references.short_range.rough_contacts', run_name='__main__')"
 
 
