@@ -133,7 +133,8 @@ class _Touching(Contact):
 
     def corrected(self, near, gap, tolerance, gain):
         """The same with pressures that leave so much of the error, or the tolerance."""
-        left, error = self.left(gap), self.off(gap)
+        left = self.left(gap)
+        error = np.abs(left).max(initial=0.0)
         accuracy = max(near.error or gain, MARGIN * tolerance / error)
         change, _ = correction(near, self.bonds, left / error, accuracy)
         return replace(self, pressure=self.pressure + error * change)

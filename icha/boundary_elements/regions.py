@@ -7,9 +7,10 @@ import math
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-# Cells a side of the blocks that lie around others. So many to a cell of contact, and a list of these is quicker than a
-# field.
-_BLOCK, _MANY = 4, 200
+# Cells a side of the blocks of which what lies around others is made.
+BLOCK = 4
+# So many to a cell of contact, and a list of these is quicker than a field.
+_MANY = 200
 
 
 def region(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -40,15 +41,19 @@ def beside(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return np.flatnonzero(wide)
 
 
+def blocks_around(cells: np.ndarray, grid: int, reach: int) -> np.ndarray:
+    """Which blocks of a grid have cells that are no farther from one of those given, (m,), or some more: 0 or 1."""
+    rough = np.zeros(2 * [-(-grid // BLOCK)], np.uint8)
+    row, column = np.divmod(cells, grid)
+    rough[row // BLOCK, column // BLOCK] = 1
+    return maximum_filter(rough, 2 * -(-reach // BLOCK) + 1, mode="wrap")
+
+
 def surroundings(cells: np.ndarray, grid: int) -> np.ndarray:
     """The cells of a grid, (k,), and those up to five cells away or some more: rising, (m,)."""
-    many = -(-grid // _BLOCK)
-    rough = np.zeros((many, many), dtype=bool)
-    row, column = np.divmod(cells, grid)
-    rough[row // _BLOCK, column // _BLOCK] = True
-    row, column = np.nonzero(maximum_filter(rough, 5, mode="wrap"))
-    way = np.arange(_BLOCK)
-    rows, columns = _BLOCK * row[:, None, None] + way[:, None], _BLOCK * column[:, None, None] + way
+    row, column = np.nonzero(blocks_around(cells, grid, 5))
+    way = np.arange(BLOCK)
+    rows, columns = BLOCK * row[:, None, None] + way[:, None], BLOCK * column[:, None, None] + way
     return np.sort((rows * grid + columns)[(rows < grid) & (columns < grid)])
 
 

@@ -26,7 +26,6 @@ def filtered(
 ) -> np.ndarray:
     """A field that has values (k,) on cells, rising, of a grid and is zero elsewhere, times factors (n, n//2 + 1).
 
-
     In the precision of the values; given at cells (m,), rising, or everywhere, in the place of `out` if there is one.
     Rows and columns are transformed while they are in the cache, and empty rows not at all.
     """

@@ -12,20 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
-from scipy.ndimage import find_objects, label, maximum_filter
+from scipy.ndimage import find_objects, label
 
 from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
-from icha.boundary_elements.regions import among, merged, surroundings
+from icha.boundary_elements.regions import BLOCK, among, blocks_around, merged, surroundings
 from icha.contact.failures import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
 # Cells a side of windows, half of which may move. What is too wide for them is cut into pieces.
 _SIDES, _PIECE = (64, 128, 256), 64
-# Cells a side of the blocks of which what may move is made.
-_BLOCK = 4
 # Cells of windows that are solved together: few enough to stay in the cache, and to be done when they are at rest.
 _TOGETHER = 65_536
 # Deviation of sqrt(G/dgamma) in windows; all of the front comes to rest afterwards.
@@ -117,12 +115,9 @@ def _at_rest(small, front, separation, contact, gap, near, windows, free, most_s
 
 def _windows(restless, grid, around):
     """Windows, some together: cells of the whole grid, (t, w, w), and which may move there, in one window each."""
-    rough = np.zeros(2 * [-(-grid // _BLOCK)], np.uint8)
-    row, column = np.divmod(restless, grid)
-    rough[row // _BLOCK, column // _BLOCK] = 1
-    labels, _ = label(maximum_filter(rough, 2 * -(-around // _BLOCK) + 1, mode="wrap"))
+    labels, _ = label(blocks_around(restless, grid, around))
     boxes = _cut(labels, find_objects(labels))
-    width = _BLOCK * np.array([max(side.stop - side.start for side in box) for box in boxes], int)
+    width = BLOCK * np.array([max(side.stop - side.start for side in box) for box in boxes], int)
     windows, narrower = [], 0
     for side in _SIDES:
         numbers = np.flatnonzero((narrower < width) & (width <= side // 2))
@@ -130,17 +125,17 @@ def _windows(restless, grid, around):
         for some in blocks(len(numbers), _TOGETHER // side**2):
             cells, free = [], []
             for number in numbers[some]:
-                middle = ((one.start + one.stop) * _BLOCK // 2 for one in boxes[number])
+                middle = ((one.start + one.stop) * BLOCK // 2 for one in boxes[number])
                 rows, columns = ((at - side // 2 + way) % grid for at in middle)
                 cells.append(np.add.outer(rows * grid, columns))
-                free.append(labels[np.ix_(rows // _BLOCK, columns // _BLOCK)] == number + 1)
+                free.append(labels[np.ix_(rows // BLOCK, columns // BLOCK)] == number + 1)
             windows.append((np.stack(cells), np.stack(free)))
     return windows
 
 
 def _cut(labels, boxes):
     """The boxes, of blocks, after those too wide for any window are cut into pieces, which get labels of their own."""
-    widest, step = _SIDES[-1] // 2 // _BLOCK, _PIECE // _BLOCK
+    widest, step = _SIDES[-1] // 2 // BLOCK, _PIECE // BLOCK
     pieces = []
     for number, box in enumerate(boxes, 1):
         if max(side.stop - side.start for side in box) <= widest:
