@@ -33,7 +33,7 @@ help:
 	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
 	@echo "make docs    build the documentation as a site in docs/_build/html; broken links within it are errors"
 	@echo "make linkcheck  check the documentation's links to other sites"
-	@echo "make benchmarks  measure ICHA and boundary-element codes (about two hours; OPTIONS='--only icha'); docs/benchmarks.md"
+	@echo "make benchmarks  measure ICHA and boundary-element codes (about four hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
 	@echo "make short-range  hold boundary elements in the limit of short range against what is known (an hour); docs/short_range.md"
 	@echo "make faults  kill, damage and starve a small campaign (an hour or two, as root); docs/faults.md"

@@ -41,7 +41,7 @@ SWEEPS = (
     ("tamaas", 2, True, "gap"),
 )
 CODES = tuple(dict.fromkeys(code for code, *_ in SWEEPS))
-PARTS = ("sweep", "scaling", "stages", "campaigns", "start")
+PARTS = ("sweep", "scaling", "stages", "campaigns", "start", "truth")
 # Patches along a side of the surfaces of the scaling; a patch has some 470 spots at the end of the sweep.
 PATCHES = (1, 2, 3, 5, 8, 15)
 
@@ -231,6 +231,19 @@ def start(scratch: Path, limit: float) -> None:
         least("start-check", icha, "check", str(run))
 
 
+def truth(scratch: Path) -> None:
+    """The challenge's full surface by boundary elements: campaign cmc_truth, where it is not there already."""
+    cores = min(2, os.cpu_count())
+    print("truth ...", end=" ", flush=True)
+    icha = [str(Path(sys.executable).parent / "icha"), "run", "config/campaigns/cmc_truth.yaml", "--plain"]
+    subprocess.run([*icha, "--cores", str(cores)], cwd=HERE.parent, check=True, stdout=subprocess.DEVNULL)
+    answer = scratch / "truth.json"
+    subprocess.run([sys.executable, script("read_truth"), HERE.parent / "results/cmc_truth", answer], check=True)
+    found = {"cores": cores} | json.loads(answer.read_text())
+    keep("truth", found)
+    print(f"{found['wall'] / 60:.0f} min, {found['peak'] / 2**30:.1f} GiB", flush=True)
+
+
 def machine() -> dict:
     """What the numbers were taken on, without names."""
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
@@ -267,6 +280,8 @@ def main() -> None:
             campaigns(scratch, options.limit)
         if "icha" in options.only and "start" in options.parts:
             start(scratch, options.limit)
+        if "icha" in options.only and "truth" in options.parts:
+            truth(scratch)
 
 
 if __name__ == "__main__":

@@ -200,8 +200,10 @@ def patch_cost(rough: Roughness, sweep: Sweep, of: Constants = FITTED) -> Cost:
     if sweep.legs:
         here, states = of.patch_cycle, cyclic_steps(max(spots(rough, load) for load in sweep.loads), sweep, of)
         seconds += states * (here.step + here.cell * transforms) * (here.adhesion if sweep.adhesion else 1)
+    start, before = _before(rough.grid, of)
     disk = 80e3 + 160 * states + _MAPS * cells * (sweep.snapshots + bool(sweep.legs))
-    return Cost(seconds, of.workflow.forked + of.loading.memory + PATCH_ARRAYS * _DOUBLE * cells, disk)
+    memory = before + of.loading.memory + PATCH_ARRAYS * _DOUBLE * cells
+    return Cost(start + _shared_out(seconds, rough.grid, of), memory, disk)
 
 
 def cyclic_steps(most: float, sweep: Sweep, of: Constants = FITTED) -> float:

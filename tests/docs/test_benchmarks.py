@@ -194,3 +194,15 @@ def test_own_boundary_elements_are_no_other_code_and_have_targets_of_their_own(p
     slow = sweep("icha-boundary-elements", adhesion=True, processor=61.0)
     results["sweep-icha-boundary-elements-adhesion-load-1024-1"] = slow
     assert {verdict.target: verdict for verdict in page.verdicts(results)}[own].reached is False
+
+
+def test_the_full_surface_by_boundary_elements_has_a_target_and_a_table(page, results):
+    stop = {"mean_separation": 1e-6, "reduced_pressure": 0.02, "contact_area_fraction": 0.05, "spot_count": 99.0}
+    stop |= {"residual": 1e-12, "front_residual": 2e-9}
+    results["truth"] = {"wall": 5300.0, "peak": 2**32, "cores": 2, "failure": "", "stops": [stop] * 20}
+    found = verdict(page, results, "20 areas of the full challenge surface by ICHA's boundary elements")
+    assert found.reached and found.measured == "88 min, 4.0 GiB"
+    assert "| 1.00 µm | 0.02 | 5.000 % | 99 |" in page.page(results)
+    for worse in ({"wall": 5500.0}, {"peak": 11 * 2**30}, {"failure": "no equilibrium"}):
+        slow = results | {"truth": results["truth"] | worse}
+        assert verdict(page, slow, found.target).reached is False
