@@ -214,7 +214,7 @@ class _Nearby:
         space = whole.space
         if not space.is_large or not len(touching.cells):
             return None
-        places = surroundings(np.union1d(touching.cells, since.cells), space.grid)
+        places = surroundings(space.grid, touching.cells, since.cells)
         tiles = space.nearly(places)
         if not isinstance(tiles, Tiles):
             return None

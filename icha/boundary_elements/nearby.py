@@ -9,6 +9,7 @@ whole grid.
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from functools import cache
 
@@ -29,6 +30,7 @@ _NODES = TILE // COARSER
 _ALPHA = 2.3 / REACH
 # All tiles together, over the whole grid: more are no short way. So many are transformed at a time, in the cache.
 _PART, _TOGETHER = 0.6, 8
+_kept = threading.local()
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,39 +58,18 @@ class Tiles:
         if grid % COARSER:
             return None
         many = -(-grid // (TILE - 2 * REACH))
-        starts = COARSER * (np.arange(many) * (grid // COARSER) // many)
-        position = np.divmod(cells, grid)
+        starts = COARSER * (np.arange(many + 1) * (grid // COARSER) // many)
         tile_of = np.searchsorted(starts, np.arange(grid), "right") - 1
-        down, across = (tile_of[along] for along in position)
-        number = np.full(many**2, -1)
-        number[down * many + across] = 0
-        tiles = np.flatnonzero(number == 0)
-        if len(tiles) * TILE**2 > _PART * grid**2:
+        there = np.zeros((many, many), dtype=bool)
+        there[tuple(tile_of[along] for along in np.divmod(cells, grid))] = True
+        tiles = np.argwhere(there)
+        if not 0 < len(tiles) * TILE**2 <= _PART * grid**2:
             return None
-        number[tiles] = np.arange(len(tiles))
-        own = number[down * many + across]
-
-        def along(axis, tile, way):
-            """Which tile lies so many farther, and where its window has the cells, if it has them."""
-            turns, other = np.divmod(tile + way, many)
-            return other, position[axis] - starts[other] - turns * grid + REACH
-
-        rows, columns = ([along(axis, tile, way) for way in (-1, 0, 1)] for axis, tile in enumerate((down, across)))
-        which, into, place = [], [], []
-        for below, row in rows:
-            for right, column in columns:
-                tile = number[below * many + right]
-                there = np.flatnonzero((tile >= 0) & (row >= 0) & (row < TILE) & (column >= 0) & (column < TILE))
-                which.append(there)
-                into.append(tile[there])
-                place.append(row[there] * TILE + column[there])
-        reaching = _Placed.of(len(tiles), *map(np.concatenate, (which, into, place)))
-        placed = _Placed.of(len(tiles), np.arange(len(cells)), own, rows[1][1] * TILE + columns[1][1])
-        coarse = grid // COARSER
-        corner = (starts[along] - REACH for along in np.divmod(tiles, many))
-        row, column = ((first[:, None] // COARSER + np.arange(_NODES)) % coarse for first in corner)
+        corner, coarse = starts[tiles] - REACH, grid // COARSER
+        reaching, own = _placed(cells, grid, corner, starts[tiles + 1] - starts[tiles])
+        row, column = ((first[:, None] // COARSER + np.arange(_NODES)) % coarse for first in corner.T)
         nodes, covered = np.unique(row[:, :, None] * coarse + column[:, None, :], return_inverse=True)
-        return cls(grid, len(tiles), reaching, placed, nodes, covered.reshape(len(tiles), _NODES, _NODES))
+        return cls(grid, len(tiles), reaching, own, nodes, covered.reshape(len(tiles), _NODES, _NODES))
 
     def sums(self, values: np.ndarray, modes: np.ndarray) -> np.ndarray:
         """At every cell, (k,), the sum of the values (k,) of those around it, times a kernel given by its modes.
@@ -143,10 +124,10 @@ class _Placed:
     first: np.ndarray
 
     @classmethod
-    def of(cls, count, which, tile, place):
-        order = np.argsort(tile.astype(np.uint16 if count < 2**16 else int), kind="stable")
-        first = np.concatenate([[0], np.cumsum(np.bincount(tile, minlength=count))])
-        return cls(which[order], (tile * TILE**2 + place)[order], first)
+    def of(cls, count, parts):
+        """Of parts, tile after tile: numbers of cells, and their places in the tiles."""
+        which, place = map(np.concatenate, zip(*parts, strict=True))
+        return cls(which, place, np.searchsorted(place, TILE**2 * np.arange(count + 1)))
 
     def of_tiles(self, some):
         """Cells of some tiles, by their numbers, and their places in these."""
@@ -159,6 +140,52 @@ class _Placed:
         which, place = self.of_tiles(some)
         field.ravel()[place] = values[which]
         return field
+
+
+def _placed(cells, grid, corner, size):
+    """Which cells, (k,), lie in the windows of tiles with these corners, (t, 2), and which are the tiles' own.
+
+    size: how many rows and columns a tile has of its own, (t, 2).
+    """
+    number = _kept_zeros(grid)
+    number.ravel()[cells] = np.arange(1, len(cells) + 1)
+
+    def found(some):
+        windows = np.stack([_window(number, *at) for at in corner[some].tolist()])
+        own = np.zeros_like(windows)
+        for whole, part, (rows, columns) in zip(windows, own, size[some].tolist(), strict=True):
+            inner = slice(REACH, REACH + rows), slice(REACH, REACH + columns)
+            part[inner] = whole[inner]
+        return _numbered(windows, some.start), _numbered(own, some.start)
+
+    try:
+        reaching, own = zip(*on_cores(found, blocks(len(corner), _TOGETHER)), strict=True)
+    finally:
+        number.ravel()[cells] = 0
+    return _Placed.of(len(corner), reaching), _Placed.of(len(corner), own)
+
+
+def _window(field, row, column):
+    """The window of a tile with its corner there, (TILE, TILE), of a periodic field."""
+    grid, way = len(field), np.arange(TILE)
+    if min(row, column) >= 0 and max(row, column) <= grid - TILE:
+        return field[row : row + TILE, column : column + TILE]
+    return field[np.ix_((row + way) % grid, (column + way) % grid)]
+
+
+def _numbered(windows, first):
+    """The cells that have numbers, from 1 on, in tiles (t, TILE, TILE) from the `first` on, and their places there."""
+    place = np.flatnonzero(windows)
+    return windows.ravel()[place].astype(int) - 1, first * TILE**2 + place
+
+
+def _kept_zeros(grid):
+    """A field of zeros, (n, n), to be left so: new memory takes longer than what is done in it."""
+    if not hasattr(_kept, "zeros"):
+        _kept.zeros = {}
+    if grid not in _kept.zeros:
+        _kept.zeros[grid] = np.zeros((grid, grid), np.int32)
+    return _kept.zeros[grid]
 
 
 # A spline of the coarse grid, on the nodes of the grid around; and those of all coarse nodes of a tile, on its nodes.

@@ -41,17 +41,18 @@ def beside(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return np.flatnonzero(wide)
 
 
-def blocks_around(cells: np.ndarray, grid: int, reach: int) -> np.ndarray:
+def blocks_around(grid: int, reach: int, *given: np.ndarray) -> np.ndarray:
     """Which blocks of a grid have cells that are no farther from one of those given, (m,), or some more: 0 or 1."""
     rough = np.zeros(2 * [-(-grid // BLOCK)], np.uint8)
-    row, column = np.divmod(cells, grid)
-    rough[row // BLOCK, column // BLOCK] = 1
+    for cells in given:
+        row, column = np.divmod(cells, grid)
+        rough[row // BLOCK, column // BLOCK] = 1
     return maximum_filter(rough, 2 * -(-reach // BLOCK) + 1, mode="wrap")
 
 
-def surroundings(cells: np.ndarray, grid: int) -> np.ndarray:
-    """The cells of a grid, (k,), and those up to five cells away or some more: rising, (m,)."""
-    row, column = np.nonzero(blocks_around(cells, grid, 5))
+def surroundings(grid: int, *given: np.ndarray) -> np.ndarray:
+    """Cells of a grid, in some lists (k,), and those up to five cells away or some more: rising, (m,)."""
+    row, column = np.nonzero(blocks_around(grid, 5, *given))
     way = np.arange(BLOCK)
     rows, columns = BLOCK * row[:, None, None] + way[:, None], BLOCK * column[:, None, None] + way
     return np.sort((rows * grid + columns)[(rows < grid) & (columns < grid)])

@@ -63,7 +63,7 @@ def relaxed_in_windows(
             break
     else:
         return None
-    near, places = np.zeros(space.size, np.float32), surroundings(contact.cells, space.grid)
+    near, places = np.zeros(space.size, np.float32), surroundings(space.grid, contact.cells)
     near[places] = neighbours(space, contact.cells, contact.fraction.astype(np.float32), places)
     kernels = {side: _kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}
 
@@ -115,7 +115,7 @@ def _at_rest(small, front, separation, contact, gap, near, windows, free, most_s
 
 def _windows(restless, grid, around):
     """Windows, some together: cells of the whole grid, (t, w, w), and which may move there, in one window each."""
-    labels, _ = label(blocks_around(restless, grid, around))
+    labels, _ = label(blocks_around(grid, around, restless))
     boxes = _cut(labels, find_objects(labels))
     width = BLOCK * np.array([max(side.stop - side.start for side in box) for box in boxes], int)
     windows, narrower = [], 0
