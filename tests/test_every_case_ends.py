@@ -51,6 +51,28 @@ LOOP_WITH_A_STEP_IN_TWO = Case(
     "boundary_elements",
 )
 
+# Contact is strongly unstable: of three asperities that may jump in, one stays. The others try again and again.
+ONE_THAT_STAYS_OF_THREE = Case(
+    Topography("pit", grid=9, size=0.45, seed=9, period=PERIOD, height=1e-6, boundary="periodic"),
+    (1e6, 0.38176765449959826, 1e-6),
+    {"mean_separations": [4e-6, 2.2873e-6], "max_step": 0.5, "snapshots": [], "unload": True},
+    "asperities",
+)
+
+# Jumps in are uphill, as far as those off are downhill, and each is known as well as where it happens in its step.
+UPHILL_AND_DOWNHILL = Case(
+    Topography("noise", grid=16, size=0.0, seed=43, period=0.1, height=1e-3, boundary="periodic"),
+    (1e6, 13.869572896740937, 0.00031622776601683794),
+    {
+        "area_fractions": [0.00019186687406702892, 0.00038018939632056124, 0.0010280162981264745],
+        "max_step": 0.05,
+        "snapshots": [("reduced_pressure", 0.003)],
+        "unload": True,
+        "turning_points": [("area_fraction", 0.001), ("area_fraction", 0.0010280162981264745)],
+    },
+    "asperities",
+)
+
 
 def pytest_generate_tests(metafunc):
     """One test for each series."""
@@ -92,6 +114,8 @@ def test_every_case_ends(series, bounded):
     @example(WITHOUT_A_SPOT_TO_LET_GO)
     @example(FRONT_THAT_JUMPS_WITHIN_ITS_PATCH)
     @example(LOOP_WITH_A_STEP_IN_TWO)
+    @example(ONE_THAT_STAYS_OF_THREE)
+    @example(UPHILL_AND_DOWNHILL)
     def ends(case):
         bounded()
         completed.append(False)

@@ -17,11 +17,17 @@ _SAME_STRENGTH = 1e-3
 
 
 def jump_off(search: Search, point: Point, margin: float) -> Search:
-    """All spots past jump-off by more than the margin (m) let go; without adhesion united ones out of contact."""
+    """All spots past jump-off by more than the margin (m) let go; without adhesion united ones out of contact.
+
+    Those that have come in this search go before the others, which may well stay without them.
+    """
     sites = search.sites
     off = sites.status == CONTACT
     if search.problem.adhesive:
+        newly_made = off & ~sites.known
         off &= point.approach < sites.jump_off - margin
+        if np.any(newly_made & (point.approach < sites.jump_off)):
+            off &= newly_made
     else:  # a single asperity out of contact is harmless
         off &= (point.approach <= 0) & (sites.asperity < 0) & (margin == 0)
     return _broken(search, off) if off.any() else search
