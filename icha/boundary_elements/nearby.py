@@ -9,7 +9,6 @@ whole grid.
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
 from functools import cache
 
@@ -18,7 +17,7 @@ import scipy.fft
 from scipy.interpolate import BSpline
 from scipy.special import erf, erfc
 
-from icha.boundary_elements.transforms import filtered
+from icha.boundary_elements.transforms import filtered, kept
 from icha.support.parallel import blocks, on_cores
 
 # Cells a side of a tile, and around its own cells those that reach into it. So far, less than, does a kernel.
@@ -30,12 +29,11 @@ _NODES = TILE // COARSER
 _ALPHA = 2.3 / REACH
 # All tiles together, over the whole grid: more are no short way. So many are transformed at a time, in the cache.
 _PART, _TOGETHER = 0.6, 8
-_kept = threading.local()
 
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """Cells of a periodic grid, (k,), rising, by the square tiles in which they or their neighbours lie.
+    """Cells of a periodic grid, (k,), rising, by the square tiles in which they lie.
 
     count: of tiles. reaching: cells that reach into the tiles. own: those that each tile has for itself. nodes: of the
     coarse grid, counted through, that tiles cover, rising, (m,). covered: which of these every tile does, (count,
@@ -147,7 +145,7 @@ def _placed(cells, grid, corner, size):
 
     size: how many rows and columns a tile has of its own, (t, 2).
     """
-    number = _kept_zeros(grid)
+    number = kept((grid, grid), np.dtype(np.int32))  # zeros, and to be left so
     number.ravel()[cells] = np.arange(1, len(cells) + 1)
 
     def found(some):
@@ -177,15 +175,6 @@ def _numbered(windows, first):
     """The cells that have numbers, from 1 on, in tiles (t, TILE, TILE) from the `first` on, and their places there."""
     place = np.flatnonzero(windows)
     return windows.ravel()[place].astype(int) - 1, first * TILE**2 + place
-
-
-def _kept_zeros(grid):
-    """A field of zeros, (n, n), to be left so: new memory takes longer than what is done in it."""
-    if not hasattr(_kept, "zeros"):
-        _kept.zeros = {}
-    if grid not in _kept.zeros:
-        _kept.zeros[grid] = np.zeros((grid, grid), np.int32)
-    return _kept.zeros[grid]
 
 
 # A spline of the coarse grid, on the nodes of the grid around; and those of all coarse nodes of a tile, on its nodes.

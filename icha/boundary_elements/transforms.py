@@ -12,8 +12,6 @@ from icha.support.parallel import blocks, on_cores
 # Bytes of a field from which it pays to transform some rows or columns at a time, so many columns; nodes a side from
 # which several threads do.
 CACHE, _COLUMNS, LARGE = 2_000_000, 32, 2048
-# Modes of the last transform, by grid and precision: new memory can take longer than the transform.
-_kept = threading.local()
 
 
 def filtered(
@@ -30,7 +28,7 @@ def filtered(
     Rows and columns are transformed while they are in the cache, and empty rows not at all.
     """
     each = on_cores if grid >= LARGE else _one_by_one
-    modes = _modes(grid, np.result_type(values.dtype, np.complex64))
+    modes = kept((grid, grid // 2 + 1), np.result_type(values.dtype, np.complex64))
     found = np.empty((grid, grid) if at is None else len(at), values.dtype) if out is None else out
     rows = blocks(grid, max(CACHE // (2 * grid * values.itemsize), 1))
     starts = grid * np.array([some.start for some in rows] + [grid])
@@ -64,12 +62,22 @@ def filtered(
     return found
 
 
-def _modes(grid, kind):
-    if not hasattr(_kept, "modes"):
-        _kept.modes = {}
-    if (grid, kind) not in _kept.modes:
-        _kept.modes[grid, kind] = np.empty((grid, grid // 2 + 1), kind)
-    return _kept.modes[grid, kind]
+def kept(shape: tuple[int, int], kind: np.dtype) -> np.ndarray:
+    """A field that a thread keeps, zeros at first: new memory can take longer than what is done in it."""
+    if (shape, kind) not in _kept.fields:
+        _kept.fields[shape, kind] = np.zeros(shape, kind)
+    return _kept.fields[shape, kind]
+
+
+class _Kept(threading.local):
+    """Fields by shape and kind, of every thread its own."""
+
+    def __init__(self):
+        """None yet, in a thread."""
+        self.fields = {}
+
+
+_kept = _Kept()
 
 
 def _one_by_one(function, items):
