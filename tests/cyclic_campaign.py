@@ -68,7 +68,8 @@ def unloaded(run, between=0):
     ended = np.arange(len(at)) == len(at) - 1
     columns["work"] = work
     columns["dissipated_by_jump_off"] = np.where(ended, loss, 0.0)
-    columns["dissipated_by_jump_in"] = columns["dissipated_by_coalescence"] = np.zeros(len(at))
+    for name in ("jump_in", "coalescence", "load_jump"):
+        columns[f"dissipated_by_{name}"] = np.zeros(len(at))
     columns["stored_energy"] = work - columns["dissipated_by_jump_off"]
 
     kinds = np.repeat(np.array([0, 1], np.int8), [spots[-1], spots[-1]])
