@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.boundary_elements.kernel import HalfSpace, Nearly, Whole
+from icha.boundary_elements.regions import among, merged
 from icha.contact.failures import NotConverged
 from icha.support.parallel import blocks, on_cores
 
-# Compliance of a lone cell, h/E*, for the conditioning of bonds.
-_CELL = 1.12
+# Compliance, h/E*, from which on that of a bond counts in the preconditioner: with it conjugate gradients are quickest.
+_CELL = 2.5
 _MAX_ITERATIONS = 300
 # Displacements in single precision are off by so much of the largest.
 ROUNDING = 5e-7
@@ -36,13 +37,11 @@ class Contact:
     pressure: np.ndarray
 
     def with_closed(self, cells: np.ndarray) -> Contact:
-        """The same with these cells, (m,), wholly in contact."""
-        together = np.union1d(self.cells, cells)
-        fraction, pressure = np.zeros(len(together)), np.zeros(len(together))
-        old = np.searchsorted(together, self.cells)
-        fraction[old], pressure[old] = self.fraction, self.pressure
-        fraction[np.searchsorted(together, cells)] = 1.0
-        return Contact(together, fraction, pressure)
+        """The same with these cells, (m,), rising, wholly in contact."""
+        there, at = among(cells, self.cells)
+        fraction = self.fraction.copy()
+        fraction[at] = 1.0
+        return Contact(*merged(self.cells, cells[~there], (fraction, 1.0), (self.pressure, 0.0)))
 
     def changed(self, fraction: np.ndarray, pressure: np.ndarray) -> Contact:
         """The same after changes of fraction and pressure, (k,), without cells that are next to out of contact."""
