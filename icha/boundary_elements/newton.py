@@ -39,15 +39,19 @@ _MAX_KRYLOV = 60
 # How far the error of the half-space lies below an accuracy for which it does not count; what a round without it gains
 # at least, or there are no more.
 _FAR_BELOW, _LEAST_GAIN = 10, 0.5
-# Of the linear equations: never better than needed, and never worse.
+# Accuracy of the linear equations: in the last step so many times that of the displacement at rest, over the error of
+# the front; at worst, and at best.
+_LAST = 5
 COARSE, FINE = 1e-1, STIFFNESS_TOLERANCE[BOUNDARY_ELEMENTS]
 # The rows of the front, in the preconditioner: what is left of a bond beside the half-space.
 _NET = 0.6
 # A deviation of sqrt(G/dgamma) that is mended where it is. Least damping of bonds there: fronts run, and a whole step
 # would lead up.
 _RESTLESS, _RUNNING = 0.03, 0.2
-# The same where there are no more such cells than this part of the front.
-_UNEASY, _FEW = 1e-3, 0.01
+# The same where there are no more such cells than this part of the front: of the largest deviation, within bounds.
+_UNEASY, _LEAST_UNEASY, _MOST_UNEASY, _FEW = 0.1, 1e-4, 1e-3, 0.01
+# To what part of that they are mended.
+_MENDED = 0.1
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
 # Damping of the first step of a front of which more than this part is restless: without, it would lead far up.
 _FAR_DAMPING, _MANY = 0.2, 0.5
@@ -123,14 +127,14 @@ def front_at_rest(
     near: bool = False,
     most_steps: int | None = None,
     beyond: np.ndarray | None = None,
-    mended: Callable[[Held, np.ndarray], Contact | None] = lambda state, restless: None,
+    mended: Callable[[Held, np.ndarray, float], Contact | None] = lambda state, restless, tolerance: None,
 ) -> Held:
     """The contact in equilibrium at a separation (cells), down in energy from that of a given one.
 
     contact: if it is `Held`, at this separation. tolerance: of sqrt(G/dgamma) along the front. near: whether it is not
     far from rest. most_steps: after which it is returned as it is. beyond: of a window, what the contact outside
     adds to the mean fraction around every cell, a field. mended: where cells, (m,), of a contact are far from rest, the
-    contact with these nearer to it, if a short way leads there.
+    contact with these nearer to it, within a tolerance, if a short way leads there.
 
     Raises
     ------
@@ -151,11 +155,11 @@ def front_at_rest(
             # The pressures are still those of a coarse beginning, and the error theirs.
             search = replace(search, state=given.at(state, enough, state))
             continue
-        restless = _restless(now)
+        restless, uneasy = _restless(now)
         if number == 0 and np.count_nonzero(restless) > _MANY * np.count_nonzero(now.front):
             search = replace(search, damping=_FAR_DAMPING)
         if search.all_moved and restless.any():
-            search = _after_mending(given, search, mended(state, now.cells[restless]), coarse)
+            search = _after_mending(given, search, mended(state, now.cells[restless], _MENDED * uneasy), coarse)
             if search.state is not state:
                 continue
         search = _after_one_step(given, search, now, enough, coarse)
@@ -165,10 +169,14 @@ def front_at_rest(
 
 
 def _restless(now):
-    """Which cells of the front are far from rest: farther than nearly all others, or than it is good for any."""
+    """Which cells of the front are far from rest: farther than nearly all others, or than it is good for any.
+
+    And how far the former are, at least.
+    """
     off = np.where(now.free, np.abs(now.intensity - 1), 0.0)
-    few = np.count_nonzero(off > _UNEASY) <= _FEW * np.count_nonzero(now.front)
-    return off > (_UNEASY if few else _RESTLESS)
+    uneasy = min(max(_UNEASY * now.error, _LEAST_UNEASY), _MOST_UNEASY)
+    few = np.count_nonzero(off > uneasy) <= _FEW * np.count_nonzero(now.front)
+    return off > (uneasy if few else _RESTLESS), uneasy
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +208,8 @@ def _after_one_step(given, search, now, enough, coarse):
     enough, coarse: accuracy of the displacement at rest and far from it, over the gap at which a cell is free.
     """
     state, damping = search.state, search.damping
-    step = _down(given.space, given.front, now, damping, min(COARSE, max(FINE, now.error)))
+    accuracy = min(COARSE, max(FINE, now.error, _LAST * enough / now.error))
+    step = _down(given.space, given.front, now, damping, accuracy)
     if step is None:
         if state.off > enough * given.critical_opening:
             # Perhaps only since the pressures, and with them the intensities, are not good enough.
