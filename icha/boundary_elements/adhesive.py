@@ -17,8 +17,6 @@ from icha.contact.failures import FullContact, NotConverged
 
 # Deviation of sqrt(G/dgamma) at which a front rests well enough to see where new contact forms.
 _NEARLY_AT_REST = 1e-3
-# The same around new contact.
-_NEARLY_IN_WINDOWS = 1e-4
 # The same where it is clear, and what is clear: by so much of the gap at which a cell lets go.
 _IN_SIGHT, _CLEARLY = 3e-2, 0.02
 # Accuracy of displacements, over that gap, at which this can be seen.
@@ -87,11 +85,11 @@ def settled(
     if near:
         del stages[:2]
 
-    def in_windows(contact, gap, restless, accuracy=_NEARLY_IN_WINDOWS):
-        return relaxed_in_windows(space, front, separation, contact, gap, restless, accuracy)
+    def in_windows(contact, gap, restless):
+        return relaxed_in_windows(space, front, separation, contact, gap, restless)
 
-    def mended(state, restless, accuracy):
-        return in_windows(state, state.gap, restless, accuracy)
+    def mended(state, restless):
+        return in_windows(state, state.gap, restless)
 
     tried = np.zeros(space.size, dtype=bool)
     stage = rounds = 0

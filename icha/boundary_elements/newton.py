@@ -48,10 +48,9 @@ _NET = 0.6
 # A deviation of sqrt(G/dgamma) that is mended where it is. Least damping of bonds there: fronts run, and a whole step
 # would lead up.
 _RESTLESS, _RUNNING = 0.03, 0.2
-# The same where there are no more such cells than this part of the front: of the largest deviation, within bounds.
-_UNEASY, _LEAST_UNEASY, _MOST_UNEASY, _FEW = 0.1, 1e-4, 1e-3, 0.01
-# To what part of that they are mended.
-_MENDED = 0.1
+# The same where there are no more such cells than this part of the front. So often, at most, are few mended before the
+# whole front moves again.
+_UNEASY, _FEW, _MOST_MENDINGS = 1e-3, 0.01, 5
 _FIRST_DAMPING, _LARGEST_DAMPING = 0.1, 1e8
 # Damping of the first step of a front of which more than this part is restless: without, it would lead far up.
 _FAR_DAMPING, _MANY = 0.2, 0.5
@@ -127,14 +126,14 @@ def front_at_rest(
     near: bool = False,
     most_steps: int | None = None,
     beyond: np.ndarray | None = None,
-    mended: Callable[[Held, np.ndarray, float], Contact | None] = lambda state, restless, tolerance: None,
+    mended: Callable[[Held, np.ndarray], Contact | None] = lambda state, restless: None,
 ) -> Held:
     """The contact in equilibrium at a separation (cells), down in energy from that of a given one.
 
     contact: if it is `Held`, at this separation. tolerance: of sqrt(G/dgamma) along the front. near: whether it is not
     far from rest. most_steps: after which it is returned as it is. beyond: of a window, what the contact outside
     adds to the mean fraction around every cell, a field. mended: where cells, (m,), of a contact are far from rest, the
-    contact with these nearer to it, within a tolerance, if a short way leads there.
+    contact with these nearer to it, if a short way leads there.
 
     Raises
     ------
@@ -155,11 +154,13 @@ def front_at_rest(
             # The pressures are still those of a coarse beginning, and the error theirs.
             search = replace(search, state=given.at(state, enough, state))
             continue
-        restless, uneasy = _restless(now)
+        restless = _restless(now)
         if number == 0 and np.count_nonzero(restless) > _MANY * np.count_nonzero(now.front):
             search = replace(search, damping=_FAR_DAMPING)
-        if search.all_moved and restless.any():
-            search = _after_mending(given, search, mended(state, now.cells[restless], _MENDED * uneasy), coarse)
+        few = np.count_nonzero(restless) <= _FEW * np.count_nonzero(now.front)
+        if restless.any() and search.mendings < (_MOST_MENDINGS if few else 1):
+            off = max(enough, min(coarse, 0.1 * _GAP_TO_FRONT, _off(now)))
+            search = _after_mending(given, search, mended(state, now.cells[restless]), off)
             if search.state is not state:
                 continue
         search = _after_one_step(given, search, now, enough, coarse)
@@ -169,14 +170,15 @@ def front_at_rest(
 
 
 def _restless(now):
-    """Which cells of the front are far from rest: farther than nearly all others, or than it is good for any.
-
-    And how far the former are, at least.
-    """
+    """Which cells of the front are far from rest: farther than nearly all others, or than it is good for any."""
     off = np.where(now.free, np.abs(now.intensity - 1), 0.0)
-    uneasy = min(max(_UNEASY * now.error, _LEAST_UNEASY), _MOST_UNEASY)
-    few = np.count_nonzero(off > uneasy) <= _FEW * np.count_nonzero(now.front)
-    return off > (uneasy if few else _RESTLESS), uneasy
+    few = np.count_nonzero(off > _UNEASY) <= _FEW * np.count_nonzero(now.front)
+    return off > (_UNEASY if few else _RESTLESS)
+
+
+def _off(now):
+    """How accurate displacements should be after a step, over the gap at which a cell is free."""
+    return now.error * min(_GAP_TO_FRONT, max(now.error, FINE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,22 +186,25 @@ class _Search:
     """How far a front on its way to rest has come.
 
     damping: of bonds in the next step. most_off: of the displacement, over the gap at which a cell is free, at most.
-    all_moved: whether the whole front has moved since it was mended where it was far from rest.
+    mendings: of places far from rest, since the whole front has moved.
     """
 
     state: Held
     most_off: float
     damping: float = 0.0
-    all_moved: bool = True
+    mendings: int = 0
 
 
-def _after_mending(given, search, contact, coarse):
-    """The search after restless cells were mended, which gave a contact or None; at its state if that is not lower."""
-    search = replace(search, all_moved=False)
-    if contact is None:
-        return search
-    new = given.at(contact, min(coarse, 0.1 * _GAP_TO_FRONT), search.state)
-    return replace(search, state=new, damping=0.0) if given.is_lower(new, search.state) else search
+def _after_mending(given, search, contact, off):
+    """The search after restless cells were mended, which gave a contact or None; at its state if that is not lower.
+
+    off: accuracy of the displacement, over the gap at which a cell is free.
+    """
+    if contact is not None:
+        new = given.at(contact, off, search.state)
+        if given.is_lower(new, search.state):
+            return replace(search, state=new, damping=0.0, mendings=search.mendings + 1)
+    return replace(search, mendings=_MOST_MENDINGS)
 
 
 def _after_one_step(given, search, now, enough, coarse):
@@ -215,7 +220,7 @@ def _after_one_step(given, search, now, enough, coarse):
             # Perhaps only since the pressures, and with them the intensities, are not good enough.
             state = given.at(state, max(enough, _FINER * state.off / given.critical_opening), state)
         return replace(search, state=state, damping=_more(damping))
-    off = max(enough, min(search.most_off, now.error * min(_GAP_TO_FRONT, max(now.error, FINE))))
+    off = max(enough, min(search.most_off, _off(now)))
     smallest = _SMALLEST_STEP if search.most_off <= _NEAR else 1.0
     lower = _lower_along(given, state, now, step, off, smallest)
     if lower is not None:

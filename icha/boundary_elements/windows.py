@@ -26,6 +26,8 @@ from icha.support.parallel import blocks, on_cores
 _SIDES, _PIECE = (64, 128, 256), 64
 # Cells of windows that are solved together: few enough to stay in the cache, and to be done when they are at rest.
 _TOGETHER = 65_536
+# Deviation of sqrt(G/dgamma) in windows; all of the front comes to rest afterwards.
+_TOLERANCE = 1e-4
 
 
 class _Way(NamedTuple):
@@ -50,12 +52,10 @@ def relaxed_in_windows(
     contact: Contact,
     gap: np.ndarray,
     restless: np.ndarray,
-    tolerance: float,
 ) -> Contact | None:
     """The contact after its front has come nearer to rest around restless cells (m,), where these lie in windows.
 
-    gap: of the contact as its pressures are, (n, n). tolerance: of sqrt(G/dgamma); all of the front comes to rest
-    afterwards. None if there are no such windows, or no way to rest in them.
+    gap: of the contact as its pressures are, (n, n). None if there are no such windows, or no way to rest in them.
     """
     for way in _WAYS:
         windows = _windows(restless, space.grid, way.around)
@@ -70,7 +70,7 @@ def relaxed_in_windows(
     def at_rest(some):
         cells, free = some
         small = HalfSpace(cells.shape, *kernels[cells.shape[-1]])
-        return _at_rest(small, front, separation, contact, gap, near, cells, free, tolerance, way.steps)
+        return _at_rest(small, front, separation, contact, gap, near, cells, free, way.steps)
 
     found = on_cores(at_rest, windows)
     moved = np.zeros(space.size, dtype=bool)
@@ -91,7 +91,7 @@ def relaxed_in_windows(
     )
 
 
-def _at_rest(small, front, separation, contact, gap, near, windows, free, tolerance, most_steps):
+def _at_rest(small, front, separation, contact, gap, near, windows, free, most_steps):
     """Cells in contact of the whole grid in some windows, their fractions and pressures, near rest; None if not found.
 
     near: mean fraction of contact around every cell of the whole grid.
@@ -107,7 +107,7 @@ def _at_rest(small, front, separation, contact, gap, near, windows, free, tolera
     level = Topography.of(np.where(free, own + separation - gap.ravel()[windows], far))
     beyond = near[windows] - neighbours(small, inside, start.fraction)
     try:
-        rest = front_at_rest(small, front, level, separation, start, tolerance, most_steps=most_steps, beyond=beyond)
+        rest = front_at_rest(small, front, level, separation, start, _TOLERANCE, most_steps=most_steps, beyond=beyond)
     except (NotConverged, FullContact):
         return None
     return windows.ravel()[rest.cells], rest.fraction, rest.pressure

@@ -79,7 +79,7 @@ def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_mov
     restless = before.cells[before.free & (np.abs(before.intensity - 1) > 0.03)]
     assert len(restless) and before.error > 0.1
 
-    mended = module.relaxed_in_windows(contact.space, contact.front, u, disturbed, disturbed.gap, restless, 1e-4)
+    mended = module.relaxed_in_windows(contact.space, contact.front, u, disturbed, disturbed.gap, restless)
     np.testing.assert_array_equal(mended.cells, state.cells)
     far = np.all(np.minimum(apart, GRID - apart) > 26, axis=0)
     np.testing.assert_array_equal(mended.fraction[far], state.fraction[far])
