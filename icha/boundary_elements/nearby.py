@@ -67,7 +67,7 @@ class Tiles:
         reaching, own = _placed(cells, grid, corner, starts[tiles + 1] - starts[tiles])
         row, column = ((first[:, None] // COARSER + np.arange(_NODES)) % coarse for first in corner.T)
         covered = row[:, :, None] * coarse + column[:, None, :]
-        number = np.zeros(coarse**2, np.int32)
+        number = np.zeros(coarse**2, int)
         number[covered] = 1
         nodes = np.flatnonzero(number)
         number[nodes] = np.arange(len(nodes))
