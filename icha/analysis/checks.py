@@ -20,7 +20,7 @@ from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.datasets.variables.run import PATCHES
-from icha.path.limits import UNBALANCED_WORK
+from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS
 from icha.path.targets import AREA_FRACTION, BETWEEN
 from icha.support.atomic_files import whole_file
 
@@ -382,14 +382,17 @@ def _unresolved_work(run):
     """By how much the work of the steps with events may be wrong, J/m^2, as it is not known where in them those happen.
 
     An event moves the work by what it changes the pressure by, times its distance from the middle of its step; and one
-    that changes the stiffness alone by a part of the difference that this makes to the integral.
+    that changes the stiffness alone by a part of the difference that this makes to the integral. No step may leave more
+    open than UNRESOLVED_LOSS of what jumps have set free.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant
     width, slope = np.diff(run["mean_separation"]), -run["contact_stiffness"]
     pressure_jump = np.diff(run["nominal_pressure"]) - 0.5 * width * (slope[1:] + slope[:-1])
     bend = width**2 * np.diff(slope)
-    return float(np.sum(events * (0.5 * np.abs(width * pressure_jump) + np.abs(bend) / 24)))
+    left_open = float(np.sum(events * (0.5 * np.abs(width * pressure_jump) + np.abs(bend) / 24)))
+    set_free = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))
+    return min(left_open, UNRESOLVED_LOSS * np.count_nonzero(events) * set_free)
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:

@@ -138,8 +138,7 @@ CYCLE_DAMAGES = {
     "targets": scaled("mean_separation", 1 + 1e-6, -1),
     "finite": written("work", np.nan, 3),
     "events": written("split_count", 1, -1),
-    # More than the work of this path leaves open, with all jumps off in a single long step.
-    "jumps lose energy": written("dissipated_by_jump_off", -2.0, -1),
+    "jumps lose energy": written("dissipated_by_jump_off", -1.0, -1),
     "loss adds up": written("loss_unattributed", 1.0),
     "loss is the work": scaled("work", 1 + 1e-6, -1),
     "separated: spots": written("spot_count", 1, -1),
