@@ -503,7 +503,7 @@ def _at_most(name, value, limit, description, subject):
     # A value that is not a number keeps to no limit; it is reported as -1, which no error can be.
     value = float(value)
     finite = math.isfinite(value)
-    return Check(name, value if finite else -1.0, float(limit), finite and value <= limit, description, subject)
+    return Check(name, value if finite else -1.0, float(limit), bool(finite and value <= limit), description, subject)
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
