@@ -20,6 +20,7 @@ from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.datasets.variables.run import PATCHES
+from icha.path.energy_balance import pressure_jump, roughness, unresolved_work
 from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS
 from icha.path.targets import AREA_FRACTION, BETWEEN
 from icha.support.atomic_files import whole_file
@@ -323,7 +324,7 @@ def _loop(run) -> Iterator[Finding]:
     yield (
         "jumps lose energy",
         -min(sum(jumps), 0.0) / scale,
-        IDENTITY_LIMIT + (_unresolved_work(run) + _error_of_work(run)) / scale,
+        IDENTITY_LIMIT + (_left_open(run) + _error_of_work(run)) / scale,
         "energy gained in jumps into and out of contact together, over the largest work",
     )
     yield "separated: spots", float(run["spot_count"][-1]), 0, "number of spots left in contact at the end of unloading"
@@ -378,7 +379,7 @@ def _error_of_work(run):
     return float(np.sum(way * ends * (0.5 * separation + relative * way / 12)))
 
 
-def _unresolved_work(run):
+def _left_open(run):
     """By how much the work of the steps with events may be wrong, J/m^2, as it is not known where in them those happen.
 
     An event moves the work by what it changes the pressure by, times its distance from the middle of its step; and one
@@ -388,11 +389,10 @@ def _unresolved_work(run):
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant
     width, slope = np.diff(run["mean_separation"]), -run["contact_stiffness"]
-    pressure_jump = np.diff(run["nominal_pressure"]) - 0.5 * width * (slope[1:] + slope[:-1])
-    bend = width**2 * np.diff(slope)
-    left_open = float(np.sum(events * (0.5 * np.abs(width * pressure_jump) + np.abs(bend) / 24)))
+    jumped = pressure_jump(width, np.diff(run["nominal_pressure"]), slope[:-1], slope[1:])
+    work = float(np.sum(events * (unresolved_work(width, jumped) + roughness(width, slope[:-1], slope[1:]))))
     set_free = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))
-    return min(left_open, UNRESOLVED_LOSS * np.count_nonzero(events) * set_free)
+    return min(work, UNRESOLVED_LOSS * np.count_nonzero(events) * set_free)
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:

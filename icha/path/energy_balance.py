@@ -48,13 +48,12 @@ class Step:
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
         # Without adhesion contact forms and breaks without a jump of the pressure.
         jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
-        bend = width**2 * (slope - end_slope)
         return cls(
             width=width,
-            work=-(0.5 * width * (p + q) + bend / 12),
+            work=-(0.5 * width * (p + q) + width**2 * (slope - end_slope) / 12),
             gained=contact.stored_energy(after) - contact.stored_energy(before),
-            pressure_jump=q - p - 0.5 * width * (slope + end_slope) if jumps else 0.0,
-            roughness=abs(bend) / 24,
+            pressure_jump=pressure_jump(width, q - p, slope, end_slope) if jumps else 0.0,
+            roughness=roughness(width, slope, end_slope),
             sudden=bool(jumps),
             events=events,
         )
@@ -76,7 +75,22 @@ class Step:
     @property
     def unresolved(self) -> float:
         """Bound of the error of the work, since it is not known where in the step its events happen, J/m^2."""
-        return 0.5 * abs(self.pressure_jump * self.width)
+        return unresolved_work(self.width, self.pressure_jump)
+
+
+def pressure_jump(width, change, slope, end_slope):
+    """By how much a change of the pressure over a step misses that along the tangents at its ends, Pa."""
+    return change - 0.5 * width * (slope + end_slope)
+
+
+def unresolved_work(width, pressure_jump):
+    """Bound of the error of the work of a step with events: they may all lie at either of its ends, J/m^2."""
+    return 0.5 * abs(width * pressure_jump)
+
+
+def roughness(width, slope, end_slope):
+    """Bound of the error of the work of a step where it is smooth, J/m^2."""
+    return width**2 * abs(end_slope - slope) / 24
 
 
 @dataclass(frozen=True)
