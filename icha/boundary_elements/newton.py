@@ -157,8 +157,7 @@ def front_at_rest(
         restless = _restless(now)
         if number == 0 and np.count_nonzero(restless) > _MANY * np.count_nonzero(now.front):
             search = replace(search, damping=_FAR_DAMPING)
-        few = np.count_nonzero(restless) <= _FEW * np.count_nonzero(now.front)
-        if restless.any() and search.mendings < (_MOST_MENDINGS if few else 1):
+        if restless.any() and search.mendings < (_MOST_MENDINGS if _are_few(restless, now) else 1):
             off = max(enough, min(coarse, 0.1 * _GAP_TO_FRONT, _off(now)))
             search = _after_mending(given, search, mended(state, now.cells[restless]), off)
             if search.state is not state:
@@ -172,8 +171,13 @@ def front_at_rest(
 def _restless(now):
     """Which cells of the front are far from rest: farther than nearly all others, or than it is good for any."""
     off = np.where(now.free, np.abs(now.intensity - 1), 0.0)
-    few = np.count_nonzero(off > _UNEASY) <= _FEW * np.count_nonzero(now.front)
-    return off > (_UNEASY if few else _RESTLESS)
+    uneasy = off > _UNEASY
+    return uneasy if _are_few(uneasy, now) else off > _RESTLESS
+
+
+def _are_few(cells, now):
+    """Whether cells are no more than a small part of the front."""
+    return np.count_nonzero(cells) <= _FEW * np.count_nonzero(now.front)
 
 
 def _off(now):
