@@ -142,8 +142,8 @@ short-range: tamaas
 	python docs/write_pages.py short_range
 
 faults: tamaas
-	python benchmarks/faults.py $(OPTIONS)
-	python benchmarks/faults_page.py
+	python -m benchmarks.faults $(OPTIONS)
+	python -m benchmarks.faults.page
 
 # The validators have an environment of their own, for some of them need an old jsonschema.
 .venv-validators/.installed: .venv-tools/bin/uv tests/validators/requirements.txt

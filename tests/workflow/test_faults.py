@@ -1,6 +1,5 @@
-"""A campaign that is killed, damaged and called twice: benchmarks/faults.py in short."""
+"""A campaign that is killed, damaged and called twice: benchmarks/faults in short."""
 
-import importlib.util
 import json
 import os
 import random
@@ -15,36 +14,29 @@ from conftest import REPOSITORY, copy_project
 from icha.support.atomic_files import whole_file
 from icha.support.checksums import damaged, lost, write_checksum
 
-BENCHMARKS = REPOSITORY / "benchmarks"
+sys.path.append(str(REPOSITORY))
+from benchmarks.faults import damages, kills, odd_places, other_settings, power_cuts
+from benchmarks.faults.page import page
+from benchmarks.faults.places import WAYS, Reference
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
-
-
-def module(name):
-    spec = importlib.util.spec_from_file_location(name, BENCHMARKS / f"{name}.py")
-    loaded = importlib.util.module_from_spec(spec)
-    sys.modules[name] = loaded  # dataclasses look their module up
-    spec.loader.exec_module(loaded)
-    return loaded
-
-
-faults = module("faults")
 
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     scratch = tmp_path_factory.mktemp("faults")
     project = copy_project(REPOSITORY, scratch / "project")
-    return faults.Reference(project, scratch, targets=("runs", "references"))
+    return Reference(project, scratch, targets=("runs", "references"))
 
 
 @pytest.mark.slow
 def test_killed_calls_leave_nothing_behind_and_the_next_goes_on(reference):
     place, chance = reference.empty(), random.Random(1)
-    for victim, moment in ((faults.VICTIMS[1], 0.5), (faults.VICTIMS[0], 0.5)):
-        assert not faults.kill(place, reference, victim, moment * reference.seconds, chance)
+    for victim, moment in ((kills.VICTIMS[1], 0.5), (kills.VICTIMS[0], 0.5)):
+        assert not kills.kill(place, reference, victim, moment * reference.seconds, chance)
     before = place.times()
     assert reference.goes_on(place) == []
-    assert faults.computed_again(before, place) == []
+    assert kills.computed_again(before, place) == []
 
 
 @pytest.mark.slow
@@ -53,8 +45,8 @@ def test_flipped_bits_are_found_by_the_one_of_two_calls_that_may_run(reference):
     kinds = {"surface": "middle", "run": "start", "boundary elements": "end"}
     spoilt = {}
     for kind, where in kinds.items():
-        file = place.folder / faults.KINDS[kind]
-        faults.flip(file, where)
+        file = place.folder / damages.KINDS[kind]
+        damages.flip(file, where)
         spoilt[file.with_name(f"{file.name}.damaged")] = file.read_bytes()
     assert len(reference.half_written(place)) == len(kinds)
     calls = [place.start(), place.start()]
@@ -67,17 +59,17 @@ def test_flipped_bits_are_found_by_the_one_of_two_calls_that_may_run(reference):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", faults.WAYS)
+@pytest.mark.parametrize("way", WAYS)
 def test_folders_may_have_any_name_and_hold_any_file(reference, way):
-    odd = faults.odd_name(reference, "both' of \"them & ($HOME*;", way)
-    modules = faults.odd_modules(reference, way)
-    long = faults.long_temporary(reference, way)
+    odd = odd_places.odd_name(reference, "both' of \"them & ($HOME*;", way)
+    modules = odd_places.odd_modules(reference, way)
+    long = odd_places.long_temporary(reference, way)
     assert [trial.violations for trial in (odd, modules, long)] == [(), (), ()]
 
 
 @pytest.mark.slow
 def test_an_orphan_leaves_nothing_of_its_own_settings(reference):
-    assert faults.orphan(reference, 0.4 * reference.seconds).violations == ()
+    assert other_settings.orphan(reference, 0.4 * reference.seconds).violations == ()
 
 
 @pytest.mark.skipif(
@@ -87,7 +79,7 @@ def test_what_is_complete_is_still_there_after_a_power_cut(tmp_path):
     contents = {f"runs/{number}.nc": random.Random(number).randbytes(100_000) for number in range(5)}
     disk = tmp_path / "disk"
     try:
-        with faults.power(disk, tmp_path / "image") as (cut, mount):
+        with power_cuts.power(disk, tmp_path / "image") as (cut, mount):
             for path, content in contents.items():
                 with whole_file(disk / path) as temporary:
                     temporary.write_bytes(content)
@@ -96,7 +88,7 @@ def test_what_is_complete_is_still_there_after_a_power_cut(tmp_path):
             (disk / "runs/.other").write_bytes(contents["runs/0.nc"])
             os.replace(disk / "runs/.other", disk / "runs/other")
             cut()
-            faults.unmount(disk)
+            power_cuts.unmount(disk)
             mount()
             assert {path: (disk / path).read_bytes() for path in contents} == contents
             assert damaged(disk, thorough=True) == lost(disk) == []
@@ -107,6 +99,6 @@ def test_what_is_complete_is_still_there_after_a_power_cut(tmp_path):
 
 
 def test_the_page_is_that_of_the_counts():
-    kept = json.loads((BENCHMARKS / "results/faults.json").read_text(encoding="utf-8"))
-    assert module("faults_page").page(kept) == Path(REPOSITORY, "docs/faults.md").read_text(encoding="utf-8")
+    kept = json.loads((REPOSITORY / "benchmarks/results/faults.json").read_text(encoding="utf-8"))
+    assert page(kept) == Path(REPOSITORY, "docs/faults.md").read_text(encoding="utf-8")
     assert not [row for row in kept["rows"] if row["violations"]]

@@ -1,17 +1,18 @@
-"""Write docs/faults.md from what benchmarks/faults.py kept; nothing is tried here."""
+"""Write docs/faults.md from what benchmarks/faults kept; nothing is tried here."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-WENT_ON, REFUSED = "went on", "said what to do"
+from benchmarks.faults.places import REFUSED, WENT_ON
+
+BENCHMARKS = Path(__file__).resolve().parents[1]
 LONGEST = 200  # of longer messages the beginning is kept
 
 HEAD = """# What becomes of a campaign that is disturbed
 
-<!-- Written by benchmarks/faults_page.py from benchmarks/results/faults.json. -->
+<!-- Written by benchmarks/faults/page.py from benchmarks/results/faults.json. -->
 
 Programs are killed, disks fill up and files get damaged. This must not lead to wrong numbers that nobody notices. To
 test this, a campaign of {results} files with every kind of result, including its deposit, was disturbed
@@ -147,5 +148,5 @@ def _lines(rows):
 
 
 if __name__ == "__main__":
-    written = json.loads((HERE / "results/faults.json").read_text(encoding="utf-8"))
-    (HERE.parent / "docs/faults.md").write_text(page(written), encoding="utf-8")
+    written = json.loads((BENCHMARKS / "results/faults.json").read_text(encoding="utf-8"))
+    (BENCHMARKS.parent / "docs/faults.md").write_text(page(written), encoding="utf-8")
