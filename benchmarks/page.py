@@ -475,8 +475,9 @@ stop. *Time / ICHA's* is the ratio of the processor times of whole processes; on
 the same as the ratio of wall times. *Computation / ICHA's* is the ratio of the computations alone. *Memory* is the
 largest resident memory. ICHA and `aspher` had the machine to themselves. Another code had not, where its wall time is
 longer than its processor time; there the ratio of the computations flatters ICHA by as much. Like the other codes, ICHA
-is asked for bare numbers (`icha.path.follow`). The labelled dataset of `icha.simulate` costs another 1.5 s, nearly all
-of it for the import of xarray. At 256² and 512² most of ICHA's time goes into its imports. The loads are
+is asked for bare numbers (`icha.path.follow`). The labelled dataset of `icha.simulate` needs xarray in
+addition, whose import is part of the first call ([first second](#the-first-second)). At 256² about half of ICHA's time
+goes into imports. The loads are
 20 reduced pressures p\\* = p/(E\\* h'_rms) from 5e-4 to 8e-2 in geometric progression. The surfaces have
 the spectrum of the challenge (period 100 µm, roll-off 20 µm, Hurst exponent 0.8, rms slope 1) down to waves of eight
 grid cells, so that every grid has all the waves that it can resolve as recommended for ICHA.
@@ -489,7 +490,7 @@ over the stops and the range. The areas of the boundary-element codes are correc
 With adhesion, a boundary-element code must resolve the range ρ of the attraction (exponential, energy 50 mJ/m²,
 E\\* = 25 MPa): on a grid of spacing Δ, Δ ≤ 8 ρ² E\\*/(3π γ) and √(γ Δ/E\\*)/ρ < 0.5. These grids resolve only ranges
 much longer than the challenge's 2.07 nm, and all codes are given the same one. The Tabor parameter is then far below
-2, where ICHA's law of jump-in was not verified; this causes part of the differences in area. `adhesion` is given the
+1, below which ICHA's law of jump-in was not verified; this causes part of the differences in area. `adhesion` is given the
 loads. `tamaas` does not find adhesive equilibria reliably at a given load, and is therefore given the mean gaps of
 ICHA's states at those loads; ICHA is measured with both. `icha-boundary-elements`, ICHA's other model, is the limit of
 a short range ([short range](short_range.md)). It has no range to resolve, so that with adhesion its area, like that of
