@@ -487,10 +487,10 @@ code at the same stop, and the same for the mean gap (in h_rms) or, where the ga
 over the stops and the range. The areas of the boundary-element codes are corrected by the perimeter of the contact
 (Yastrebov, Anciaux & Molinari, Tribol. Int. 114 (2017) 161-171).
 
-With adhesion, a boundary-element code must resolve the range ρ of the attraction (exponential, energy 50 mJ/m²,
-E\\* = 25 MPa): on a grid of spacing Δ, Δ ≤ 8 ρ² E\\*/(3π γ) and √(γ Δ/E\\*)/ρ < 0.5. These grids resolve only ranges
-much longer than the challenge's 2.07 nm, and all codes are given the same one. The Tabor parameter is then far below
-1, below which ICHA's law of jump-in was not verified; this causes part of the differences in area. `adhesion` is given the
+With adhesion, a boundary-element code must resolve the range ρ of the attraction (exponential, energy 50 mJ/m², E\\* =
+25 MPa): on a grid of spacing Δ, Δ ≤ 8 ρ² E\\*/(3π γ) and √(γ Δ/E\\*)/ρ < 0.5. These grids resolve only ranges much
+longer than the challenge's 2.07 nm, and all codes are given the same one. The Tabor parameter is then far below 1,
+below which ICHA's law of jump-in was not verified; this causes part of the differences in area. `adhesion` is given the
 loads. `tamaas` does not find adhesive equilibria reliably at a given load, and is therefore given the mean gaps of
 ICHA's states at those loads; ICHA is measured with both. `icha-boundary-elements`, ICHA's other model, is the limit of
 a short range ([short range](short_range.md)). It has no range to resolve, so that with adhesion its area, like that of

@@ -25,7 +25,7 @@ import icha
 from icha.datasets.campaign_file.write import write_campaign
 from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
-from icha.datasets.netcdf import LEAST_COMPRESSED
+from icha.datasets.storage import LEAST_COMPRESSED
 from icha.datasets.surface_file import write_surface
 
 REPEATS = 3

@@ -110,7 +110,7 @@ def simulate(
         raise ConvergenceError(met.failure, dataset) from None
     if path.unload:
         pull_off = met.snapshots[-1]["snapshot_step"]
-        loop = hysteresis(met.steps, pull_off, material, observables.largest_tension)
+        loop = hysteresis(met.steps, pull_off, material, observables.largest_tension, met.unattributed)
         dataset = dataset.assign(described(LOOP, loop))
     return dataset
 
@@ -176,17 +176,21 @@ def _check_arguments(surface, material, path):
 
 
 class _Met(NamedTuple):
-    """What a path has met: a row of values for every step and snapshot, the events of every step, why it ends early."""
+    """What a path has met: a row of values for every step and snapshot, the events of every step, why it ends early.
+
+    unattributed: loss that is in no class, J/m^2.
+    """
 
     steps: list[dict]
     snapshots: list[dict]
     events: list[Events]
     failure: str
+    unattributed: float
 
 
 def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
     steps, snapshots, events, failure = [], [], [], ""
-    before = pulled = None
+    before = pulled = balance = None
 
     def keep_snapshot(target, state, step):
         asked = {"snapshot_step": step, "snapshot_kind": target.kind, "snapshot_target": target.value}
@@ -194,7 +198,7 @@ def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
 
     try:
         for waypoint in follow(contact, path, pressure_unit, progress):
-            state = waypoint.state
+            state, balance = waypoint.state, waypoint.balance
             steps.append(_finite(_step(contact, waypoint, pressure_unit) | observables.of_step(state)))
             events.append(Events.joined(()) if before is None else contact.events_between(before, state))
             before = state
@@ -208,7 +212,7 @@ def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
             keep_snapshot(Target(PULL_OFF, 0.0), *pulled[1:])
     except NotConverged as error:
         failure = f"the path ends {error}"
-    return _Met(steps, snapshots, events, failure)
+    return _Met(steps, snapshots, events, failure, balance.unattributed if balance else 0.0)
 
 
 def _finite(values: dict) -> dict:

@@ -12,7 +12,7 @@ class Patches(AsperityObservables):
     """Observables of asperities, with residuals and maps."""
 
     def of_step(self, state):
-        return super().of_step(state) | {"front_residual": 1e-6, "gap_residual": 1e-9}
+        return super().of_step(state) | {"front_residual": 1e-9, "gap_residual": 1e-9}
 
     def of_snapshot(self, state):
         spots, surface = state.spots, self.surface

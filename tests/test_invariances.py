@@ -11,6 +11,7 @@ from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, 
 from icha.boundary_elements import transforms
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.path.limits import UNRESOLVED_LOSS
+from icha.support import parallel
 
 PERIOD, MODULUS = 100e-6, 25e6
 # Grid and shortest waves along its side: some fifty asperities, and eight cells for each wave.
@@ -193,7 +194,7 @@ def test_threads_change_no_bit(model, data):
     with pytest.MonkeyPatch.context() as patch:
         # Boundary elements work on small grids by blocks and threads, as on large ones.
         patch.setattr(transforms, "CACHE", 1000)
-        patch.setattr(transforms, "LARGE", 0)
+        patch.setattr(parallel, "LARGE_GRID", 0)
         for threads in ("1", "3"):
             patch.setenv("OMP_NUM_THREADS", threads)
             again = Surface(surface.heights, PERIOD)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from icha.boundary_elements.elasticity import Contact, Topography, solve_bonds
+from icha.boundary_elements.elasticity import Contact, Topography, pressures_for
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.regions import merged
 from icha.contact.failures import FullContact, NotConverged
@@ -50,10 +50,9 @@ def pressed(
         height = heights.ravel()[cells]
         if load is not None:
             pressure = pressure * (load * space.size / np.sum(pressure))
-        pressure, left = solve_bonds(
+        pressure, left = pressures_for(
             space,
             cells,
-            np.zeros(len(cells)),
             height - (separation or 0.0),
             pressure,
             topography.rounding if rough else exact,

@@ -41,14 +41,15 @@ class Summits:
     radius: np.ndarray
 
     def contacts(self, which: np.ndarray, grid: int) -> np.ndarray:
-        """Cells, counted through, that these summits (k,) touch with when they jump into contact; some come twice."""
-        found = []
-        for cell, radius in zip(self.cell[which], self.radius[which], strict=True):
+        """Cells, counted through, that these summits (k,) touch with when they jump into contact."""
+        touched = np.zeros((grid, grid), bool)
+        # Whatever would be larger than the surface covers it with its periodic images.
+        for cell, radius in zip(self.cell[which], np.minimum(self.radius[which], 0.75 * grid), strict=True):
             way = np.arange(-int(radius), int(radius) + 1)
             rows, columns = np.nonzero(np.hypot(way[:, None], way) <= radius)
             row, column = divmod(int(cell), grid)
-            found.append((row + way[rows]) % grid * grid + (column + way[columns]) % grid)
-        return np.concatenate([np.zeros(0, int), *found])
+            touched[(row + way[rows]) % grid, (column + way[columns]) % grid] = True
+        return np.flatnonzero(touched)
 
 
 def settled(

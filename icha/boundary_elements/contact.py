@@ -19,6 +19,7 @@ from icha.boundary_elements.patch_events import patch_events
 from icha.boundary_elements.patches import BEYOND_EDGES, edges, labelled
 from icha.boundary_elements.states import CellState
 from icha.contact.events import Events
+from icha.contact.failures import NotConverged
 from icha.contact.model import PRESSURE, Control
 from icha.surfaces.summits import Asperities, find_summits
 from icha.surfaces.surface import Surface
@@ -112,8 +113,10 @@ class BoundaryElements:
     ) -> CellState:
         """The contact brought to another mean separation (m), or to a given load or area; as of `ContactModel`.
 
-        Fronts lose their equilibrium by themselves, together or alone, so that `let_go` changes nothing.
+        Fronts lose their equilibrium by themselves, together or alone: none can be `let_go`.
         """
+        if let_go:
+            raise NotConverged("fronts let go by themselves")
         if control is None:
             new = self._at(state, separation)
         elif not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):

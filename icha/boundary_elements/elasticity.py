@@ -87,10 +87,9 @@ class Topography:
         return displaced
 
 
-def solve_bonds(
+def pressures_for(
     space: HalfSpace,
     cells: np.ndarray,
-    bonds: np.ndarray,
     wanted: np.ndarray,
     pressure: np.ndarray,
     tolerance: float,
@@ -99,13 +98,13 @@ def solve_bonds(
     gain: float = 0.0,
     balanced: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pressures p with (K + bonds) p = wanted on cells, zero elsewhere; and what is left of `wanted`.
+    """Pressures on cells, zero elsewhere, under which these are displaced as `wanted`; and what is left of `wanted`.
 
     Corrections are computed in single precision, the remaining error in double precision.
 
     Parameters
     ----------
-    cells : (k,), counted through. bonds, wanted : (k,), compliances and displacements. pressure : (k,), to start from.
+    cells : (k,), counted through. wanted : (k,), displacements, in cells. pressure : (k,), to start from.
     tolerance : of the displacement, in cells. kind : np.float32 for displacements, (n, n), in single precision. gain :
     in single precision, what may be left of the error at the start. balanced : the sum of the pressures does not
     change, and `wanted` is met up to a constant.
@@ -115,9 +114,9 @@ def solve_bonds(
     NotConverged
         If that is not reached.
     """
-    p, before, near = pressure, np.inf, None
+    p, before, near, without_bonds = pressure, np.inf, None, np.zeros(len(cells))
     while True:
-        r = wanted - space.displacement(cells, p.astype(kind), cells) - bonds * p
+        r = wanted - space.displacement(cells, p.astype(kind), cells)
         if balanced:
             r -= np.mean(r)
         error = np.abs(r).max(initial=0.0)
@@ -127,7 +126,7 @@ def solve_bonds(
             raise NotConverged(f"pressures at a given contact were not found (displacement off by {error:.1e} cells)")
         before, near = error, near or (space.nearly(cells) if kind is float else Whole(space, cells))
         accuracy = max(gain if kind == np.float32 else GAIN, near.error, MARGIN * tolerance / error)
-        change, left = correction(near, bonds, r / error, accuracy, balanced)
+        change, left = correction(near, without_bonds, r / error, accuracy, balanced)
         p = p + error * change
         if kind == np.float32:
             if np.abs(left).max() > accuracy:

@@ -15,6 +15,7 @@ import scipy.fft
 
 from icha.boundary_elements import transforms
 from icha.boundary_elements.nearby import Tiles
+from icha.support import parallel
 
 # The inverse of the kernel for the mean, in parts of that of the longest wave.
 _MEAN = 0.3
@@ -58,7 +59,7 @@ class HalfSpace:
     @property
     def is_large(self) -> bool:
         """Whether it is one grid whose transforms take longer than finding out what is where."""
-        return len(self.shape) == 2 and self.grid >= transforms.LARGE
+        return len(self.shape) == 2 and self.grid >= parallel.LARGE_GRID
 
     def displacement(
         self,

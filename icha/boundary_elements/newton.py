@@ -26,12 +26,13 @@ from icha.contact.tolerances import STIFFNESS_TOLERANCE
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
 FRONT_TOLERANCE = 1e-9
-# Of the displacement in contact, over the gap at which a cell is free.
-GAP_TOLERANCE = 1e-11
-# The same on the way to rest, over the error of the front, at most; and at rest, over the tolerance of the front.
+# Of the displacement in contact, over the gap at which a cell is free: on the way to rest, over the error of the front,
+# at most; and at rest, over the tolerance of the front.
 _GAP_TO_FRONT, _GAP_TO_TOLERANCE = 1e-1, 0.02
 # Of the displacement, near to rest and where energies are in doubt. Relative change of an energy that is rounding.
 _NEAR, _SAME_ENERGY = 1e-5, 1e-12
+# Of a step, so much of its size times sqrt(G/dgamma) leads neither up nor down.
+_LEVEL = 1e-11
 # Pressures that are found again are so much better.
 _FINER = 0.03
 _MAX_STEPS = 400
@@ -141,7 +142,7 @@ def front_at_rest(
         If it is not found.
     """
     given = _Given(space, front, topography, separation, beyond)
-    enough = max(GAP_TOLERANCE, _GAP_TO_TOLERANCE * tolerance)
+    enough = _GAP_TO_TOLERANCE * tolerance
     coarse = _NEAR if near else _GAP_TO_FRONT
     state = contact if isinstance(contact, Held) else given.at(contact, max(enough, coarse))
     search = _Search(state, most_off=coarse)
@@ -296,7 +297,7 @@ def _more(damping):
 def _down(space, front, now, damping, accuracy):
     """Newton's step if it leads down in energy, as far as G - dgamma tells, against the change of contact."""
     change, pressed = _step(space, front, now, damping, accuracy)
-    if np.sum((now.intensity**2 - 1) * change) > GAP_TOLERANCE * np.abs(change).sum():
+    if np.sum((now.intensity**2 - 1) * change) > _LEVEL * np.abs(change).sum():
         return None
     return change, pressed
 

@@ -1,4 +1,4 @@
-"""Patches: connected regions of contact, what is in each, and what becomes of them from one state to the next."""
+"""Patches: connected regions of contact, and what is in each."""
 
 from __future__ import annotations
 

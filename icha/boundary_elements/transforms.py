@@ -7,11 +7,11 @@ import threading
 import numpy as np
 import scipy.fft
 
+from icha.support import parallel
 from icha.support.parallel import blocks, on_cores
 
-# Bytes of a field from which it pays to transform some rows or columns at a time, so many columns; nodes a side from
-# which several threads do.
-CACHE, _COLUMNS, LARGE = 2_000_000, 32, 2048
+# Bytes of a field from which it pays to transform some rows or columns at a time, so many columns.
+CACHE, _COLUMNS = 2_000_000, 32
 
 
 def filtered(
@@ -27,7 +27,7 @@ def filtered(
     In the precision of the values; given at cells (m,), rising, or everywhere, in the place of `out` if there is one.
     Rows and columns are transformed while they are in the cache, and empty rows not at all.
     """
-    each = on_cores if grid >= LARGE else _one_by_one
+    each = on_cores if grid >= parallel.LARGE_GRID else _one_by_one
     modes = kept((grid, grid // 2 + 1), np.result_type(values.dtype, np.complex64))
     found = np.empty((grid, grid) if at is None else len(at), values.dtype) if out is None else out
     rows = blocks(grid, max(CACHE // (2 * grid * values.itemsize), 1))

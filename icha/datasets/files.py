@@ -13,10 +13,8 @@ import numpy as np
 import xarray as xr
 
 from icha.datasets.netcdf import (
-    COMPRESSION,
     FLOAT_FILL,
     INTEGER_FILL,
-    LEAST_COMPRESSED,
     characters,
     coordinates_of,
     define_dimensions,
@@ -25,12 +23,11 @@ from icha.datasets.netcdf import (
     is_text,
     not_finite,
 )
+from icha.datasets.storage import COMPRESSED_SIZES, COMPRESSION
 from icha.datasets.variables.campaign import COMPLETE
 from icha.datasets.variables.run import CELLS
 from icha.support.atomic_files import whole_file
 
-# Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
-_COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 # Bytes of an array from which on it is not read as a whole.
 _LEFT_IN_FILE = 2**26
 
@@ -83,7 +80,7 @@ def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.V
         if variable.dims[-2:] == CELLS:
             # Maps are mostly zeros, and looked at one by one.
             storage |= COMPRESSION | {"chunksizes": (*[1] * (variable.ndim - 2), *variable.shape[-2:])}
-        elif variable.size in _COMPRESSED_SIZES:
+        elif variable.size in COMPRESSED_SIZES:
             storage |= COMPRESSION
         defined.append((define_numbers(group, name, variable.dims, values.dtype, attrs, **storage), values))
     return defined

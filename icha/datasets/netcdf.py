@@ -17,10 +17,6 @@ if TYPE_CHECKING:
 
 FLOAT_FILL = 9.969209968386869e36
 INTEGER_FILL = -(2**31) + 1
-# As measured by benchmarks/storage.py (docs/reference/dataset.md): smaller arrays lose by being cut into chunks what
-# compression gains.
-LEAST_COMPRESSED = 1024
-COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 # How xarray marks text that is kept as characters. Every netCDF tool reads those, and they compress, unlike strings of
 # variable length.
 TEXT = {"_Encoding": "utf-8"}

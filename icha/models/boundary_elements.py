@@ -2,6 +2,7 @@
 
 import hashlib
 import pathlib
+from importlib.metadata import version
 
 from icha.asperity.material import Material
 from icha.boundary_elements.contact import BoundaryElements
@@ -19,8 +20,9 @@ def _observables(surface: Surface, material: Material, path: Path) -> Observable
 
 
 def _kept(contact: BoundaryElements, folder: pathlib.Path) -> Kept:
-    material = repr((contact.spacing, contact.law.material)).encode()
-    of = hashlib.sha256(contact.heights.tobytes() + material).hexdigest()
+    programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
+    others = repr((contact.spacing, contact.law.material, programs)).encode()
+    of = hashlib.sha256(contact.heights.tobytes() + others).hexdigest()
     return Kept(contact, of[:32], folder, packed, unpacked)
 
 

@@ -23,15 +23,15 @@ class Step:
     """From one equilibrium of a path to the next: work, change of energy and events.
 
     width: change of the mean separation, m. work: done on the contact, -(integral of p du), J/m^2. gained: stored
-    energy, J/m^2. pressure_jump: by which events changed the pressure, Pa. roughness: bound of the error of the
-    integral where it is smooth, J/m^2. sudden: whether there are events that may change the pressure.
+    energy, J/m^2. pressure_jump: by which events changed the pressure, Pa. integration_error: bound of the error
+    of the integral where it is smooth, J/m^2. sudden: whether there are events that may change the pressure.
     """
 
     width: float
     work: float
     gained: float
     pressure_jump: float
-    roughness: float
+    integration_error: float
     sudden: bool
     events: Events
 
@@ -53,7 +53,7 @@ class Step:
             work=-(0.5 * width * (p + q) + width**2 * (slope - end_slope) / 12),
             gained=contact.stored_energy(after) - contact.stored_energy(before),
             pressure_jump=pressure_jump(width, q - p, slope, end_slope) if jumps else 0.0,
-            roughness=roughness(width, slope, end_slope),
+            integration_error=integration_error(width, slope, end_slope),
             sudden=bool(jumps),
             events=events,
         )
@@ -88,7 +88,7 @@ def unresolved_work(width, pressure_jump):
     return 0.5 * abs(width * pressure_jump)
 
 
-def roughness(width, slope, end_slope):
+def integration_error(width, slope, end_slope):
     """Bound of the error of the work of a step where it is smooth, J/m^2."""
     return width**2 * abs(end_slope - slope) / 24
 
@@ -97,8 +97,8 @@ def roughness(width, slope, end_slope):
 class EnergyBalance:
     """Work done on a contact since first contact and what has been lost of it, by the kind of event, J/m^2.
 
-    unattributed: lost in steps without any event: errors of the integration, and what is not reciprocal in a model's
-    interaction.
+    unattributed: lost without an event, or beside what jumps lose: errors of the integration, and what is not
+    reciprocal in a model's interaction.
     """
 
     work: float = 0.0

@@ -10,7 +10,11 @@ _LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
 
 
 def hysteresis(
-    steps: Sequence[Mapping[str, float]], pull_off: int, material: Material, largest_tension: float
+    steps: Sequence[Mapping[str, float]],
+    pull_off: int,
+    material: Material,
+    largest_tension: float,
+    unattributed: float,
 ) -> dict[str, float]:
     """Pull-off, detachment and losses, by the names of their variables.
 
@@ -20,6 +24,7 @@ def hysteresis(
     pull_off : which of them has the largest tension of the last unloading.
     material : half-space and interface.
     largest_tension : Pa, of all asperities at once.
+    unattributed : what is in no class of losses, J/m^2.
     """
     last, adhesive = steps[-1], material.surface_energy > 0
     touching = steps[max((k for k, step in enumerate(steps) if step["spot_count"]), default=0)]
@@ -38,7 +43,7 @@ def hysteresis(
         "hysteresis_loss": loss,
         "hysteresis_loss_over_surface_energy": loss / material.surface_energy if adhesive else 0.0,
         **losses,
-        "loss_unattributed": loss - sum(losses.values()),
+        "loss_unattributed": unattributed,
         "largest_contact_area_fraction": max(step["contact_area_fraction"] for step in steps),
         "largest_reduced_pressure": max(step["reduced_pressure"] for step in steps),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,7 @@ UNRESOLVED_WORK = 2e-4
 UNITING_STEP = 1 / 16
 # Of the work so far, the part by which the pressure's curvature may matter in a step without events, unless work and
 # energy agree to UNBALANCED_WORK.
-_ROUGH_WORK = 1e-4
+_CURVED_WORK = 1e-4
 # A loss that is less than this part of the work is known no better than one that is as large: fronts of boundary
 # elements lose such parts in hops from cell to cell, which no short step resolves.
 _LEAST_LOSS = 1e-2
@@ -113,13 +114,12 @@ def _equilibrium(contact, start, separation, collective):
             raise NotConverged("spots would come closer as the surfaces part: an unstable equilibrium")
         return beyond
     except NotConverged as failure:
-        last, count = failure, 1
+        first, count = failure, 1
     while collective and count <= contact.spot_count(start):
-        try:
+        with suppress(NotConverged):
             return contact.equilibrium(start, separation, let_go=count)
-        except NotConverged as failure:
-            last, count = failure, 2 * count
-    raise last
+        count *= 2
+    raise first
 
 
 def _is_work_known(contact, beyond, step, account, longest):
@@ -135,7 +135,7 @@ def _is_work_known(contact, beyond, step, account, longest):
     if step.width > 0 and contact.pressure(beyond) < 0:
         # There is no way in here that has the same error.
         scale = min(effort, max(10 * account.jumped, _LEAST_LOSS * effort))
-    unbalanced = step.roughness > _ROUGH_WORK * scale and abs(step.lost) > UNBALANCED_WORK * scale
+    unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.lost) > UNBALANCED_WORK * scale
     return step.sudden or not unbalanced or abs(step.width) <= longest / 256
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from icha.contact.model import AREA_FRACTION as AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
+from icha.path.limits import LEAST_PRESSURE
 from icha.path.targets import AREA_FRACTION, MEAN_SEPARATION, Target
 
 # Relative excess over a target that is rounding.
@@ -25,14 +26,14 @@ class Stop:
     pressure_scale: float
 
     def excess(self, state: State) -> float:
-        """Relative excess of the state over the target; of a load that is zero in units of its scale."""
+        """Relative excess of the state over the target; of no load, in units of the least that can be asked for."""
         kind, value = self.target.kind, self.target.value
         if kind == MEAN_SEPARATION:
             return (value - state.separation) / self.contact.rms_height
         if kind == AREA_FRACTION:
             return self.contact.area_fraction(state) / value - 1
         pressure = self.contact.pressure(state) / self.pressure_scale
-        return (pressure - value) / (abs(value) or 1.0)
+        return (pressure - value) / (abs(value) or LEAST_PRESSURE)
 
     @property
     def control(self) -> Control | None:

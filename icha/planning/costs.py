@@ -13,8 +13,11 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from icha.datasets.storage import COMPRESSED_SIZES
 from icha.path.limits import DEFAULT_STEP
 from icha.planning.constants import FITTED, Constants, MiB
+from icha.support.parallel import LARGE_GRID
+from icha.surfaces.moments import summit_density
 
 _DOUBLE = 8
 
@@ -76,23 +79,10 @@ def roughness_of(grid: int, period: float, m0: float, m2: float, m4: float, summ
 
     Its summits, unless they were counted, are those expected of an isotropic Gaussian surface.
     """
-    expected = gaussian_summits(period, m2, m4) if summits is None else summits
+    expected = period**2 * summit_density(m2, m4) if summits is None else summits
     # At rms slope 1 of the surface m2 is 1/2.
     sharpness = m0**0.75 * m4**0.25 / (2 * m2)
     return Roughness(grid, expected, period**2 * m2 / m0, sharpness)
-
-
-def gaussian_summits(period: float, m2: float, m4: float) -> float:
-    """Expected number of maxima of an isotropic Gaussian surface, A0 m4/(6 sqrt(3) pi m2).
-
-    P. R. Nayak, J. Lubr. Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
-
-    Parameters
-    ----------
-    period : side of the periodic cell, m.
-    m2, m4 : variances of a profile's slope (1) and curvature (m^-2).
-    """
-    return period**2 * m4 / (6 * math.sqrt(3) * math.pi * m2)
 
 
 def self_affine_moments(
@@ -114,22 +104,16 @@ def self_affine_moments(
     return moment(0), moment(2) / 2, 3 / 8 * moment(4)
 
 
-def self_affine_summits(period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float) -> float:
-    """Expected number of summits of a self-affine surface with roll-off; m."""
-    _, m2, m4 = self_affine_moments(period, rolloff_wavelength, short_wavelength, hurst)
-    return gaussian_summits(period, m2, m4)
-
-
 def job_threads(grid: int) -> int:
-    """Cores that a job of a surface takes, and is given: two where transforms of large arrays pay, else one."""
-    return 2 if grid >= 2048 else 1
+    """Cores that a job of a surface takes, and is given: two where they pay, else one."""
+    return 2 if grid >= LARGE_GRID else 1
 
 
 def surface_cost(grid: int, of: Constants = FITTED) -> Cost:
     """Making a topography of `grid` nodes a side, and writing it."""
     heights = _DOUBLE * grid**2
-    # Heights of grids between 64 and 2048 nodes are compressed, by about a sixth.
-    compression = 0.84 if 64 <= grid < 2048 else 1.0
+    # Compression makes heights smaller by about a sixth.
+    compression = 0.84 if grid**2 in COMPRESSED_SIZES else 1.0
     start, memory = _before(grid, of)
     seconds = start + _shared_out(of.making.file + of.making.node * grid**2, grid, of)
     return Cost(seconds, memory + 2.7 * heights, 18e3 + compression * heights)

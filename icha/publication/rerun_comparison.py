@@ -41,7 +41,8 @@ TOLERANCE = 1e-6
 FLOOR = 1e-6
 # Differences that are allowed of variables of these names, whatever their values.
 NOISE = {
-    **dict.fromkeys(("residual", "gap_residual"), RESIDUAL_LIMIT),
+    "residual": RESIDUAL_LIMIT,
+    "gap_residual": RESIDUAL_LIMIT,
     "front_residual": FRONT_LIMIT,
 }
 _DRAWN = (".png", ".pdf", ".html")

@@ -21,7 +21,7 @@ from scipy.special import gamma, pbdv
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.surfaces.moments import SpectralMoments
+from icha.surfaces.moments import SpectralMoments, summit_density
 
 # Slope of A/A0 against p* as p* -> 0.
 BUSH_GIBSON_THOMAS_SLOPE = np.sqrt(2 * np.pi)
@@ -73,7 +73,7 @@ def gaussian_summits(moments: SpectralMoments) -> Summits:
     if alpha < 1.5 * (1 - 1e-9):
         raise ValueError(f"spectral moments: Nayak's parameter is {alpha:.4g}, and at least 1.5 if they are isotropic")
     return Summits(
-        density=moments.m4 / (6 * math.sqrt(3) * math.pi * moments.m2),
+        density=summit_density(moments.m2, moments.m4),
         mean_height=4 * math.sqrt(moments.m0 / (math.pi * alpha)),
         deviation=math.sqrt((1 - _SUMMIT_VARIANCE / alpha) * moments.m0),
         radius_of_curvature=3 * math.sqrt(math.pi) / (8 * math.sqrt(moments.m4)),

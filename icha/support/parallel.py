@@ -4,6 +4,9 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
+# Nodes a side of a grid from which on several threads pay.
+LARGE_GRID = 2048
+
 
 def cores() -> int:
     """Number of threads to work with: OMP_NUM_THREADS if it is set, else the processors that the process may use.

@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
 
+def summit_density(m2: float, m4: float) -> float:
+    """Maxima of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), of its moments; m^-2 (Nayak 1971)."""
+    return m4 / (6 * math.sqrt(3) * math.pi * m2)
+
+
 class SpectralMoments(NamedTuple):
     """Variances of a profile's height (m0, m^2), slope (m2, 1) and curvature (m4, m^-2)."""
 

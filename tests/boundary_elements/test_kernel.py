@@ -5,6 +5,7 @@ import pytest
 
 from icha.boundary_elements import transforms
 from icha.boundary_elements.kernel import HalfSpace
+from icha.support import parallel
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -20,7 +21,7 @@ def test_fields_by_blocks_are_those_of_the_whole_grid(grid, largest, kind, monke
     # Blocks of a few rows and columns, of which the last ones are smaller.
     monkeypatch.setattr(transforms, "CACHE", 2 * 5 * grid * values.itemsize)
     monkeypatch.setattr(transforms, "_COLUMNS", 7)
-    monkeypatch.setattr(transforms, "LARGE", largest)
+    monkeypatch.setattr(parallel, "LARGE_GRID", largest)
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     by_blocks = [space.filtered(cells, values, space.compliance[np.dtype(kind)], where) for where in (None, at)]
     for one, other in zip(whole, by_blocks, strict=True):

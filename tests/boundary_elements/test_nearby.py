@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from icha import Material, SelfAffineSpectrum
-from icha.boundary_elements import nearby, transforms
+from icha.boundary_elements import nearby
 from icha.boundary_elements.contact import BoundaryElements
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.nearby import REACH, TILE, Tiles
 from icha.contact.model import PRESSURE
+from icha.support import parallel
 
 
 def patches(grid, rng, count):
@@ -61,7 +62,7 @@ def test_contacts_are_the_same_with_tiles_and_without(adhesion, monkeypatch):
     surface, material = spectrum.realise(800, seed=5), Material(25e6, adhesion, 2e-9)
     results, used = [], []
     of = Tiles.of
-    monkeypatch.setattr(transforms, "LARGE", 800)
+    monkeypatch.setattr(parallel, "LARGE_GRID", 800)
     monkeypatch.setattr(Tiles, "of", lambda *given: used.append(of(*given)) or used[-1])
     for part in (nearby._PART, 0.0):
         monkeypatch.setattr(nearby, "_PART", part)

@@ -13,7 +13,7 @@ import icha
 from icha.analysis.checks import check_run
 from icha.boundary_elements import adhesive
 from icha.boundary_elements.contact import BoundaryElements
-from icha.boundary_elements.elasticity import solve_bonds
+from icha.boundary_elements.elasticity import pressures_for
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import Linearised
 from icha.contact.failures import NotConverged
@@ -74,8 +74,14 @@ def test_attraction_of_shorter_and_shorter_range_tends_to_the_limit():
 
 
 # Small grids are worked on by blocks and threads, as large ones are.
-BY_THREADS = "import runpy; from icha.boundary_elements import transforms as t; t.CACHE, t.LARGE = 1000, 0; "
-BY_THREADS += "runpy.run_module('icha.references.short_range.rough_contacts', run_name='__main__')"
+BY_THREADS = """
+import runpy
+from icha.boundary_elements import transforms
+from icha.support import parallel
+
+transforms.CACHE, parallel.LARGE_GRID = 1000, 0
+runpy.run_module("icha.references.short_range.rough_contacts", run_name="__main__")
+"""
 
 
 def test_threads_change_no_byte():
@@ -120,7 +126,7 @@ def test_pressures_that_are_no_numbers_end_in_a_failure():
     """Conjugate gradients that break down must not go on for ever."""
     cells, nothing = np.arange(64), np.zeros(64)
     with pytest.raises(NotConverged, match="pressures at a given contact were not found"):
-        solve_bonds(HalfSpace.of(8), cells, nothing, np.full(64, np.nan), nothing, 1e-9)
+        pressures_for(HalfSpace.of(8), cells, np.full(64, np.nan), nothing, 1e-9)
 
 
 def test_an_area_of_few_cells_is_met_to_two_of_them():

@@ -48,6 +48,17 @@ def test_next_to_no_load_is_refused_in_units_of_the_slope():
 
 
 @pytest.mark.parametrize("strength", [0.0, 1e-2])
+def test_no_load_is_met_beside_the_lightest_stops(strength):
+    surface = Surface(1e-6 * WAVES, 1e-4)
+    material = Material(1e6, strength * 1e6 * surface.rms_height**1.5 * surface.rms_curvature**0.5, 1e-8)
+    path = Path([1e-10, 1e-3], turning_points=[("reduced_pressure", 0.0)], unload=True)
+    run = simulate(surface, material, path)
+    turn = run.isel(step=int(np.argmax((run.step_target == 0).values)))
+    assert abs(turn.reduced_pressure) <= 1e-8 * run.reduced_pressure.max()
+    assert all(check.passed for check in check_run(run))
+
+
+@pytest.mark.parametrize("strength", [0.0, 1e-2])
 @pytest.mark.parametrize("modulus", [1e-9, 1e15])
 @pytest.mark.parametrize(("height", "period"), [(1e-24, 1e-24), (1e-22, 1e-24), (1.0, 1e9), (2e8, 1e9)])
 def test_at_the_ends_of_the_ranges_runs_are_finite_and_pass_their_checks(height, period, modulus, strength):

@@ -7,7 +7,7 @@ import pytest
 
 from icha.planning import costs
 from icha.planning.roughness import measured_roughness
-from icha.surfaces.moments import spectral_moments
+from icha.surfaces.moments import spectral_moments, summit_density
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.summits import find_summits
 
@@ -21,14 +21,14 @@ def rough(grid=256, summits=500, hills=100):
 @pytest.mark.parametrize(("hurst", "rolloff", "short"), [(0.8, 20e-6, 3e-6), (0.3, 50e-6, 4e-6), (1.0, 25e-6, 6e-6)])
 def test_summits_are_counted_as_on_real_surfaces(hurst, rolloff, short):
     spectrum = SelfAffineSpectrum(100e-6, rolloff, short, hurst)
-    expected = costs.self_affine_summits(100e-6, rolloff, short, hurst)
+    by_spectrum = costs.roughness_of(256, 100e-6, *costs.self_affine_moments(100e-6, rolloff, short, hurst))
+    expected = by_spectrum.summits
     surfaces = [spectrum.realise(256, seed) for seed in range(4)]
     counted = np.mean([len(find_summits(surface).height) for surface in surfaces])
     # A finite cell has few long waves, and summits scatter as their square root.
     assert expected == pytest.approx(counted, rel=0.15)
     moments = spectral_moments(surfaces[0])
-    assert costs.gaussian_summits(100e-6, moments.m2, moments.m4) == pytest.approx(expected, rel=0.1)
-    by_spectrum = costs.roughness_of(256, 100e-6, *costs.self_affine_moments(100e-6, rolloff, short, hurst))
+    assert 100e-6**2 * summit_density(moments.m2, moments.m4) == pytest.approx(expected, rel=0.1)
     by_heights = measured_roughness(surfaces[0])
     assert by_heights.summits == len(find_summits(surfaces[0]).height)
     assert by_spectrum.hills == pytest.approx(by_heights.hills, rel=0.25)
@@ -36,7 +36,8 @@ def test_summits_are_counted_as_on_real_surfaces(hurst, rolloff, short):
 
 
 def test_the_spectrum_may_lie_where_its_moments_are_logarithms():
-    values = [costs.self_affine_summits(1.0, 0.2, 0.02, hurst) for hurst in (0.999999, 1.0)]
+    moments = [costs.self_affine_moments(1.0, 0.2, 0.02, hurst) for hurst in (0.999999, 1.0)]
+    values = [costs.roughness_of(256, 1.0, *each).summits for each in moments]
     assert values[0] == pytest.approx(values[1], rel=1e-5)
 
 

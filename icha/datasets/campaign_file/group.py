@@ -12,10 +12,8 @@ from icha.datasets.attributes import COLLECTED, collected
 from icha.datasets.campaign_file.arrangement import Arrangement
 from icha.datasets.labels import LABELS
 from icha.datasets.netcdf import (
-    COMPRESSION,
     FLOAT_FILL,
     INTEGER_FILL,
-    LEAST_COMPRESSED,
     characters,
     coordinates_of,
     define_dimensions,
@@ -23,6 +21,7 @@ from icha.datasets.netcdf import (
     define_text,
     is_text,
 )
+from icha.datasets.storage import COMPRESSION, LEAST_COMPRESSED
 from icha.datasets.variables.campaign import CAMPAIGN, FAILURE, RAGGED, place_of
 from icha.datasets.variables.run import FURTHER
 

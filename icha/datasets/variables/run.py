@@ -58,7 +58,11 @@ RUN = {
     "pending_count": Variable(
         _STEP, "1", "asperities past jump-in left free after breaking contact at the same step", int
     ),
-    "outside_wu_fraction": Variable(_STEP, "1", "fraction of single-asperity spots whose Tabor parameter is below 1"),
+    "outside_wu_fraction": Variable(
+        _STEP,
+        "1",
+        "fraction of single-asperity spots (boundary elements: of summits in contact) with a Tabor parameter below 1",
+    ),
     "snapshot_step": Variable(_SNAPSHOT, "1", "step of the snapshot", int),
     "snapshot_kind": Variable(_SNAPSHOT, "1", "quantity that the snapshot was asked to reach", str),
     "snapshot_target": Variable(_SNAPSHOT, "1", "value asked for, in the SI unit of its kind"),
@@ -178,7 +182,7 @@ LOOP = {
     "loss_by_coalescence": Variable((), "J m^-2", "part of the loss in unions of spots and their undoing"),
     "loss_by_load_jump": Variable((), "J m^-2", "part of the loss in jumps at constant load, under load control"),
     "loss_unattributed": Variable(
-        (), "J m^-2", "part of the loss without an event: non-reciprocal interaction and integration"
+        (), "J m^-2", "part of the loss that no event explains: non-reciprocal interaction and integration"
     ),
     "largest_contact_area_fraction": Variable((), "1", "largest A/A0 on the path"),
     "largest_reduced_pressure": Variable((), "1", "largest reduced pressure on the path"),
