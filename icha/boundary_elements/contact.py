@@ -11,7 +11,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements.adhesionless import pressed
 from icha.boundary_elements.adhesive import Summits, settled
 from icha.boundary_elements.elasticity import Contact, Topography
-from icha.boundary_elements.front import COMPLIANCE, Front, areas, contact_area_gradient, contact_areas
+from icha.boundary_elements.front import COMPLIANCE, Front, adhesive_areas, reported_area_gradient, reported_areas
 from icha.boundary_elements.held_load import under_control
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import COARSE, FINE, FRONT_TOLERANCE, front_residual, tangent
@@ -143,7 +143,7 @@ class BoundaryElements:
     def area_of_cells(self, state: CellState) -> np.ndarray:
         """Contact area of every cell in contact, (k,), in cells: less than its fraction along the perimeter."""
         if self.adhesive:
-            return contact_areas(state.fraction, state.around)
+            return reported_areas(state.fraction, state.around)
         return 1 - BEYOND_EDGES * edges(state.cells, self.space.grid)
 
     def gap(self, state: CellState) -> np.ndarray:
@@ -251,7 +251,7 @@ class BoundaryElements:
         cells = self.heights.size * self.spacing
         stiffer = float(np.sum(pressure)) * self.contact_modulus / cells
         if self.adhesive:
-            wider = float(np.sum(contact_area_gradient(state.fraction, state.around) * fraction)) / cells
+            wider = float(np.sum(reported_area_gradient(state.fraction, state.around) * fraction)) / cells
         else:
             # Cells come and go as wholes; in the mean the area grows about in proportion to the load.
             wider = self.area_fraction(state) * stiffer / self.pressure(state)
@@ -260,7 +260,7 @@ class BoundaryElements:
     def _energy_of_cells(self, state):
         """Elastic energy less that of adhesion of every cell in contact, (k,), J/m^2."""
         elastic = 0.5 * state.pressure * (self.heights.ravel()[state.cells] - state.separation)
-        return elastic - self.law.material.surface_energy * areas(state.fraction, state.around)
+        return elastic - self.law.material.surface_energy * adhesive_areas(state.fraction, state.around)
 
     def _set_free(self, state):
         """What every cell would set free if its patch jumped, J/m^2: without adhesion nothing jumps."""

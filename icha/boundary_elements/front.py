@@ -87,27 +87,27 @@ def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:
     return half + half.T - diags_array(half.diagonal(), dtype=np.float32, format="csr")
 
 
-def areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
-    """Contact area of every cell, in cells; around: `neighbours` of the fractions (n, n)."""
+def adhesive_areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """Contact area of every cell as the energy of adhesion has it, in cells; around: `neighbours` of the fractions."""
     return fraction - PERIMETER * fraction * (1 - around)
 
 
-def area_gradient(around: np.ndarray) -> np.ndarray:
+def adhesive_area_gradient(around: np.ndarray) -> np.ndarray:
     """Change of the whole area with the fraction of every cell."""
     return 1 - PERIMETER + 2 * PERIMETER * around
 
 
-def contact_areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
+def reported_areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
     """Contact area of every cell as it is reported, in cells.
 
-    `areas` is what the energy of adhesion needs; how far the sum of fractions lies outside the edge of contact depends
-    on how wide the front is, which cells partly in contact say. With both terms the radius of spots of 4 to 16 cells
-    is right to some hundredths of a cell whether adhesion is strong or next to nothing (docs/short_range.md).
+    Beside `adhesive_areas`: how far the sum of fractions lies outside the edge of contact depends on how wide the front
+    is, which cells partly in contact say. With both terms the radius of spots of 4 to 16 cells is right to some
+    hundredths of a cell whether adhesion is strong or next to nothing (docs/short_range.md).
     """
     return fraction * np.maximum(1 - _EDGE * (1 - around) - _WIDE * (1 - fraction), _LEAST)
 
 
-def contact_area_gradient(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
+def reported_area_gradient(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
     """Change of the whole area, as it is reported, with the fraction of every cell."""
     whole = 1 - _EDGE - _WIDE + 2 * _EDGE * around + 2 * _WIDE * fraction
     return np.where(1 - _EDGE * (1 - around) - _WIDE * (1 - fraction) > _LEAST, whole, _LEAST)
@@ -126,7 +126,7 @@ class Front:
 
     def strengths(self, around: np.ndarray) -> np.ndarray:
         """Tension at which cells begin to open, from their neighbours: less where the front is convex."""
-        return self.strength * np.sqrt(area_gradient(around))
+        return self.strength * np.sqrt(adhesive_area_gradient(around))
 
     def strength_change(self, strengths: np.ndarray, around_change: np.ndarray) -> np.ndarray:
         """Change of the strengths with that of the neighbours."""

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.boundary_elements.elastic_equilibrium import Held, held, intensity
 from icha.boundary_elements.elasticity import NOTHING, Contact, Topography
-from icha.boundary_elements.front import COMPLIANCE, Front, areas, neighbour_weights
+from icha.boundary_elements.front import COMPLIANCE, Front, adhesive_areas, neighbour_weights
 from icha.boundary_elements.kernel import HalfSpace, Whole
 from icha.boundary_elements.regions import adjacent, merged, region
 from icha.contact.failures import NotConverged
@@ -266,7 +266,7 @@ class _Given:
         """Elastic energy less that of adhesion, in E* cells^3."""
         # What lies beyond loses perimeter where it meets what lies here, as this does.
         around = state.around if self.beyond is None else state.around + self.beyond.ravel()[state.cells]
-        return state.energy - self.front.adhesion_length * float(np.sum(areas(state.fraction, around)))
+        return state.energy - self.front.adhesion_length * float(np.sum(adhesive_areas(state.fraction, around)))
 
     def is_lower(self, new, old):
         """Whether a state is not above another in energy, as far as this is known."""
