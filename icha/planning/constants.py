@@ -101,6 +101,8 @@ class Patches:
     """The power of that strength with which it does."""
     density: float = 0.6
     """The power of the number of summits in a cell, over 0.01, with which it does: noise makes small patches."""
+    large: float = 0.6
+    """The power of the nodes a side, over 2048, with which it does beyond that: of campaign cmc_truth, 8192 a side."""
 
 
 @dataclass(frozen=True)

@@ -177,6 +177,7 @@ def patch_cost(rough: Roughness, sweep: Sweep, of: Constants = FITTED) -> Cost:
     if sweep.adhesion:
         density = max(rough.summits, 1) / cells
         longer = here.adhesion * (sweep.adhesion / 0.01) ** here.strength * (density / 0.01) ** here.density
+        longer *= max(1.0, rough.grid / LARGE_GRID) ** here.large
     states = len(sweep.loads) + here.way * DEFAULT_STEP / sweep.max_step
     harder = [(load / 0.01) ** here.load for load in sweep.loads]
     at_stops = sum(harder) + here.way * DEFAULT_STEP / sweep.max_step * max(harder)
