@@ -18,6 +18,7 @@ from scipy.interpolate import BSpline
 from scipy.special import erf, erfc
 
 from icha.boundary_elements.transforms import filtered, kept
+from icha.support import parallel
 from icha.support.parallel import blocks, on_cores
 
 # Cells a side of a tile, and around its own cells those that reach into it. So far, less than, does a kernel.
@@ -27,8 +28,10 @@ COARSER, _ORDER = 4, 4
 _NODES = TILE // COARSER
 # What splits the kernel, per cell: at this, both what is cut off and what the coarse grid misses are small.
 _ALPHA = 2.3 / REACH
-# All tiles together, over the whole grid: more are no short way. So many are transformed at a time, in the cache.
-_PART, _TOGETHER = 0.6, 8
+# All tiles together, over the whole grid: more are no short way; on large grids, whose own transforms leave the cache.
+_PART, _LARGE_PART = 0.6, 1.2
+# So many tiles are transformed at a time, in the cache.
+_TOGETHER = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +64,8 @@ class Tiles:
         there = np.zeros((many, many), dtype=bool)
         there[tuple(tile_of[along] for along in np.divmod(cells, grid))] = True
         tiles = np.argwhere(there)
-        if not 0 < len(tiles) * TILE**2 <= _PART * grid**2:
+        part = _PART if grid < parallel.LARGE_GRID else _LARGE_PART
+        if not 0 < len(tiles) * TILE**2 <= part * grid**2:
             return None
         corner, coarse = starts[tiles] - REACH, grid // COARSER
         reaching, own = _placed(cells, grid, corner, starts[tiles + 1] - starts[tiles])

@@ -64,8 +64,8 @@ def test_contacts_are_the_same_with_tiles_and_without(adhesion, monkeypatch):
     of = Tiles.of
     monkeypatch.setattr(parallel, "LARGE_GRID", 800)
     monkeypatch.setattr(Tiles, "of", lambda *given: used.append(of(*given)) or used[-1])
-    for part in (nearby._PART, 0.0):
-        monkeypatch.setattr(nearby, "_PART", part)
+    for part in (nearby._LARGE_PART, 0.0):
+        monkeypatch.setattr(nearby, "_LARGE_PART", part)
         contact = BoundaryElements.of(surface, material)
         state = contact.untouched()
         for closer in (0.1, 0.3, 0.45):
