@@ -202,7 +202,7 @@ def lacking(case: Case, run) -> set[tuple[str, float]]:
 
 
 # What holds for every step by itself, and so for those that a run reached before it failed.
-_OF_STEPS = ("finite", "residual", "front", "converged", "targets")
+_OF_STEPS = ("finite", "residual", "front", "gap", "converged", "targets")
 
 
 def wrong(run) -> list[str]:

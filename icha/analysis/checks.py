@@ -112,9 +112,13 @@ def _findings(run: _Run) -> Iterator[Finding]:
 
 
 def _fronts(run) -> Iterator[Finding]:
-    """The finding on the edges of contact, of boundary elements."""
-    if "front_residual" in run:
-        yield "front", np.max(run["front_residual"]), FRONT_LIMIT, PATCHES["front_residual"].long_name
+    """Findings on the edges of contact, of boundary elements."""
+    for name, short, limit in (
+        ("front_residual", "front", FRONT_LIMIT),
+        ("gap_residual", "gap", RESIDUAL_LIMIT),
+    ):
+        if name in run:
+            yield short, np.max(run[name]), limit, PATCHES[name].long_name
 
 
 def _not_finite(arrays):

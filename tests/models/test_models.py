@@ -96,7 +96,7 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     assert not {"contact_map", "contact_pressure", "row", "column"} & {*study.variables, *study.dims}
     front = study["front_residual"]
     assert np.isnan(front.sel(model=ASPERITIES)).all() and front.attrs["missing"] == "of runs by asperities"
-    assert (front.sel(model=BOUNDARY_ELEMENTS, material="soft") == 1e-6).all()
+    assert (front.sel(model=BOUNDARY_ELEMENTS, material="soft") == 1e-9).all()
     assert set(np.unique(study["spot_model"])) == {0, 1}
     assert [flaw for flaw in flaws(CAMPAIGN, tree) if "attribute" not in flaw] == []
     assert run_labels(tree) == [labels(ASPERITIES), labels(ASPERITIES, "hertz"), labels(BOUNDARY_ELEMENTS)]
