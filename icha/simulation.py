@@ -185,7 +185,7 @@ class _Met(NamedTuple):
     snapshots: list[dict]
     events: list[Events]
     failure: str
-    unattributed: float
+    unattributed: float = 0.0
 
 
 def _followed(contact, observables, path, pressure_unit, progress) -> _Met:

@@ -20,8 +20,8 @@ from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.datasets.variables.run import PATCHES
-from icha.path.energy_balance import integration_error, pressure_jump, unresolved_work
 from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS
+from icha.path.open_work import integration_error, pressure_jump, unresolved_work
 from icha.path.targets import AREA_FRACTION, BETWEEN
 from icha.support.atomic_files import whole_file
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 from icha.contact.model import ContactModel, State
+from icha.path.open_work import integration_error, pressure_jump, unresolved_work
 
 # Of the work of a step, the part from which on its loss is that of its jumps, and not what is not reciprocal.
 _PLAIN_LOSS = 0.1
@@ -76,21 +77,6 @@ class Step:
     def unresolved(self) -> float:
         """Bound of the error of the work, since it is not known where in the step its events happen, J/m^2."""
         return unresolved_work(self.width, self.pressure_jump)
-
-
-def pressure_jump(width, change, slope, end_slope):
-    """By how much a change of the pressure over a step misses that along the tangents at its ends, Pa."""
-    return change - 0.5 * width * (slope + end_slope)
-
-
-def unresolved_work(width, pressure_jump):
-    """Bound of the error of the work of a step with events: they may all lie at either of its ends, J/m^2."""
-    return 0.5 * abs(width * pressure_jump)
-
-
-def integration_error(width, slope, end_slope):
-    """Bound of the error of the work of a step where it is smooth, J/m^2."""
-    return width**2 * abs(end_slope - slope) / 24
 
 
 @dataclass(frozen=True)
