@@ -20,7 +20,7 @@ from icha.boundary_elements.elasticity import NOTHING, Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, adhesive_areas, neighbour_weights
 from icha.boundary_elements.kernel import HalfSpace, Whole
 from icha.boundary_elements.regions import adjacent, merged, region
-from icha.contact.failures import NotConverged
+from icha.contact.failures import FullContact, NotConverged
 from icha.contact.models import BOUNDARY_ELEMENTS
 from icha.contact.tolerances import STIFFNESS_TOLERANCE
 
@@ -205,11 +205,17 @@ def _after_mending(given, search, contact, off):
 
     off: accuracy of the displacement, over the gap at which a cell is free.
     """
-    if contact is not None:
+    without = replace(search, mendings=_MOST_MENDINGS)
+    if contact is None:
+        return without
+    try:
         new = given.at(contact, off, search.state)
-        if given.is_lower(new, search.state):
-            return replace(search, state=new, damping=0.0, mendings=search.mendings + 1)
-    return replace(search, mendings=_MOST_MENDINGS)
+    except FullContact:
+        # Where pressures around it stay as they are, the last gap may close that else does not.
+        return without
+    if not given.is_lower(new, search.state):
+        return without
+    return replace(search, state=new, damping=0.0, mendings=search.mendings + 1)
 
 
 def _after_one_step(given, search, now, enough, coarse):

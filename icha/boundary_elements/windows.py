@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
-from scipy.ndimage import find_objects, label
+from scipy.ndimage import find_objects
 
 from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
+from icha.boundary_elements.patches import labelled
 from icha.boundary_elements.regions import BLOCK, among, blocks_around, merged, surroundings
 from icha.contact.failures import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
@@ -115,8 +116,10 @@ def _at_rest(small, front, separation, contact, gap, near, windows, free, most_s
 
 def _windows(restless, grid, around):
     """Windows, some together: cells of the whole grid, (t, w, w), and which may move there, in one window each."""
-    labels, _ = label(blocks_around(grid, around, restless))
-    boxes = _cut(labels, find_objects(labels))
+    rough = blocks_around(grid, around, restless)
+    labels, there = np.zeros(rough.shape, int), np.flatnonzero(rough)
+    labels.ravel()[there], _ = labelled(there, len(rough))
+    boxes = _cut(labels, _boxes(labels))
     width = BLOCK * np.array([max(side.stop - side.start for side in box) for box in boxes], int)
     windows, narrower = [], 0
     for side in _SIDES:
@@ -133,6 +136,16 @@ def _windows(restless, grid, around):
     return windows
 
 
+def _boxes(labels):
+    """Rows and columns, of blocks, around each label; over the edges of the period they begin below zero."""
+    half = len(labels) // 2
+    boxes = []
+    for here, turned in zip(find_objects(labels), find_objects(np.roll(labels, (half, half), (0, 1))), strict=True):
+        sides = [(side, slice(other.start - half, other.stop - half)) for side, other in zip(here, turned, strict=True)]
+        boxes.append(tuple(min(pair, key=lambda side: side.stop - side.start) for pair in sides))
+    return boxes
+
+
 def _cut(labels, boxes):
     """The boxes, of blocks, after those too wide for any window are cut into pieces, which get labels of their own."""
     widest, step = _SIDES[-1] // 2 // BLOCK, _PIECE // BLOCK
@@ -142,11 +155,11 @@ def _cut(labels, boxes):
             continue
         for row in range(box[0].start, box[0].stop, step):
             for column in range(box[1].start, box[1].stop, step):
-                piece = slice(row, row + step), slice(column, column + step)
-                mine = labels[piece] == number
-                if mine.any():
-                    pieces.append(piece)
-                    labels[piece][mine] = len(boxes) + len(pieces)
+                rows, columns = (np.arange(start, start + step) % len(labels) for start in (row, column))
+                mine = np.argwhere(labels[np.ix_(rows, columns)] == number)
+                if len(mine):
+                    pieces.append((slice(row, row + step), slice(column, column + step)))
+                    labels[rows[mine[:, 0]], columns[mine[:, 1]]] = len(boxes) + len(pieces)
     return boxes + pieces
 
 
