@@ -87,6 +87,11 @@ def patches(keep=lambda labels: True, **factors):
     ]
 
 
+def tree_of_both(**factors):
+    """The campaign with the runs of `patches` as its second model."""
+    return campaign_tree([*runs().items(), *patches(**factors)])
+
+
 AREA_FACTORS = {1: 1.1, 2: 1.2, 3: 1.6}
 
 

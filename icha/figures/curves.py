@@ -27,6 +27,7 @@ from icha.figures.select import (
     Snapshots,
     name_of_place,
     path_steps,
+    runs_by_boundary_elements,
     shown_model,
     snapshot_label,
     study_runs,
@@ -76,10 +77,12 @@ class Line(NamedTuple):
 class Curves(NamedTuple):
     """The lines of a study, the colours of its materials, the scale of colours where there are many lines, and legend.
 
-    `handles` name materials, surfaces and slopes as far as the study has several of them, and the model.
+    `beside` are the lines of the same contacts by boundary elements, crosses, if lines are asperities. `handles` name
+    materials, surfaces and slopes as far as the study has several of them, and the models.
     """
 
     lines: list[Line]
+    beside: list[Line]
     colours: dict[str, str]
     scale: Scale | None
     handles: dict[str, Line2D]
@@ -94,19 +97,18 @@ class Curves(NamedTuple):
 _FEW_LINES = 6
 
 
-def study_curves(campaign: xr.DataTree, study: str) -> Curves:
+def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None) -> Curves:
     """All runs of a study: a colour for every material, a marker for every surface and slope; open without adhesion.
 
-    Of many materials, or of many surfaces and slopes, those have colours of a scale instead.
+    Of many materials, or of many surfaces and slopes, those have colours of a scale instead. Beside asperities are the
+    study's runs by boundary elements, or those of the study of that name.
 
     Raises
     ------
     ValueError
         If there is no such study or no run in it.
     """
-    members: dict[tuple, list] = {}
-    for labels, run in study_runs(campaign, study, ragged=False):
-        members.setdefault((labels.material, labels.surface, labels.rms_slope), []).append((labels, run))
+    members = _by_contact(study_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
     materials = [name for name in dataset["material"].values.tolist() if name in {material for material, *_ in members}]
     places = list(dict.fromkeys((surface, slope) for _, surface, slope in members))
@@ -135,12 +137,51 @@ def study_curves(campaign: xr.DataTree, study: str) -> Curves:
         if scale:
             look |= {"ls": "-", "lw": 0.6, "ms": 0.6 * look["ms"], "mew": 0.6}
         lines.append(Line(first, [path_steps(run) for run in runs], [ways_back(run) for run in runs], look))
-    return Curves(lines, colours, scale, _curve_handles(dataset, lines, scale, bool(of_place)))
+    others = boundary_elements or (None if by_elements else study)
+    beside = _crosses(campaign, others, lines, colours) if others else []
+    handles = _curve_handles(dataset, lines, scale, bool(of_place))
+    return Curves(lines, beside, colours, scale, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if beside else {}))
+
+
+def _by_contact(runs):
+    """Labels and runs of the seeds of every material, surface and slope."""
+    members: dict[tuple, list] = {}
+    for labels, run in runs:
+        members.setdefault((labels.material, labels.surface, labels.rms_slope), []).append((labels, run))
+    return members
+
+
+def _crosses(campaign, study, lines, colours):
+    """The lines of a study by boundary elements, in the colours of others of the same contacts, or of the material."""
+    of_contact = {contact_of(line): line.look["color"] for line in lines}
+    energy, found = campaign[study]["surface_energy"], []
+    for contact, own in _by_contact(runs_by_boundary_elements(campaign, study)).items():
+        (first, *_), runs = zip(*own, strict=True)
+        adhesive = float(energy.sel(material=first.material)) > 0
+        colour = of_contact.get(contact, colours.get(first.material, GREY))
+        # The larger ones show behind the others where the results agree, as the markers of asperities do.
+        size = (8 if adhesive else 11) * (1 if len(lines) <= _FEW_LINES else 0.7)
+        look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
+        found.append(Line(first, [path_steps(run) for run in runs], [], look | _CROSS))
+    return found
+
+
+_CROSS = {"ls": "none", "marker": MODEL_MARKERS[SHORT_RANGE], "mew": 1.0}
+
+
+def contact_of(line: Line) -> tuple[str, str, float]:
+    """Material, surface and rms slope of the runs of a line."""
+    return line.labels.material, line.labels.surface, line.labels.rms_slope
+
+
+def model_name(dataset: xr.Dataset) -> str:
+    """By what legends call the `shown_model` of a study."""
+    return ASPERITIES_NAME if shown_model(dataset) == ASPERITIES else SHORT_RANGE
 
 
 def _curve_handles(dataset, lines, scale, many_places):
     """What the legend names of the lines of a study, but for what the scale tells."""
-    name = ASPERITIES_NAME if shown_model(dataset) == ASPERITIES else SHORT_RANGE
+    name = model_name(dataset)
     several = any(len(line.runs) > 1 for line in lines)
     shape = {"ls": "-" if several or scale else "none"} | ({} if many_places else {"marker": MODEL_MARKERS[name]})
     materials = {line.labels.material: line.look for line in lines}
@@ -160,12 +201,13 @@ def _curve_handles(dataset, lines, scale, many_places):
 def material_looks(campaign: xr.DataTree, study: str, materials: Sequence[str]) -> tuple[list[dict], Scale | None]:
     """Looks of the lines of a figure of one line for every material, and their scale where there are many."""
     dataset = campaign[study].to_dataset()
+    marker = MODEL_MARKERS[model_name(dataset)]
     if len(materials) > MOST_COLOURS:
         scale = materials_scale(dataset, materials)
-        return [{"color": colour, "ls": "-", "lw": 0.9, "marker": "o", "ms": 2} for colour in scale.colours], scale
+        return [{"color": colour, "ls": "-", "lw": 0.9, "marker": marker, "ms": 2} for colour in scale.colours], scale
     colours, layers = material_colours(campaign), material_layers(dataset, materials)
     return [
-        closed_look(colours[name], layers[name]) | {"ls": "-", "marker": "o", "label": material_label(dataset, name)}
+        closed_look(colours[name], layers[name]) | {"ls": "-", "marker": marker, "label": material_label(dataset, name)}
         for name in materials
     ], None
 
@@ -222,6 +264,21 @@ def draw_line(
         axes.plot(load, values, **line.look)
     load, values = map(np.concatenate, zip(*members, strict=True))
     return load, values
+
+
+def draw_crosses(
+    axes: Axes, line: Line, points: Callable[[xr.Dataset], tuple[np.ndarray, np.ndarray]], *, logarithmic: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Draw the points of a line by boundary elements, of several seeds their means at common loads; returns these.
+
+    `points` and `logarithmic` as for `draw_line`.
+    """
+    from icha.analysis.common_loads import at_common_loads
+
+    load, values = at_common_loads([points(run) for run in line.runs], logarithmic=logarithmic)
+    mean = values.mean(axis=0)
+    axes.plot(load, mean, **line.look)
+    return load, mean
 
 
 def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:

@@ -13,6 +13,8 @@ from icha.figures.curves import (
     UNLOADING,
     Line,
     add_legend,
+    contact_of,
+    draw_crosses,
     draw_line,
     draw_ways_back,
     gap_label,
@@ -22,9 +24,9 @@ from icha.figures.curves import (
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.ensembles import LINES_OF_SEEDS, draw_members
-from icha.figures.options import StudyFigure, is_compared
-from icha.figures.palette import FINITE_RANGE_MARKERS, MODEL_MARKERS
-from icha.figures.select import is_short_range, study_errors
+from icha.figures.options import StudyFigure, finite_range_error
+from icha.figures.palette import FINITE_RANGE_MARKERS
+from icha.figures.select import finite_range_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
 
@@ -34,10 +36,10 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, theories for their first surface, and boundary elements beside them, if there are any."""
+    """The runs, theories for their first surface, and boundary elements at a finite range beside them, if any."""
     theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
     found = {"campaign": files.path(results.DATASET), "references": theories}
-    return found | ({"model_error": files.path(results.MODEL_ERROR)} if is_compared(campaign, options.study) else {})
+    return found | finite_range_error(campaign, options.study, files)
 
 
 DECLARATION = Declaration(
@@ -52,14 +54,14 @@ DECLARATION = Declaration(
         "of the material; their area is corrected by the perimeter of the contact. At ranges that a grid resolves "
         "they show practically no hysteresis; with adhesion they therefore bound the result in the limit of short "
         "ranges (JKR), but do not determine it. The lower panels show in per cent by how much the asperities differ "
-        "from boundary elements at the same load; where there are none, from the adhesionless theories of Persson "
-        "(area) and of Yang and Persson (separation), as the label of the axis says. Thin dashed lines, if there are "
-        "any, show unloading as long as the load is compressive. Lines without markers are these theories, the linear "
-        "law of Bush, Gibson and Thomas where few summits touch, and the theories of separate summits of Greenwood "
-        "and Williamson (no adhesion) and of Fuller and Tabor (with adhesion, in the colour of the material). The "
-        "theories use the spectral moments of the surface, or of the first one if there are several. Oblique crosses, "
-        "if there are any, are published results of adhesionless Green's function molecular dynamics (GFMD) of "
-        "surfaces with this spectrum."
+        "from boundary elements at the same load, interpolated between the stops of these; where there are none, from "
+        "the adhesionless theories of Persson (area) and of Yang and Persson (separation), as the label of the axis "
+        "says. Thin dashed lines, if there are any, show unloading as long as the load is compressive. Lines without "
+        "markers are these theories, the linear law of Bush, Gibson and Thomas where few summits touch, and the "
+        "theories of separate summits of Greenwood and Williamson (no adhesion) and of Fuller and Tabor (with "
+        "adhesion, in the colour of the material). The theories use the spectral moments of the surface, or of the "
+        "first one if there are several. Oblique crosses, if there are any, are published results of adhesionless "
+        "Green's function molecular dynamics (GFMD) of surfaces with this spectrum."
     ),
     options=StudyFigure,
     inputs=inputs,
@@ -67,6 +69,8 @@ DECLARATION = Declaration(
 
 # Height of the panels of differences, in heights of those above them.
 _LOWER = 0.42
+# Loads that both models are given are the same to this part, for each has its tolerance.
+_SAME_LOAD = 1e-6
 
 
 @styled
@@ -83,7 +87,8 @@ def figure(
     ----------
     campaign : the campaign dataset.
     references : theories and points for the study's first surface (`icha.references.theories`), if any.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements beside runs, if any.
+    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements at a finite range, if
+        any.
     study : name of the study.
 
     Raises
@@ -92,7 +97,7 @@ def figure(
         If there is no such study or no run in it.
     """
     curves = study_curves(campaign, study)
-    dataset, entries = campaign[study].to_dataset(), study_errors(model_error, study)
+    dataset, entries = campaign[study].to_dataset(), finite_range_errors(model_error, study)
     differences = _differences(curves, entries, references)
     fig = new_figure(TWO_COLUMNS, 4.5)
     rows = ["ab", "c" + ("d" if differences[1] else "b")]
@@ -106,6 +111,12 @@ def figure(
         p, gap = draw_line(right, line, _separations, logarithmic=True, lines=len(curves.lines))
         gaps.append(gap)
         draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
+    for line in curves.beside:
+        p, area = draw_crosses(left, line, _areas, logarithmic=True)
+        areas.append(area)
+        pressures.append(p)
+        p, gap = draw_crosses(right, line, _separations, logarithmic=True)
+        gaps.append(gap)
     for ax in (left, right):
         logarithmic_axes(ax)
     if curves.unloaded:
@@ -163,18 +174,20 @@ def _differences(curves, entries, references):
     from icha.references.persson import persson_area
 
     # The limit of a short range comes first: the other one with adhesion only bounds it.
-    ordered = sorted(entries.values(), key=lambda errors: not is_short_range(errors))
-    beside = [(line, found) for line in curves.lines if (found := _errors_of(line.labels, ordered)) is not None]
-    if beside:
+    truths = {contact_of(line): line.runs for line in curves.beside}
+    areas, separations = [], []
+    for line in curves.lines:
+        if runs := truths.get(contact_of(line)):
+            areas.append((line, *_from_runs(line.runs, runs, _areas, logarithmic=True)))
+            separations.append((line, *_from_runs(line.runs, runs, _separations, logarithmic=False)))
+        elif (errors := _errors_of(line.labels, entries.values())) is not None:
+            load = errors["reduced_pressure"].values
+            areas.append((line, load, 100 * _by_seed(errors["area_error"])))
+            separations.append((line, load, 100 * _by_seed(errors["separation_error"])))
+    if areas:
         return [
-            _Difference(
-                [(line, errors["reduced_pressure"].values, 100 * _by_seed(errors[name])) for line, errors in beside],
-                label,
-            )
-            for name, label in (
-                ("area_error", r"$A/A_{\mathrm{BEM}}-1$  (%)"),
-                ("separation_error", r"$\bar{u}/\bar{u}_{\mathrm{BEM}}-1$  (%)"),
-            )
+            _Difference(areas, r"$A/A_{\mathrm{BEM}}-1$  (%)"),
+            _Difference(separations, r"$\bar{u}/\bar{u}_{\mathrm{BEM}}-1$  (%)"),
         ]
     found = [_Difference(_from_theory(curves.lines, _areas, persson_area), r"$A/A_{\mathrm{Persson}}-1$  (%)")]
     if references is None or "persson_reduced_separation" not in references:
@@ -184,9 +197,30 @@ def _differences(curves, entries, references):
     return [*found, _Difference(drawn, r"$\bar{u}/\bar{u}_{\mathrm{Persson}}-1$  (%)")]
 
 
-def _errors_of(labels, ordered):
+def _from_runs(runs, truths, points, *, logarithmic):
+    """Loads, and differences in per cent (seeds, loads), of runs from those by boundary elements with the same seed.
+
+    They are at the runs' own loads as far as boundary elements reach, between whose stops values are interpolated.
+    """
+    from icha.analysis.common_loads import at_common_loads, interpolated
+
+    by_seed, members = {int(truth["seed"]): truth for truth in truths}, []
+    for run in runs:
+        if int(run["seed"]) in by_seed:
+            (load, values), (true_load, true_values) = points(run), points(by_seed[int(run["seed"])])
+            pressed = true_load > 0
+            if pressed.any():
+                true_load, true_values = true_load[pressed], true_values[pressed]
+                at = np.clip(load, true_load.min(), true_load.max())
+                reached = np.isclose(at, load, rtol=_SAME_LOAD, atol=0)
+                true_values = interpolated(true_load, true_values, at[reached], logarithmic=logarithmic)
+                members.append((load[reached], 100 * (values[reached] / true_values - 1)))
+    return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
+
+
+def _errors_of(labels, entries):
     """The error of the runs of a line from the first of some entries that has it, or None."""
-    for errors in ordered:
+    for errors in entries:
         slopes = np.flatnonzero(np.isclose(errors["rms_slope"].values, labels.rms_slope, rtol=1e-6))
         if labels.material in errors["material"].values and labels.surface in errors["surface"].values and len(slopes):
             own = errors.sel(material=labels.material, surface=labels.surface).isel(rms_slope=slopes[0])
@@ -233,7 +267,7 @@ def _separations(run):
 
 
 def _draw_solutions(left, right, colours, entries):
-    """Mark the states of boundary elements, means over their seeds; returns pressures, areas and separations."""
+    """Mark the states of boundary elements at a finite range, means over their seeds; returns loads and values."""
     states, drawn, named = [], [], set()
     for entry, errors in entries.items():
         name = errors.attrs["truth"]
@@ -250,7 +284,7 @@ def _draw_solutions(left, right, colours, entries):
             there = np.isfinite(area)
             look = {
                 "ls": "none",
-                "marker": MODEL_MARKERS[name] if is_short_range(errors) else FINITE_RANGE_MARKERS[again % 4],
+                "marker": FINITE_RANGE_MARKERS[again % 4],
                 "mec": colours.get(material, GREY),
                 "mew": 1.0,
                 # The larger ones show behind the others where the results agree, as the runs' markers do.

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import material_looks, plausible, say_which_snapshots
+from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
+from icha.figures.curves import material_looks, model_name, plausible, say_which_snapshots
 from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, lines_handles
 from icha.figures.legends import legend_below, named_handles
-from icha.figures.options import SnapshotFigure, is_compared
-from icha.figures.palette import ASPERITIES_NAME, MODEL_MARKERS, model_handle
-from icha.figures.select import first_line, study_errors
+from icha.figures.options import SnapshotFigure, finite_range_error
+from icha.figures.palette import BESIDE_LINE, MODEL_MARKERS, model_handle
+from icha.figures.select import finite_range_errors, first_line, same_snapshots_by_boundary_elements
 from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, styled
 
 if TYPE_CHECKING:
@@ -23,9 +24,8 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: SnapshotFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, and boundary elements beside them, if there are any."""
-    compared = {"model_error": files.path(results.MODEL_ERROR)} if is_compared(campaign, options.study) else {}
-    return {"campaign": files.path(results.DATASET)} | compared
+    """The runs, and boundary elements at a finite range beside them, if there are any."""
+    return {"campaign": files.path(results.DATASET)} | finite_range_error(campaign, options.study, files)
 
 
 DECLARATION = Declaration(
@@ -52,8 +52,7 @@ DECLARATION = Declaration(
 _LEAST_CELLS = 100
 # The same for the nodes in contact, which are few.
 _LEAST_NODES = 25
-_MOST_MARKERS, _TRUTH_MARKERS = 40, 14
-_TRUTH = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
+_MOST_MARKERS, _BESIDE_MARKERS = 40, 14
 
 
 @styled
@@ -70,7 +69,8 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements of the states, if any.
+    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements at a finite range of
+        the states that those in the limit of a short range lack, if any.
     study : name of the study.
     kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
 
@@ -88,7 +88,8 @@ def figure(
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2)
     lowest, highest, top, named, floor = -0.3, 0.3, 0.0, {}, []
-    for line, look in zip(lines, looks, strict=True):
+    truths = same_snapshots_by_boundary_elements(campaign, lines)
+    for line, truth, look in zip(lines, truths, looks, strict=True):
         u, densities = gap_densities(line.members)
         drawn = {"positive": True, "lines": len(lines)}
         draw_members(left, u, densities, look, **drawn, markevery=1 + len(u) // _MOST_MARKERS)
@@ -102,15 +103,14 @@ def figure(
             top = max(top, density.max())
         loads = [float(state_of(run, at)["reduced_pressure"]) for run, at in line.members]
         load = float(np.mean(loads))
-        truths = _solutions(study_errors(model_error, study), line, loads)
-        if truths:
-            name = truths[0].attrs["truth"]
-            for ax, points in ((left, solution_gap_points), (right, solution_pressure_points)):
-                at, density = points(*truths)
-                every = 1 + len(at) // _TRUTH_MARKERS
-                ax.plot(at, density, color=look["color"], marker=MODEL_MARKERS[name], markevery=every, **_TRUTH)
-                top = max(top, density.max(initial=0.0)) if ax is right else top
-            named[name] = model_handle(name, **_TRUTH)
+        distributions = _of_boundary_elements(truth, _solutions(finite_range_errors(model_error, study), line, loads))
+        if distributions:
+            name = distributions.name
+            for ax, (at, density) in ((left, distributions.gaps), (right, distributions.pressures)):
+                every = 1 + len(at) // _BESIDE_MARKERS
+                ax.plot(at, density, color=look["color"], marker=MODEL_MARKERS[name], markevery=every, **BESIDE_LINE)
+            top = max(top, distributions.pressures[1].max(initial=0.0))
+            named[name] = model_handle(name, **BESIDE_LINE)
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
@@ -128,9 +128,36 @@ def figure(
         right.set_ylim(top * 5e-5, top * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
     seeds = lines_handles(len(line.members) for line in lines)
-    models = {ASPERITIES_NAME: model_handle(ASPERITIES_NAME, ls="-", lw=0.8, mfc="white")} | named
+    own = model_name(dataset)
+    models = {own: model_handle(own, ls="-", lw=0.8, mfc="white")} | named
     legend_below(fig, named_handles([left]) | models | seeds | named_handles([right]))
     return fig
+
+
+class _Beside(NamedTuple):
+    """What is drawn of boundary elements: which they are, u/h_rms and P(u) h_rms, p/(E* h'_rms) and P(p) E* h'_rms."""
+
+    name: str
+    gaps: tuple[np.ndarray, np.ndarray]
+    pressures: tuple[np.ndarray, np.ndarray]
+
+
+def _of_boundary_elements(truth, solutions):
+    """Means over the seeds of the distributions of runs in the limit of a short range, or of solutions; or None."""
+    if truth.members:
+        u, gaps = gap_densities(truth.members)
+        edges, pressures = _reduced_pressure_densities(truth.members)
+        grid = int(truth.members[0][0]["grid"])
+        return _Beside(SHORT_RANGE, (u, gaps.mean(axis=0)), _pressure_points(edges, pressures, grid))
+    if not solutions:
+        return None
+    gaps, pressures = (
+        np.array([solution[name].values for solution in solutions]) for name in ("gap_density", "pressure_density")
+    )
+    first, grid = solutions[0], int(solutions[0]["solution_grid"])
+    u, gaps = _gap_densities(first["gap_bin_edges"].values, gaps, grid)
+    points = _pressure_points(first["pressure_bin_edges"].values, pressures, grid)
+    return _Beside(FINITE_RANGE, (u, gaps.mean(axis=0)), points)
 
 
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
@@ -149,30 +176,29 @@ def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray
 
 def pressure_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
     """p/(E* h'_rms) (k,) and P(p) E* h'_rms (members, k) of the bins of snapshots that hold anything."""
-    (first, _), *_ = members
-    unit = float(first["contact_modulus"]) * float(first["rms_slope"])
-    edges = first["pressure_bin_edges"].values / unit
-    densities = np.array([run["pressure_density"].values[at] * unit for run, at in members])
+    edges, densities = _reduced_pressure_densities(members)
     filled = densities.max(axis=0) > 0
     return (0.5 * (edges[1:] + edges[:-1]))[filled], densities[:, filled]
 
 
-def solution_gap_points(*truths: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """u/h_rms and P(u) h_rms of boundary elements, states of the model error, the mean of all; bins joined as above."""
-    densities = np.array([truth["gap_density"].values for truth in truths])
-    at, densities = _gap_densities(truths[0]["gap_bin_edges"].values, densities, int(truths[0]["solution_grid"]))
-    return at, densities.mean(axis=0)
+def _reduced_pressure_densities(members):
+    """Edges of the bins of p/(E* h'_rms), and P(p) E* h'_rms (members, bins)."""
+    (first, _), *_ = members
+    unit = float(first["contact_modulus"]) * float(first["rms_slope"])
+    return first["pressure_bin_edges"].values / unit, np.array(
+        [run["pressure_density"].values[at] * unit for run, at in members]
+    )
 
 
-def solution_pressure_points(*truths: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+def _pressure_points(edges, densities, grid):
     """p/(E* h'_rms) and P(p) E* h'_rms of boundary elements, the mean of all; bins joined until they hold nodes."""
-    edges = truths[0]["pressure_bin_edges"].values
-    content = np.array([truth["pressure_density"].values for truth in truths]) * np.diff(edges)
+    content = densities * np.diff(edges)
     held = np.flatnonzero(content.any(axis=0))
+    if not len(held):  # before first contact
+        return np.empty(0), np.empty(0)
     inside = slice(held[0], held[-1] + 1)
-    least = _LEAST_NODES / int(truths[0]["solution_grid"]) ** 2
-    low, high, densities = _joined(edges[held[0] : held[-1] + 2], content[:, inside], least)
-    return 0.5 * (low + high), densities.mean(axis=0)
+    low, high, joined = _joined(edges[held[0] : held[-1] + 2], content[:, inside], _LEAST_NODES / grid**2)
+    return 0.5 * (low + high), joined.mean(axis=0)
 
 
 def _gap_densities(edges, densities, grid):

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from icha.datasets import results
 from icha.datasets.measured_table import read_columns
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
     UNLOADING,
-    Line,
+    draw_crosses,
     draw_line,
     draw_ways_back,
     study_curves,
@@ -22,8 +21,6 @@ from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.ensembles import LINES_OF_SEEDS, lines_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import TruthFigure
-from icha.figures.palette import MODEL_MARKERS, model_handle
-from icha.figures.select import path_steps, runs_by_boundary_elements
 from icha.figures.style import (
     BLACK,
     DASHES,
@@ -83,9 +80,9 @@ DECLARATION = Declaration(
         "the curves of one topography that is scaled to different slopes are one curve in (a). What adhesion adds "
         "depends on the material and grows as the slope falls. In (b) the curves are ordered by slope: at a given "
         "load the area falls as the slope rises. Upright crosses, if there are any, are boundary elements in the "
-        "limit of a short range of attraction, on the same topographies, in the colour of the material. Thin dashed "
-        "lines, if there are any, show unloading as long as the load is compressive. Measurements, if there are any, "
-        "are drawn as lines."
+        "limit of a short range of attraction, on the same topographies (means over their seeds), in the colour of the "
+        "material. Thin dashed lines, if there are any, show unloading as long as the load is compressive. "
+        "Measurements, if there are any, are drawn as lines."
     ),
     options=TruthFigure,
     inputs=inputs,
@@ -118,7 +115,7 @@ def figure(
     ValueError
         If there is no such study or no run in it, or a table cannot be read.
     """
-    curves = study_curves(campaign, study)
+    curves = study_curves(campaign, study, boundary_elements)
     dataset = campaign[study].to_dataset()
     # Of curves that lie on each other all stay visible: later materials have smaller markers.
     drawn = [
@@ -136,7 +133,9 @@ def figure(
         draw_ways_back([(left, lambda p, a, _: (p, a)), (right, lambda p, a, _, slope=slope: (p * slope, a))], line)
         draw_line(left, line, _points, logarithmic=True, lines=len(curves.lines))
         draw_line(right, line, _points_at_load, logarithmic=True, lines=len(curves.lines))
-    crosses = _draw_boundary_elements((left, right), campaign, boundary_elements or study, curves.colours)
+    for line in curves.beside:
+        draw_crosses(left, line, _points, logarithmic=True)
+        draw_crosses(right, line, _points_at_load, logarithmic=True)
     for ax in (left, right):
         logarithmic_axes(ax)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
@@ -150,7 +149,7 @@ def figure(
     unloading = {"unloading": legend_handle(color=GREY, **UNLOADING)} if curves.unloaded else {}
     seeds = lines_handles(len(line.runs) for line in curves.lines)
     open_shapes = {} if curves.scale else {material_label(dataset, m): _open(curves.colours[m], size[m]) for m in size}
-    legend_below(fig, curves.handles | open_shapes | crosses | unloading | seeds | named_handles([left]))
+    legend_below(fig, curves.handles | open_shapes | unloading | seeds | named_handles([left]))
     for ax, letter in ((left, "a"), (right, "b")):
         panel_label(ax, letter)
     return fig
@@ -159,24 +158,6 @@ def figure(
 def _open(colour, size):
     """What the legend shows of a material."""
     return legend_handle(ls="none", marker="o", color=colour, mfc="none", mew=1.1, ms=size)
-
-
-def _draw_boundary_elements(panels, campaign, study, colour):
-    """Mark the runs of a study by boundary elements, means over their seeds; returns their entry of the legend."""
-    runs = runs_by_boundary_elements(campaign, study)
-    lines: dict[tuple, list] = {}
-    for labels, run in runs:
-        lines.setdefault((labels.surface, labels.rms_slope, labels.material), []).append((labels, run))
-    for (*_, material), members in lines.items():
-        (first, *_), own = zip(*members, strict=True)
-        look = _CROSS | dict.fromkeys(("color", "mec"), colour.get(material, GREY))
-        line = Line(first, [path_steps(run) for run in own], [], look)
-        for ax, points in zip(panels, (_points, _points_at_load), strict=True):
-            draw_line(ax, line, points, logarithmic=True, lines=len(lines))
-    return {SHORT_RANGE: model_handle(SHORT_RANGE)} if runs else {}
-
-
-_CROSS = {"ls": "none", "marker": MODEL_MARKERS[SHORT_RANGE], "ms": 8, "mew": 1.0, "zorder": 6}
 
 
 def _draw_measured(left, right, table, known, colour, dashes):

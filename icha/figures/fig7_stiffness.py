@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import PRESSURE_LABEL, add_legend, draw_line, plausible, study_curves, whose_theories
+from icha.figures.curves import (
+    PRESSURE_LABEL,
+    add_legend,
+    draw_crosses,
+    draw_line,
+    plausible,
+    study_curves,
+    whose_theories,
+)
 from icha.figures.declaration import Campaign, Declaration, Inputs
 from icha.figures.ensembles import LINES_OF_SEEDS
 from icha.figures.options import StudyFigure
@@ -30,12 +38,14 @@ DECLARATION = Declaration(
     caption=(
         "Contact stiffness K = -dp/du, the derivative of the nominal pressure p with respect to the mean separation "
         "u, against the reduced pressure F/(E* h'rms A0). It is in units of E* h'rms/h_rms (a) and of p/h_rms (b), "
-        "where the law K = p/u0 is a constant. Markers are interacting asperities, whose stiffness is that of the "
-        "tangent of the equilibrium with the present spots; runs by boundary elements are not drawn. Open markers are "
-        f"without adhesion. {LINES_OF_SEEDS} States under tension or with negative stiffness cannot be shown on these "
-        "axes. The line is the derivative of the adhesionless separation of Yang and Persson for an infinite surface. "
-        "On a finite surface, the stiffness at small loads lies above the proportional law, since only its highest "
-        "parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
+        "where the law K = p/u0 is a constant. Closed and open shapes are interacting asperities, whose stiffness is "
+        "that of the tangent of the equilibrium with the present spots; open ones are without adhesion. "
+        f"{LINES_OF_SEEDS} Upright crosses, if there are any, are boundary elements in the limit of a short range of "
+        "attraction, on the same topographies (means over their seeds), in the colour of the material; their stiffness "
+        "is that of the tangent along which the edges of contact move. States under tension or with negative stiffness "
+        "cannot be shown on these axes. The line is the derivative of the adhesionless separation of Yang and Persson "
+        "for an infinite surface. On a finite surface, the stiffness at small loads lies above the proportional law, "
+        "since only its highest parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
     ),
     options=StudyFigure,
     inputs=inputs,
@@ -64,6 +74,11 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     for line in curves.lines:
         p, stiffness = draw_line(left, line, stiffness_points, logarithmic=True, lines=len(curves.lines))
         draw_line(right, line, _over_pressure, logarithmic=True, lines=len(curves.lines))
+        pressures.append(p)
+        stiffnesses.append(stiffness)
+    for line in curves.beside:
+        p, stiffness = draw_crosses(left, line, stiffness_points, logarithmic=True)
+        draw_crosses(right, line, _over_pressure, logarithmic=True)
         pressures.append(p)
         stiffnesses.append(stiffness)
     logarithmic_axes(left)

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.curves import material_looks, say_which_snapshots
+from icha.datasets.variables.model_error import SHORT_RANGE
+from icha.figures.curves import material_looks, model_name, say_which_snapshots
 from icha.figures.declaration import Declaration
 from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, lines_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import SnapshotFigure
-from icha.figures.select import first_line
+from icha.figures.palette import BESIDE_LINE, MODEL_MARKERS, model_handle
+from icha.figures.select import first_line, same_snapshots_by_boundary_elements
 from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, styled, unit_for
 
 if TYPE_CHECKING:
@@ -26,7 +28,10 @@ DECLARATION = Declaration(
         "Sizes of the contact patches, which are the areas A of the spots (united spots count as one), at the load "
         "given in the figure, by interacting asperities; open markers are without adhesion. Panel (a) shows the "
         "number density n(A) per area of a patch and per nominal area, where bins with few patches are joined. Panel "
-        f"(b) shows the number of patches larger than A per nominal area, down to the largest patch. {LINES_OF_SEEDS}"
+        f"(b) shows the number of patches larger than A per nominal area, down to the largest patch. {LINES_OF_SEEDS} "
+        "Dashed lines, with crosses in (a), if there are any, are boundary elements in the limit of a short range of "
+        "attraction, on the same topographies (means over the seeds that have them), in the colour of the material; "
+        "their patches are regions of cells in contact that share edges."
     ),
     options=SnapshotFigure,
 )
@@ -64,22 +69,34 @@ def figure(
     looks, scale = material_looks(campaign, study, [line.labels.material for line in lines])
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2, sharex=True)
-    for line, look in zip(lines, looks, strict=True):
-        period = float(line.members[0][0]["period"])
-        factor, unit = unit_for(period, "m")
-        cell = (period * factor) ** 2
-        areas = [patch_areas(run, at) * factor**2 for run, at in line.members]
+    truths = same_snapshots_by_boundary_elements(campaign, lines)
+    period = float(lines[0].members[0][0]["period"])
+    factor, unit = unit_for(period, "m")
+    cell = (period * factor) ** 2
+    for line, truth, look in zip(lines, truths, looks, strict=True):
+        areas, true_areas = ([patch_areas(run, at) * factor**2 for run, at in each.members] for each in (line, truth))
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
-        for ax, points, own in ((left, patch_density, look), (right, patches_above, smooth)):
-            area, values = points(areas, cell)
-            draw_members(ax, area, values, own, positive=True, lines=len(lines))
+        for ax, points, own, marker in (
+            (left, patch_density, look, MODEL_MARKERS[SHORT_RANGE]),
+            (right, patches_above, smooth, "none"),
+        ):
+            draw_members(ax, *points(areas, cell), own, positive=True, lines=len(lines))
+            if truth.members:
+                area, values = points(true_areas, cell)
+                ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **BESIDE_LINE)
     for ax in (left, right):
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
     say_which_snapshots(fig, [left, right], dataset, lines, scale)
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    legend_below(fig, named_handles([left]) | lines_handles(len(line.members) for line in lines))
+    models = {model_name(dataset): {"ls": "-", "lw": 0.8, "mfc": "white"}}
+    if any(truth.members for truth in truths):
+        models[SHORT_RANGE] = BESIDE_LINE
+    seeds = lines_handles(len(line.members) for line in lines)
+    legend_below(
+        fig, named_handles([left]) | {name: model_handle(name, **look) for name, look in models.items()} | seeds
+    )
     return fig
 
 

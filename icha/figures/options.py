@@ -142,7 +142,17 @@ class ComparedFigure(StudyFigure):
 
 def is_compared(campaign: Campaign, study: str) -> bool:
     """Whether there are boundary elements beside the runs of a study, in either limit of the range."""
-    return campaign.compares_models(study) or any(entry.study == study for entry in campaign.boundary_elements.values())
+    return campaign.compares_models(study) or is_solved_at_finite_range(campaign, study)
+
+
+def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
+    """Whether there are boundary elements at a finite range beside the runs of a study."""
+    return any(entry.study == study for entry in campaign.boundary_elements.values())
+
+
+def finite_range_error(campaign: Campaign, study: str, files: results.ResultFiles) -> Inputs:
+    """The error against boundary elements at a finite range as an input, where there are any beside a study."""
+    return {"model_error": files.path(results.MODEL_ERROR)} if is_solved_at_finite_range(campaign, study) else {}
 
 
 def not_unloaded(campaign: Campaign, location: tuple, name: str, *, in_part: bool) -> Iterator[Problem]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import contextlib
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from icha.contact.models import BOUNDARY_ELEMENTS, first_of
 from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.variables.model_error import SHORT_RANGE
+from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.style import number, slope_label
 
 if TYPE_CHECKING:
@@ -57,8 +58,10 @@ def study_runs(
     return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
 
 
-def runs_by_boundary_elements(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All complete runs of a study by boundary elements, without spots and events; none if there are none.
+def runs_by_boundary_elements(
+    campaign: xr.DataTree, study: str, *, ragged: bool = False
+) -> list[tuple[RunLabels, xr.Dataset]]:
+    """All complete runs of a study by boundary elements, without patches and events if not `ragged`; none if none are.
 
     Raises
     ------
@@ -66,13 +69,13 @@ def runs_by_boundary_elements(campaign: xr.DataTree, study: str) -> list[tuple[R
         If the campaign has no such study.
     """
     try:
-        return study_runs(campaign, study, ragged=False, model=BOUNDARY_ELEMENTS)
+        return study_runs(campaign, study, ragged=ragged, model=BOUNDARY_ELEMENTS)
     except NothingToDraw:
         return []
 
 
 def shown_model(study: xr.Dataset) -> str:
-    """The model whose runs figures show of a study: asperities, or else the study's first."""
+    """The model whose runs figures show first of a study: asperities, or else the study's first."""
     return first_of(study["model"].values.tolist())
 
 
@@ -188,7 +191,7 @@ class Snapshots(NamedTuple):
 def first_line(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
-    """Of every material on the first surface and slope of a study a snapshot of every seed.
+    """Of every material on the first surface and slope of a study a snapshot of every seed, by its `shown_model`.
 
     Raises
     ------
@@ -205,6 +208,25 @@ def first_line(
             own = found.setdefault(labels.material, Snapshots(labels, []))
             own.members.append((run, find_snapshot(run, kind, target)))
     return list(found.values())
+
+
+def same_snapshots_by_boundary_elements(campaign: xr.DataTree, lines: Sequence[Snapshots]) -> list[Snapshots]:
+    """For every line by asperities the same snapshot by boundary elements, of those seeds that keep it, if any."""
+    from icha.datasets.campaign import find_snapshot
+
+    found = [Snapshots(line.labels._replace(model=BOUNDARY_ELEMENTS), []) for line in lines]
+    first = lines[0].labels
+    if first.model == BOUNDARY_ELEMENTS:
+        return found
+    truths = runs_by_boundary_elements(campaign, first.study, ragged=True)
+    for line, beside in zip(lines, found, strict=True):
+        run, at = line.members[0]
+        asked = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
+        for labels, truth in truths:
+            if labels._replace(seed=beside.labels.seed) == beside.labels:
+                with contextlib.suppress(ValueError):  # a run that does not keep it
+                    beside.members.append((truth, find_snapshot(truth, *asked)))
+    return found
 
 
 def name_of_place(dataset: xr.Dataset, surface: str, rms_slope: float) -> str:
@@ -229,12 +251,13 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     return f"{_KIND_LABELS[kind]} = {number(value)}"
 
 
-def is_short_range(errors: xr.Dataset) -> bool:
-    """Whether an entry of a model error compares with boundary elements in the limit of a short range."""
-    return errors.attrs["truth"] == SHORT_RANGE
-
-
 def study_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:
     """The entries of a model error that compare the runs of a study, by name; none where no error is given."""
     entries = model_error.children if model_error is not None else {}
     return {name: node.to_dataset() for name, node in entries.items() if node.attrs["study"] == study}
+
+
+def finite_range_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:
+    """Those of `study_errors` that compare with boundary elements at a finite range."""
+    entries = study_errors(model_error, study)
+    return {name: errors for name, errors in entries.items() if errors.attrs["truth"] == FINITE_RANGE}

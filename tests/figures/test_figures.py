@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.colors import to_hex, to_rgb
 
 import icha
-from icha.analysis.model_error import jaccard, model_error
+from icha.analysis.model_error import jaccard
 from icha.datasets.campaign import campaign_tree, find_snapshot
 from icha.datasets.files import read_dataset
 from icha.datasets.labels import RunLabels
@@ -85,8 +85,10 @@ def draw(name, surface):
         "fig8": lambda: fig8_patch_sizes.figure(tree, study="slopes"),
         "fig8_one": lambda: fig8_patch_sizes.figure(tree, study="single", kind="area_fraction"),
         "fig9": lambda: fig9_tabor.figure(tree, study="slopes"),
-        "fig2_truth": lambda: fig2_area_and_gap.figure(compared.tree(), None, compared.errors(), study="one"),
+        "fig2_truth": lambda: fig2_area_and_gap.figure(compared.tree_of_both(), None, compared.errors(), study="one"),
         "fig3_truth": lambda: fig3_distributions.figure(compared.tree(), compared.errors(), study="one"),
+        "fig7_truth": lambda: fig7_stiffness.figure(compared.tree_of_both(), study="one"),
+        "fig8_truth": lambda: fig8_patch_sizes.figure(compared.tree_of_both(), study="one"),
         "fig4_truth": lambda: fig4_contact_map.figure(compared.tree(), surface, solution(), study="one"),
         "fig10": lambda: fig10_model_error.figure(compared.tree(), compared.errors(), study="one"),
         "fig11": lambda: fig11_distribution_error.figure(compared.tree(), compared.errors(), study="one"),
@@ -98,7 +100,8 @@ def draw(name, surface):
 
 NAMES = ["fig1", "fig2", "fig2_alone", "fig3", "fig3_one", "fig4", "fig5", "fig5_one", "fig6", "fig6_one"]
 NAMES += ["fig7", "fig7_alone", "fig8", "fig8_one", "fig9", "fig9_one"]
-NAMES += ["fig2_loops", "fig5_loops", "fig2_truth", "fig3_truth", "fig4_truth", "fig10", "fig11"]
+NAMES += ["fig2_loops", "fig5_loops", "fig2_truth", "fig3_truth", "fig4_truth", "fig7_truth", "fig8_truth"]
+NAMES += ["fig10", "fig11"]
 FIGURES = [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope]
 FIGURES += [fig7_stiffness, fig8_patch_sizes, fig9_tabor]
 KIND = "reduced_pressure"
@@ -449,7 +452,8 @@ def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
 
 
 def test_fig2_marks_both_kinds_of_boundary_elements():
-    figure = fig2_area_and_gap.figure(compared.tree(), None, compared.short_range_errors(), study="one")
+    tree = compared.tree_of_both(area=1.5, separation=0.9)
+    figure = fig2_area_and_gap.figure(tree, None, compared.short_range_errors(), study="one")
     runs = compared.runs()
     for axes, name, factor in zip(
         figure.axes[:2], ("contact_area_fraction", "reduced_separation"), (1.5, 0.9), strict=True
@@ -506,23 +510,29 @@ def test_fig3_shows_boundary_elements_of_the_same_state_only():
     only = compared.errors().isel(reduced_pressure=[1])
     assert crosses(only) == [[], []]
     # These solutions are the runs' own states, so that their points lie on those of the runs.
-    truth = compared.errors()["bare"].to_dataset().isel(surface=0, seed=0, rms_slope=0, material=0, reduced_pressure=0)
-    truth["solution_grid"] = 32
-    u, (density,) = fig3_distributions.gap_densities(
-        [(compared.runs()["one", "asperities", "rough", 1, 1.0, "hertz"], 0)]
-    )
-    for drawn, own in zip(fig3_distributions.solution_gap_points(truth), (u, density), strict=True):
-        np.testing.assert_allclose(drawn, own, rtol=1e-9)
+    bare = compared.errors()["bare"].to_dataset()
+    bare["solution_grid"] = xr.full_like(bare["solution_grid"], 32)
+    (drawn,) = crosses(xr.DataTree.from_dict({"/bare": bare}))[0]
+    members = [(run, 0) for labels, run in compared.runs().items() if labels.material == "hertz"]
+    u, densities = fig3_distributions.gap_densities(members)
+    np.testing.assert_allclose(drawn.get_xdata(), u, rtol=1e-9)
+    np.testing.assert_allclose(drawn.get_ydata(), densities.mean(axis=0), rtol=1e-9)
 
 
 def test_fig3_shows_the_limit_of_a_short_range_where_it_is_known():
-    figure = fig3_distributions.figure(compared.tree(), compared.short_range_errors(), study="one", target=3e-3)
+    figure = fig3_distributions.figure(compared.tree_of_both(), compared.errors(), study="one", target=3e-3)
     assert "boundary elements" in legend(figure) and "boundary elements at finite range" not in legend(figure)
-    # Of a load that those runs do not keep, it is the others.
-    kept = [(labels, run.isel(snapshot=[1])) for labels, run in compared.patches()]
-    errors = model_error(compared.tree(), compared.solutions_of_errors(), runs=kept)
-    figure = fig3_distributions.figure(compared.tree(), errors, study="one", target=3e-3)
-    assert "boundary elements at finite range" in legend(figure)
+    (left, *_), (right, *_) = ([each for each in axes.get_lines() if each.get_marker() == "+"] for axes in figure.axes)
+    members = [(run, 0) for labels, run in compared.runs().items() if labels.material == "soft"]
+    u, densities = fig3_distributions.gap_densities(members)
+    np.testing.assert_allclose(left.get_xydata(), np.transpose([u, densities.mean(axis=0)]), rtol=1e-9)
+    assert (
+        right.get_xdata().min() < 0 and left.get_color() == right.get_color() == material_colours(small.tree())["soft"]
+    )
+    # Of a contact without such runs, it is the others.
+    only = campaign_tree([*compared.runs().items(), *compared.patches(lambda labels: labels.material == "soft")])
+    figure = fig3_distributions.figure(only, compared.errors(), study="one", target=3e-3)
+    assert {"boundary elements", "boundary elements at finite range"} <= set(legend(figure))
 
 
 def test_fig3_joined_bins_keep_what_they_hold():
@@ -789,13 +799,13 @@ def test_of_few_seeds_figures_promise_no_confidence_and_show_every_seed():
 
 
 def test_fig2_shows_below_what_the_logarithmic_axes_hide():
-    figure = fig2_area_and_gap.figure(compared.tree(), None, compared.short_range_errors(), study="one")
+    figure = fig2_area_and_gap.figure(compared.tree_of_both(area=1.5, separation=0.9), study="one")
     for axes, factor in zip(figure.axes[2:], (1.5, 0.9), strict=True):
         means = [line for line in axes.get_lines() if line.get_marker() == "o"]
         assert len(means) == 2 and "BEM" in axes.get_ylabel() and axes.get_yscale() == "linear"
         for line in means:
             np.testing.assert_allclose(line.get_ydata(), 100 * (1 / factor - 1), rtol=1e-9)
-            np.testing.assert_array_equal(line.get_xdata(), compared.PRESSURES)
+            np.testing.assert_allclose(line.get_xdata(), compared.PRESSURES, rtol=1e-9)
     # Without boundary elements it is the difference from theory, of the separation only where there is one.
     references = reference_dataset(small.SPECTRUM)
     figure = fig2_area_and_gap.figure(small.tree(), references, study="slopes")
@@ -814,12 +824,61 @@ def test_fig2_shows_below_what_the_logarithmic_axes_hide():
     assert len(fig2_area_and_gap.figure(small.tree(), study="slopes").axes) == 3
 
 
+def test_fig2_compares_models_at_equal_loads_whatever_their_stops():
+    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
+    run = compared.runs()[labels]
+    truth = compared.own_patches(run, area=1.5)
+    truth["reduced_pressure"] = 1.1 * truth["reduced_pressure"]
+    both = campaign_tree([(labels, run), (labels._replace(model="boundary_elements"), truth)])
+    figure = fig2_area_and_gap.figure(both, study="one")
+    (crosses,) = [line for line in figure.axes[0].get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
+    np.testing.assert_allclose(crosses.get_xdata(), 1.1 * np.array(compared.PRESSURES), rtol=1e-9)
+    # The lowest load lies below all of boundary elements; between two points logarithms are interpolated linearly.
+    (line,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "o"]
+    area = path_steps(run)["contact_area_fraction"].values
+    true_area = np.exp(np.interp(np.log(1e-2), np.log(crosses.get_xdata()), np.log(1.5 * area)))
+    np.testing.assert_allclose(line.get_xydata(), [(1e-2, 100 * (area[1] / true_area - 1))], rtol=1e-6)
+
+
+def test_stiffness_and_patches_of_boundary_elements_stand_beside_those_of_asperities():
+    tree = compared.tree_of_both()
+    colours = material_colours(tree)
+    figure = fig7_stiffness.figure(tree, study="one")
+    for axes in figure.axes:
+        crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
+        circles = {line.get_color(): line for line in axes.get_lines() if line.get_marker() == "o"}
+        assert {line.get_color() for line in crosses} == set(circles) == set(colours.values())
+        for line in crosses:  # made of the same states
+            np.testing.assert_allclose(line.get_xydata(), circles[line.get_color()].get_xydata(), rtol=1e-9)
+    assert legend(figure).count("boundary elements") == 1
+    figure = fig8_patch_sizes.figure(tree, study="one", target=3e-3)
+    for axes in figure.axes:
+        dashed = [line for line in axes.get_lines() if line.is_dashed()]
+        assert {line.get_color() for line in dashed} == set(colours.values())
+        solid = [line.get_xydata() for line in axes.get_lines() if not line.is_dashed()]
+        for line in dashed:
+            assert any(np.array_equal(line.get_xydata(), own) for own in solid)
+    assert {"asperities", "boundary elements"} <= set(legend(figure))
+    for module in (fig7_stiffness, fig8_patch_sizes):
+        assert "boundary elements" not in legend(module.figure(compared.tree(), study="one"))
+
+
+def test_figures_of_boundary_elements_alone_call_them_so():
+    alone = campaign_tree(compared.patches())
+    for module in (fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig7_stiffness, fig8_patch_sizes):
+        figure = module.figure(alone, study="one")
+        assert legend(figure).count("boundary elements") == 1 and "asperities" not in legend(figure)
+        assert "+" in {line.get_marker() for line in figure.axes[0].get_lines()}
+        assert "o" not in {line.get_marker() for line in figure.axes[0].get_lines()}
+
+
 def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_campaign(surface):
     # Another study names the materials in another order.
     first = [
         (RunLabels("first", *labels[1:]), run) for labels, run in compared.runs().items() if labels.material == "hertz"
     ]
-    tree, errors = campaign_tree([*first, *compared.runs().items()]), compared.short_range_errors()
+    tree = campaign_tree([*first, *compared.runs().items(), *compared.patches(area=1.5)])
+    errors = compared.short_range_errors()
     colours = material_colours(tree)
     assert list(colours) == ["hertz", "soft"] and len(set(colours.values())) == 2
     soft = colours["soft"]
