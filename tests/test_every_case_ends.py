@@ -73,6 +73,14 @@ UPHILL_AND_DOWNHILL = Case(
     "asperities",
 )
 
+# Of a union that came apart the two spots overlap again as they settle, where the tension is largest.
+PARTED_SPOTS_THAT_OVERLAP = Case(
+    Topography("step", grid=8, size=0.3, seed=0, period=PERIOD, height=1e-6, boundary="periodic"),
+    (1e6, 0.11231294684902415, 1e-6),
+    {"mean_separations": [1.723e-6], "max_step": 0.5, "snapshots": None, "unload": True},
+    "asperities",
+)
+
 
 def pytest_generate_tests(metafunc):
     """One test for each series."""
@@ -116,6 +124,7 @@ def test_every_case_ends(series, bounded):
     @example(LOOP_WITH_A_STEP_IN_TWO)
     @example(ONE_THAT_STAYS_OF_THREE)
     @example(UPHILL_AND_DOWNHILL)
+    @example(PARTED_SPOTS_THAT_OVERLAP)
     def ends(case):
         bounded()
         completed.append(False)

@@ -17,7 +17,8 @@ from icha.surfaces.surface import Surface
 class GapDistribution:
     """P(u) over the nominal area: bin edges in m, density in 1/m; overlap is the area fraction of negative gaps.
 
-    beyond_edges: part of the nominal area by which spots reach over the edges of a free square.
+    beyond_edges: part of the nominal area by which A/A0 exceeds what spots cover of it: where they reach over the edges
+    of a free square, and where two that came apart overlap.
     """
 
     edges: np.ndarray
@@ -59,9 +60,9 @@ def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndar
 def gap_distribution(law: SpotLaw, surface: Surface, state: ContactState) -> GapDistribution:
     """P(u) from the gap field; cells on the edge of a spot count with the part that lies outside.
 
-    integral of P(u) + A/A0 + overlap = 1; for a free square, 1 plus what its spots have beyond the edges. Where the
-    node of a cell lies inside a spot, the outer part of the cell has gap zero: it is the spot's edge. The last bin also
-    counts what lies beyond it. The field is never held as a whole.
+    integral of P(u) + A/A0 + overlap = 1 + beyond_edges. Where the node of a cell lies inside a spot, the outer part of
+    the cell has gap zero: it is the spot's edge. The last bin also counts what lies beyond it. The field is never held
+    as a whole.
     """
     edges = gap_bins(surface)
     spots = state.spots
@@ -83,14 +84,14 @@ def gap_distribution(law: SpotLaw, surface: Surface, state: ContactState) -> Gap
         place = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
         cut = np.flatnonzero(cover)
         hidden = np.bincount(place[cut], weights=np.clip(cover.ravel()[cut], 0.0, 1.0), minlength=len(edges))
-        return np.bincount(place, minlength=len(edges)) - hidden, np.sum(cover)
+        return np.bincount(place, minlength=len(edges)) - hidden, np.sum(cover), np.sum(np.maximum(cover - 1.0, 0.0))
 
-    content, covered = zip(*field.in_blocks(nodes_per_bin), strict=True)
+    content, covered, twice = zip(*field.in_blocks(nodes_per_bin), strict=True)
     content = np.sum(content, axis=0) / surface.grid**2
-    beyond = 0.0
+    beyond = float(sum(twice)) / surface.grid**2
     if surface.free:
         area = np.sum(np.pi * spots.contact_radius**2) / surface.period**2
-        beyond = max(float(area - sum(covered) / surface.grid**2), 0.0)
+        beyond += max(float(area - sum(covered) / surface.grid**2), 0.0)
     return GapDistribution(edges, content[1:] / np.diff(edges), float(content[0]), beyond)
 
 

@@ -67,6 +67,16 @@ def test_one_asperity_loses_what_lies_between_jump_in_and_jump_off():
     assert waypoints[-1].balance.work * contact.area == pytest.approx(total, rel=1e-9)
 
 
+@pytest.mark.parametrize("beyond", [0.0, 0.1, 3.0])
+def test_a_jump_into_contact_sets_free_no_less_where_it_is_found_late(beyond):
+    contact = contact_of([HEIGHT])
+    start = contact.untouched()
+    found = contact.equilibrium(start, HEIGHT - WU - beyond - 1e-9)
+    events = contact.events_between(start, found)
+    assert events.kind.tolist() == [JUMP_IN]
+    assert events.energy == pytest.approx(-energy(stable_radius(WU)), rel=1e-9)
+
+
 def test_under_load_one_asperity_loses_more():
     """From first contact it falls to where there is no load; the largest tension pulls it to where contact ends."""
     contact, waypoints = alone("load")

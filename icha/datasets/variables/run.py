@@ -70,7 +70,8 @@ RUN = {
     "area_beyond_edges": Variable(
         _SNAPSHOT,
         "1",
-        "part of the nominal area by which spots extend beyond the edges of a free square; 0 for a periodic surface",
+        "part of the nominal area by which A/A0 exceeds what spots cover of it: where they extend beyond the edges of "
+        "a free square, and where two that a union came apart into overlap",
     ),
     "gap_density": Variable(_GAP_BIN, "m^-1", "probability density of the gap over the nominal area"),
     "pressure_density": Variable(

@@ -66,8 +66,9 @@ def jump_in(search: Search, point: Point, margin: float) -> tuple[Search, bool]:
     stay, joining = np.unique(source[source >= 0]), ready[source < 0]
     search = search.noting(SPLIT, search.sites.position[stay], search.sites.members[stay])
     if problem.adhesive:
+        # What approaches further before it is found is pressed, which sets nothing free.
         R = asperities.radius_of_curvature[joining]
-        energy = -law.energy(law.contact_radius(search.seen[joining], R), R)
+        energy = -law.energy(law.contact_radius(problem.jump_in[joining], R), R)
         search = search.noting(JUMP_IN, asperities.position[joining], 1, energy, joining)
     return _admitted(search, ready, CONTACT if problem.adhesive else TRIAL, search.seen[ready]), True
 
