@@ -145,10 +145,8 @@ class _Beside(NamedTuple):
 def _of_boundary_elements(truth, solutions):
     """Means over the seeds of the distributions of runs in the limit of a short range, or of solutions; or None."""
     if truth.members:
-        u, gaps = gap_densities(truth.members)
-        edges, pressures = _reduced_pressure_densities(truth.members)
-        grid = int(truth.members[0][0]["grid"])
-        return _Beside(SHORT_RANGE, (u, gaps.mean(axis=0)), _pressure_points(edges, pressures, grid))
+        (u, gaps), (p, pressures) = gap_densities(truth.members), joined_pressure_densities(truth.members)
+        return _Beside(SHORT_RANGE, (u, gaps.mean(axis=0)), (p, pressures.mean(axis=0)))
     if not solutions:
         return None
     gaps, pressures = (
@@ -156,8 +154,8 @@ def _of_boundary_elements(truth, solutions):
     )
     first, grid = solutions[0], int(solutions[0]["solution_grid"])
     u, gaps = _gap_densities(first["gap_bin_edges"].values, gaps, grid)
-    points = _pressure_points(first["pressure_bin_edges"].values, pressures, grid)
-    return _Beside(FINITE_RANGE, (u, gaps.mean(axis=0)), points)
+    p, pressures = _pressure_densities(first["pressure_bin_edges"].values, pressures, grid)
+    return _Beside(FINITE_RANGE, (u, gaps.mean(axis=0)), (p, pressures.mean(axis=0)))
 
 
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
@@ -181,6 +179,11 @@ def pressure_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.nd
     return (0.5 * (edges[1:] + edges[:-1]))[filled], densities[:, filled]
 
 
+def joined_pressure_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
+    """As `pressure_densities`, of boundary elements, of which few nodes are in contact: bins are joined."""
+    return _pressure_densities(*_reduced_pressure_densities(members), int(members[0][0]["grid"]))
+
+
 def _reduced_pressure_densities(members):
     """Edges of the bins of p/(E* h'_rms), and P(p) E* h'_rms (members, bins)."""
     (first, _), *_ = members
@@ -190,15 +193,15 @@ def _reduced_pressure_densities(members):
     )
 
 
-def _pressure_points(edges, densities, grid):
-    """p/(E* h'_rms) and P(p) E* h'_rms of boundary elements, the mean of all; bins joined until they hold nodes."""
+def _pressure_densities(edges, densities, grid):
+    """The distributions within their first and last nodes; bins are joined until they hold nodes."""
     content = densities * np.diff(edges)
     held = np.flatnonzero(content.any(axis=0))
     if not len(held):  # before first contact
-        return np.empty(0), np.empty(0)
+        return np.empty(0), np.empty((len(densities), 0))
     inside = slice(held[0], held[-1] + 1)
     low, high, joined = _joined(edges[held[0] : held[-1] + 2], content[:, inside], _LEAST_NODES / grid**2)
-    return 0.5 * (low + high), joined.mean(axis=0)
+    return 0.5 * (low + high), joined
 
 
 def _gap_densities(edges, densities, grid):

@@ -14,7 +14,7 @@ import xarray as xr
 
 from icha.contact.models import ASPERITIES
 from icha.datasets.campaign import reduced_gap, spots_of
-from icha.figures.fig3_distributions import gap_densities, pressure_densities, solution_pressure_points
+from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
 from icha.figures.fig8_patch_sizes import patch_areas, patch_density, patches_above
 from icha.figures.maps import block_means
 from icha.path.targets import BETWEEN
@@ -102,18 +102,8 @@ def _points(curve):
 
 def _pressures(run, at):
     """Points of the density of the pressure, without its thinnest tail; bins of few nodes are joined."""
-    if run.attrs["contact_model"] == ASPERITIES or not run["pressure_density"].values[at].any():
-        pressure, (density,) = pressure_densities([(run, at)])
-    else:
-        unit = float(run["contact_modulus"]) * float(run["rms_slope"])
-        state = xr.Dataset(
-            {
-                "pressure_bin_edges": run["pressure_bin_edges"] / unit,
-                "pressure_density": run["pressure_density"][at] * unit,
-                "solution_grid": run["grid"],
-            }
-        )
-        pressure, density = solution_pressure_points(state)
+    densities = pressure_densities if run.attrs["contact_model"] == ASPERITIES else joined_pressure_densities
+    pressure, (density,) = densities([(run, at)])
     shown = density > LEAST_DENSITY * density.max(initial=0)
     return [floats(pressure[shown]), floats(density[shown])]
 
