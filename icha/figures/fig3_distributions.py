@@ -39,10 +39,11 @@ DECLARATION = Declaration(
         "Adhesion gives the tensile tail at negative pressures. Dashed lines with crosses, if there are any, are "
         "boundary elements in the limit of a short range of attraction, on the same topographies (means over the "
         "seeds that have them), in the colour of the material; their gaps are those out of contact, their pressures "
-        "those in contact. Where the legend says so, they are instead boundary elements by an independent code at the "
-        "finite interaction range of the material. At ranges that a grid resolves these show practically no "
-        "hysteresis; with adhesion they therefore bound the result in the limit of short ranges (JKR), but do not "
-        "determine it. The black line is Persson's theory of adhesionless contact."
+        "those in contact. Next to an edge of contact, where the tension is singular, theirs is the mean of a cell, so "
+        "that their tensile tail ends there, in a peak. Where the legend says so, they are instead boundary elements "
+        "by an independent code at the finite interaction range of the material. At ranges that a grid resolves these "
+        "show practically no hysteresis; with adhesion they therefore bound the result in the limit of short ranges "
+        "(JKR), but do not determine it. The black line is Persson's theory of adhesionless contact."
     ),
     options=SnapshotFigure,
     inputs=inputs,

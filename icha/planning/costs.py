@@ -164,7 +164,7 @@ def spots(rough: Roughness, load: float) -> float:
 
 
 # Arrays of the grid that boundary elements hold at a time; bytes of a cell that a snapshot's maps take, compressed.
-PATCH_ARRAYS = 16
+PATCH_ARRAYS = 20
 _MAPS = 1.5
 
 

@@ -29,7 +29,7 @@ def run_memory(campaign: Campaign, case: RunLabels) -> int:
     """Megabytes for a run: some arrays of the surface's size, for boundary elements some dozens, and the program."""
     if case.model == ASPERITIES:
         return surface_memory(campaign, case.surface)
-    return int(600 + 1.5 * PATCH_ARRAYS * _ARRAY * campaign.grid(case.surface) ** 2)
+    return int(600 + 1.25 * PATCH_ARRAYS * _ARRAY * campaign.grid(case.surface) ** 2)
 
 
 def run_minutes(campaign: Campaign, case: RunLabels) -> int:
@@ -47,6 +47,6 @@ def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
 
 
 def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
-    """Megabytes for a figure, which may hold the largest topography."""
+    """Megabytes for a figure, which may hold the largest topography, and who is in contact where by both models."""
     largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
-    return int(2000 + 2 * _ARRAY * largest**2 * holds_topography)
+    return int(2000 + 4 * _ARRAY * largest**2 * holds_topography)

@@ -646,7 +646,7 @@ def test_a_single_run_that_exceeds_the_machine_is_refused_with_its_size(project,
     assert "--grid 32768, with 4.1e+03 of the shortest waves along a side, needs about 23" in told
     assert "GB of memory, and this machine has 16 GB; choose a smaller --grid" in told
     by_cells = icha("simulate", "run.nc", "--grid", "16384", "--model", "boundary_elements")
-    assert by_cells.exit_code == 2 and "needs about 34.4 GB of memory" in " ".join(by_cells.output.split())
+    assert by_cells.exit_code == 2 and "needs about 42.9 GB of memory" in " ".join(by_cells.output.split())
 
 
 def test_want_of_memory_is_a_message(project, monkeypatch):
