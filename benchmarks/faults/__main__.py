@@ -147,10 +147,10 @@ def main() -> None:
                     print(f"    WRONG: {violation}", flush=True)
             print(f"{part}: {len(made)} trials, {time.monotonic() - started:.0f} s", flush=True)
             rows += counts(made)
+            keep({"seed": options.seed, "moment": MOMENT, "results": len(reference.contents), "rows": rows})
         print(table(rows))
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
-    keep({"seed": options.seed, "moment": MOMENT, "results": len(reference.contents), "rows": rows})
     if any(row["violations"] for row in rows):
         raise SystemExit("Not everything ended as wanted.")
 

@@ -15,6 +15,7 @@ from benchmarks.faults.places import (
     WENT_ON,
     Reference,
     Trial,
+    ended,
     last_words,
     sentence,
 )
@@ -63,8 +64,8 @@ def full_disk(reference: Reference, what: str, room: float | None, moment: float
         filler.unlink(missing_ok=True)
         mount(f"size={large}")
         wrong += reference.goes_on(place, way) if status else reference.unequal(place)
-    ended = REFUSED if status else WENT_ON
-    return ended(place, Trial("full disk", f"{what}: {fault}", ended, words[:200], tuple(wrong)))
+    end = REFUSED if status else WENT_ON
+    return ended(place, Trial("full disk", f"{what}: {fault}", end, words[:200], tuple(wrong)))
 
 
 def disk_use(files: Iterable[Path]) -> int:

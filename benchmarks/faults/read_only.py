@@ -15,6 +15,7 @@ from benchmarks.faults.places import (
     WENT_ON,
     Reference,
     Trial,
+    ended,
     last_words,
     sentence,
 )
@@ -48,9 +49,9 @@ def read_only(reference: Reference, what: str, state: str, way: str) -> Trial:
         wrong = [f"{path} was computed" for path, time in place.times().items() if before.get(path) != time]
         words = sentence(said, "cannot be written to", "cannot be set aside")
         if state == "everything is there" and not status:
-            ended = WENT_ON
+            end = WENT_ON
         else:
-            ended = REFUSED
+            end = REFUSED
             if not status:
                 wrong.append("it did as if it had written")
             if not words:
@@ -63,7 +64,7 @@ def read_only(reference: Reference, what: str, state: str, way: str) -> Trial:
         else:
             subprocess.run(["mount", "-o", "remount,bind,rw", str(folder)], check=True)
         wrong += reference.goes_on(place, way)
-        trial = Trial("read-only", f"{what}: {state}", ended, words[:200], tuple(wrong))
+        trial = Trial("read-only", f"{what}: {state}", end, words[:200], tuple(wrong))
     return ended(place, trial)
 
 

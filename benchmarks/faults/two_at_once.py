@@ -29,9 +29,9 @@ def two_at_once(reference: Reference, pause: float, ways: tuple[str, str]) -> Tr
     wrong = [f"a call failed: {last_words(said)}" for status, said in ends if status and "is running this" not in said]
     wrong += ["both calls were refused"] if len(refusals) == 2 else []
     wrong += reference.unequal(place)
-    ended = REFUSED if refusals else WENT_ON
+    end = REFUSED if refusals else WENT_ON
     words = " ".join("N" if word.isdigit() else word for word in "".join(refusals).split())
-    return ended(place, Trial("two at once", "the same campaign", ended, words[:200], tuple(wrong)))
+    return ended(place, Trial("two at once", "the same campaign", end, words[:200], tuple(wrong)))
 
 
 def two_campaigns(reference: Reference, pause: float) -> Trial:
