@@ -59,11 +59,12 @@ def relaxed_in_windows(
     gap: of the contact as its pressures are, (n, n). None if there are no such windows, or no way to rest in them.
     """
     for way in _WAYS:
-        windows = _windows(restless, space.grid, way.around)
-        if sum(cells.size for cells, _ in windows) <= way.part * space.size:
+        places = _Places.around(restless, space.grid, way.around)
+        if np.sum(places.sides**2) <= way.part * space.size:
             break
     else:
         return None
+    windows = places.windows(space.grid)
     near, places = np.zeros(space.size, np.float32), surroundings(space.grid, contact.cells)
     near[places] = neighbours(space, contact.cells, contact.fraction.astype(np.float32), places)
     kernels = {side: _kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}
@@ -114,26 +115,42 @@ def _at_rest(small, front, separation, contact, gap, near, windows, free, most_s
     return windows.ravel()[rest.cells], rest.fraction, rest.pressure
 
 
-def _windows(restless, grid, around):
-    """Windows, some together: cells of the whole grid, (t, w, w), and which may move there, in one window each."""
-    rough = blocks_around(grid, around, restless)
-    labels, there = np.zeros(rough.shape, int), np.flatnonzero(rough)
-    labels.ravel()[there], _ = labelled(there, len(rough))
-    boxes = _cut(labels, _boxes(labels))
-    width = BLOCK * np.array([max(side.stop - side.start for side in box) for box in boxes], int)
-    windows, narrower = [], 0
-    for side in _SIDES:
-        numbers = np.flatnonzero((narrower < width) & (width <= side // 2))
-        narrower, way = side // 2, np.arange(side)
-        for some in blocks(len(numbers), _TOGETHER // side**2):
-            cells, free = [], []
-            for number in numbers[some]:
-                middle = ((one.start + one.stop) * BLOCK // 2 for one in boxes[number])
-                rows, columns = ((at - side // 2 + way) % grid for at in middle)
-                cells.append(np.add.outer(rows * grid, columns))
-                free.append(labels[np.ix_(rows // BLOCK, columns // BLOCK)] == number + 1)
-            windows.append((np.stack(cells), np.stack(free)))
-    return windows
+class _Places(NamedTuple):
+    """Places that are not at rest, each in a box, and how wide their windows are.
+
+    labels: number of its place, from 1 on, of every block of the grid; 0 where nothing moves. In cells: middles of
+    boxes, (t, 2), and sides of windows, (t,).
+    """
+
+    labels: np.ndarray
+    middles: np.ndarray
+    sides: np.ndarray
+
+    @classmethod
+    def around(cls, restless, grid, reach):
+        """Those around restless cells (m,), with what is so far from them."""
+        rough = blocks_around(grid, reach, restless)
+        labels, there = np.zeros(rough.shape, int), np.flatnonzero(rough)
+        labels.ravel()[there], _ = labelled(there, len(rough))
+        boxes = _cut(labels, _boxes(labels))
+        ends = np.array([[(side.start, side.stop) for side in box] for box in boxes], int).reshape(-1, 2, 2)
+        widths = BLOCK * np.max(ends[:, :, 1] - ends[:, :, 0], axis=1, initial=0)
+        # Of boxes that were cut into pieces nothing is left.
+        sides = np.array([*_SIDES, 0])[np.searchsorted(np.array(_SIDES) // 2, widths)]
+        return cls(labels, np.sum(ends, axis=2) * BLOCK // 2, sides)
+
+    def windows(self, grid):
+        """Windows, some together: cells of the whole grid, (t, w, w), and which may move there, in one window each."""
+        windows = []
+        for side in _SIDES:
+            numbers, way = np.flatnonzero(self.sides == side), np.arange(side) - side // 2
+            for some in blocks(len(numbers), _TOGETHER // side**2):
+                mine = numbers[some]
+                rows, columns = ((self.middles[mine, axis, None] + way) % grid for axis in (0, 1))
+                cells = rows[:, :, None] * grid + columns[:, None, :]
+                free = self.labels[rows[:, :, None] // BLOCK, columns[:, None, :] // BLOCK] == mine[:, None, None] + 1
+                windows.append((cells, free))
+        return windows
 
 
 def _boxes(labels):
