@@ -11,6 +11,7 @@ import os
 import re
 import shutil
 import stat
+import struct
 import unicodedata
 import zipfile
 from collections.abc import Callable, Iterator
@@ -25,9 +26,14 @@ _BLOCK = 1 << 20
 # What of a name most systems can have: of a part, of a path.
 _LONGEST_PART, _LONGEST = 255, 1000
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-_ENCRYPTED = 0x1
-# Bytes before the name in the header of an entry.
-_HEADER = 30
+_ENCRYPTED, _SIZES_AFTERWARDS, _UTF8 = 0x1, 0x8, 0x800
+# Headers of a zip: of an entry, of the same in its list of contents, at its end, and there too if it is large (APPNOTE,
+# section 4.3). An entry's sizes may come after it, in so many bytes.
+_ENTRY = struct.Struct("<4s5H3L2H")
+_LISTED, _END, _LARGE_END = 46, 22, 98
+_AFTERWARDS = (12, 16, 20, 24)
+# Of what may follow a name there: another name, which some programs take (Info-ZIP Unicode Path).
+_OTHER_NAME = 0x7075
 
 
 class Limits(NamedTuple):
@@ -119,32 +125,37 @@ def _in_zip(path: Path, archive: zipfile.ZipFile, limits: Limits) -> Found:
     if len(entries) > limits.files:
         return nothing._replace(flaws=[_too_many(f"{len(entries):,}", limits)])
     flaws = [f"{printable(entry.orig_filename)}: {flaw}" for entry in entries if (flaw := _flaw_of_entry(entry))]
-    tops = {entry.filename.partition("/")[0] for entry in entries}
-    files = [entry for entry in entries if not entry.is_dir()]
-    if not flaws and (len(tops) != 1 or any("/" not in entry.filename for entry in files)):
-        held = [printable(top) for top in sorted(tops)[:5]] + ["…"] * (len(tops) > 5)
-        flaws = [f"holds {', '.join(held) or 'nothing'}; allowed: a single folder, the deposit"]
     if flaws:
         return nothing._replace(flaws=flaws)
+    tops = {entry.filename.partition("/")[0] for entry in entries}
+    files = [entry for entry in entries if not entry.is_dir()]
+    if len(tops) != 1 or any("/" not in entry.filename for entry in files):
+        held = [printable(top) for top in sorted(tops)[:5]] + ["…"] * (len(tops) > 5)
+        return nothing._replace(flaws=[f"holds {', '.join(held) or 'nothing'}; allowed: a single folder, the deposit"])
     there: dict[str, zipfile.ZipInfo] = {}
     for entry in files:
         name = entry.filename.partition("/")[2]
         if name in there:
             flaws.append(f"{name}: is there more than once")
         there[name] = entry
-    if flaw := _flaw_of_sizes(entries, path.stat().st_size, limits):
+    size = path.stat().st_size
+    if flaw := _flaw_of_layout(archive, entries, size) or _flaw_of_size(entries, size, limits):
         return nothing._replace(flaws=[*flaws, flaw])
     sizes = {name: entry.file_size for name, entry in there.items()}
     return Found(path, sizes, [*flaws, *_clashes(sizes)], lambda name: archive.open(there[name]))
 
 
 def _flaw_of_entry(entry: zipfile.ZipInfo) -> str:
-    # Whatever system it says that it is of: programs that unpack do not agree on which of them have modes.
-    mode = entry.external_attr >> 16
-    kind = stat.S_IFDIR if entry.is_dir() else stat.S_IFREG
     for name in (entry.orig_filename, entry.filename):
         if flaw := flaw_of_name(name.removesuffix("/")):
             return f"the name {flaw}"
+    if _has_other_name(entry.extra):
+        return _OTHER
+    # Whatever system it says that it is of: programs that unpack do not agree on which of them have modes.
+    mode = entry.external_attr >> 16
+    kind = stat.S_IFDIR if entry.is_dir() else stat.S_IFREG
+    if entry.is_dir() and (entry.file_size or entry.compress_size):
+        return "is a folder, and has content"
     if stat.S_IFMT(mode) not in (0, kind):
         return "is a link, a device or something else that is no file"
     if mode & (stat.S_ISUID | stat.S_ISGID | stat.S_ISVTX):
@@ -154,16 +165,68 @@ def _flaw_of_entry(entry: zipfile.ZipInfo) -> str:
     return ""
 
 
-def _flaw_of_sizes(entries: list[zipfile.ZipInfo], size: int, limits: Limits) -> str:
-    """What is wrong with the entries of a zip of so many bytes, together; empty if nothing is."""
-    end = 0
+def _has_other_name(extra: bytes) -> bool:
+    """Whether what follows a name in a header has another one."""
+    while len(extra) >= 4:
+        kind, length = struct.unpack_from("<HH", extra)
+        if kind == _OTHER_NAME:
+            return True
+        extra = extra[4 + length :]
+    return False
+
+
+def _flaw_of_layout(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo], size: int) -> str:
+    """Why a zip of so many bytes is read differently by different programs; empty if it is not.
+
+    One that follows the list of contents and one that reads from the beginning must find the same entries: these lie
+    one after another, are called the same in both places, and there is nothing else.
+    """
+    raw, end, before = archive.fp, 0, None
     for entry in sorted(entries, key=lambda entry: entry.header_offset):
+        name = printable(entry.orig_filename)
         if entry.header_offset < end:
-            return "its files overlap: some bytes of it belong to two of them"
-        # Of the header at least; how much more it has does not matter.
-        end = entry.header_offset + _HEADER + len(entry.orig_filename) + entry.compress_size
-    if end > size:
-        return f"its files take {in_words.size(end)}, and the zip has {in_words.size(size)}"
+            return f"{name}: its files overlap: some bytes of it belong to two of them"
+        if not _is_next(entry.header_offset - end, before):
+            return _more_before(name)
+        raw.seek(entry.header_offset)
+        header = raw.read(_ENTRY.size)
+        if len(header) < _ENTRY.size or not header.startswith(zipfile.stringFileHeader):
+            return f"{name}: is not where the zip's list of contents says"
+        *_, named, more = _ENTRY.unpack(header)
+        if raw.read(named) != _encoded(entry):
+            return f"{name}: has another name in the zip's list of contents than before its content"
+        if _has_other_name(raw.read(more)):
+            return f"{name}: {_OTHER}"
+        end, before = entry.header_offset + _ENTRY.size + named + more + entry.compress_size, entry
+    if archive.start_dir < end:
+        return f"its files take {in_words.size(end)}, and the zip has {in_words.size(archive.start_dir)} for them"
+    if not _is_next(archive.start_dir - end, before):
+        return _more_before("its list of contents")
+    listed = sum(_LISTED + len(_encoded(entry)) + len(entry.extra) + len(entry.comment) for entry in entries)
+    if size - archive.start_dir - listed not in (_END, _LARGE_END):
+        return "has bytes beside its files and their list, such as a comment; allowed: none"
+    return ""
+
+
+_OTHER = "has a second name, which some programs use in the place of the first"
+
+
+def _encoded(entry: zipfile.ZipInfo) -> bytes:
+    """The name of an entry as it stands in a zip."""
+    return entry.orig_filename.encode("utf-8" if entry.flag_bits & _UTF8 else "cp437")
+
+
+def _is_next(gap: int, before: zipfile.ZipInfo | None) -> bool:
+    """Whether nothing but an entry's sizes, if they come after it, lies in the bytes between it and what is next."""
+    return gap == 0 or bool(before and before.flag_bits & _SIZES_AFTERWARDS and gap in _AFTERWARDS)
+
+
+def _more_before(name: str) -> str:
+    return f"{name}: before it the zip has bytes that belong to no file"
+
+
+def _flaw_of_size(entries: list[zipfile.ZipInfo], size: int, limits: Limits) -> str:
+    """Whether a zip of so many bytes unpacks to too much; empty if it does not."""
     unpacked, most = sum(entry.file_size for entry in entries), limits.ratio * size + limits.allowance
     if unpacked > most:
         return (

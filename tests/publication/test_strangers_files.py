@@ -1,10 +1,12 @@
 """What a stranger may do with names, kinds of files and sizes in a deposit is said, and nothing of it is done."""
 
 import hashlib
+import io
 import os
 import stat
 import struct
 import zipfile
+import zlib
 from types import SimpleNamespace
 
 import pytest
@@ -221,6 +223,100 @@ def test_a_link_in_a_zip_is_one_whatever_system_it_is_said_to_be_of(system, tmp_
     content[content.rindex(b"PK\x01\x02") + 5] = system
     path.write_bytes(content)
     assert verify_deposit(path) == ["tiny/a: is a link, a device or something else that is no file"]
+
+
+OTHER_NAME = struct.pack("<HHBL", 0x7075, 5 + len(b"tiny/b"), 1, zlib.crc32(b"tiny/a")) + b"tiny/b"
+
+
+@pytest.mark.parametrize("where", ["before the content", "in the list of contents"])
+def test_an_entry_has_one_name(where, tmp_path):
+    """Some programs unpack to the second one, and write what nobody has verified."""
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("tiny/SHA256SUMS", f"{SUM}  a\n")
+        entry = zipfile.ZipInfo("tiny/a")
+        entry.extra = OTHER_NAME
+        archive.writestr(entry, CONTENT)
+        if where == "before the content":
+            entry.extra = b""
+    (said,) = verify_deposit(tmp_path / "a.zip")
+    assert said == "tiny/a: has a second name, which some programs use in the place of the first"
+
+
+def test_an_entry_is_called_the_same_in_both_places(tmp_path):
+    path = packed(tmp_path / "a.zip", "tiny/a", "tiny/b/", modes=[("tiny/b/", stat.S_IFDIR | 0o755)])
+    path.write_bytes(path.read_bytes().replace(b"tiny/b/", b"tiny/c/", 1))
+    (said,) = verify_deposit(path)
+    assert said == "tiny/b/: has another name in the zip's list of contents than before its content"
+
+
+@pytest.mark.parametrize("name", ["", "\0x"])
+def test_a_name_of_nothing_is_none(name, tmp_path):
+    path = packed(tmp_path / "a.zip", "Q" * max(len(name), 1))
+    path.write_bytes(path.read_bytes().replace(b"Q" * max(len(name), 1), name.encode() or b"\0"))
+    (said,) = verify_deposit(path)
+    assert "the name leads elsewhere, or nowhere" in said or "cannot be seen" in said
+
+
+def _in_front(content, other):
+    return other + content
+
+
+def _behind(content, other):
+    return content + other
+
+
+def _in_the_comment(content, other):
+    return content[:-2] + struct.pack("<H", len(other)) + other
+
+
+def _between(content, other):
+    """In front of the second entry, where the list of contents says that it is."""
+    at = content.index(b"PK\x03\x04", 4)
+    later = bytearray(content[:at] + other + content[at:])
+    for entry, move in ((later.rindex(b"PK\x01\x02") + 42, len(other)), (len(later) - 6, len(other))):
+        struct.pack_into("<I", later, entry, struct.unpack_from("<I", later, entry)[0] + move)
+    return bytes(later)
+
+
+@pytest.mark.parametrize("placed", [_in_front, _behind, _in_the_comment, _between])
+def test_bytes_that_belong_to_no_file_are_refused(placed, tmp_path):
+    """A program that reads a zip from its beginning finds the files of another one there."""
+    other = packed(tmp_path / "b.zip", "tiny/GNUmakefile").read_bytes()
+    path = packed(tmp_path / "a.zip", "tiny/a")
+    path.write_bytes(placed(path.read_bytes(), other))
+    found = verify_deposit(path)
+    assert len(found) == 1 and ("belong to no file" in found[0] or "has bytes beside its files" in found[0]), found
+
+
+def test_a_folder_has_no_content(tmp_path):
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("tiny/SHA256SUMS", "")
+        archive.writestr("tiny/b/", CONTENT)
+    assert verify_deposit(path) == ["tiny/b/: is a folder, and has content"]
+
+
+def test_a_zip_written_in_one_go_is_whole(tmp_path):
+    """To a pipe, say: the sizes of its files come after them."""
+    plain = packed(tmp_path / "plain.zip", "tiny/a")
+
+    class Pipe(io.BytesIO):
+        def seekable(self):
+            return False
+
+        def tell(self):
+            raise OSError
+
+        seek = tell
+
+    pipe = Pipe()
+    with zipfile.ZipFile(plain) as one, zipfile.ZipFile(pipe, "w", zipfile.ZIP_DEFLATED) as other:
+        for entry in one.infolist():
+            other.writestr(entry.filename, one.read(entry))
+    (tmp_path / "a.zip").write_bytes(pipe.getvalue())
+    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
+        assert all(entry.flag_bits & 0x8 for entry in archive.infolist())
+    assert verify_deposit(tmp_path / "a.zip") == []
 
 
 def test_an_encrypted_file_is_said_to_be_one(tmp_path):
