@@ -94,6 +94,16 @@ def test_an_array_that_is_shorter_than_declared_is_refused(tmp_path):
         scan(tmp_path / "scan.npy", **LINES)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("side", [2**32, 2**62])
+def test_sizes_that_no_number_holds_are_refused_without_a_warning(side, tmp_path):
+    with (tmp_path / "scan.npy").open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (side, side)})
+        file.write(bytes(8))
+    with pytest.raises(UnfitTopography, match="cannot be read as npy"):
+        scan(tmp_path / "scan.npy", **LINES)
+
+
 def test_the_limit_can_be_raised_and_must_be_a_number(tmp_path, monkeypatch):
     np.save(tmp_path / "scan.npy", np.random.default_rng(1).normal(size=(300, 300)))
     monkeypatch.setenv("ICHA_INPUT_MB", "1")

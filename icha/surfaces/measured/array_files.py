@@ -20,8 +20,9 @@ def read_npy(path: Path, how: Preparation) -> Found:
 
 def whole_npy(path: Path) -> np.ndarray:
     """The array of a file of NumPy's."""
-    # Mapped, no more is declared than is there.
-    array = np.lib.format.open_memmap(path, mode="r")
+    # Mapped, no more is declared than is there; of what overflows NumPy warns before it refuses it.
+    with np.errstate(over="ignore"):
+        array = np.lib.format.open_memmap(path, mode="r")
     _require_room(array)
     return np.array(array)
 
