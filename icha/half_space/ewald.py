@@ -75,54 +75,56 @@ class _SmoothSum:
     The plans are expensive and depend on the number of modes alone; points are set when they change.
     """
 
-    def __init__(self, period, alpha, contact_modulus, cut, tolerance):
-        self._period = period
+    def __init__(self, period, alpha, contact_modulus, cut, tolerance, kind=np.complex128):
+        """kind: of the numbers that are summed; in single precision these are of order one."""
+        self._period, self._kind, self._real = period, kind, np.empty(0, kind).real.dtype
         highest = int(np.ceil(cut * alpha * period / np.pi))
         k = np.arange(-highest, highest + 1) * (2 * np.pi / period)
         q2 = k[:, None] ** 2 + k[None, :] ** 2
         q2[highest, highest] = 1.0
-        self._green = smooth_mode(np.sqrt(q2), alpha, contact_modulus, period)
-        self._green[highest, highest] = 0.0
+        green = smooth_mode(np.sqrt(q2), alpha, contact_modulus, period)
+        green[highest, highest] = 0.0
+        self._unit = float(green.max())
+        self._green = (green / self._unit).astype(self._real)
         self._laplacian = -q2 * self._green
         # One thread: the order of summation, and with it every bit of the result, is then fixed.
         self._plans = [
             finufft.Plan(
-                kind,
+                transform,
                 q2.shape,
                 eps=tolerance,
                 isign=sign,
                 nthreads=1,
                 upsampfac=1.25,
-                dtype="complex128",
+                dtype=np.dtype(kind).name,
             )
-            for kind, sign in ((1, -1), (2, 1))
+            for transform, sign in ((1, -1), (2, 1))
         ]
         self._points = [None, None]
 
     def _set_points(self, which, points):
         if self._points[which] is not points:
-            angle = points * (2 * np.pi / self._period)
+            angle = (points * (2 * np.pi / self._period)).astype(self._real)
             self._plans[which].setpts(np.ascontiguousarray(angle[:, 1]), np.ascontiguousarray(angle[:, 0]))
             self._points[which] = points
 
     def __call__(self, sources, targets, force, moment=None):
         """Displacement (m) at the targets, of forces (N) and second moments (N m^2) at the sources."""
-        if not len(sources) or not len(targets):
+        largest, second = (0.0 if m is None else np.max(np.abs(m), initial=0.0) for m in (force, moment))
+        if not len(targets) or not (largest or second):
             return np.zeros(len(targets))
         self._set_points(0, sources)
         self._set_points(1, targets)
         collect, distribute = self._plans
-        if moment is None:
-            modes = collect.execute(force.astype(complex))
-            modes *= self._green
-        else:
-            # Both real sets travel as one complex set: its spectrum c holds F as the part with c(-k) = conj c(k).
-            sizes = [np.max(np.abs(each), initial=0.0) for each in (force, moment)]
-            scale = sizes[0] / sizes[1] if all(sizes) else 1.0
-            c = collect.execute(force + 1j * (scale * moment))
-            mirrored = np.conj(c[::-1, ::-1])
-            modes = (0.5 * self._green) * (c + mirrored) + (-0.5j / scale * self._laplacian) * (c - mirrored)
-        return distribute.execute(modes).real
+        if not second:
+            modes = collect.execute((force / largest).astype(self._kind)) * self._green
+            return self._unit * largest * distribute.execute(modes).real
+        # Both real sets travel as one complex set: its spectrum c holds F as the part with c(-k) = conj c(k).
+        scale = largest / second or 1.0
+        c = collect.execute(force + 1j * (scale * moment))
+        mirrored = np.conj(c[::-1, ::-1])
+        modes = (0.5 * self._green) * (c + mirrored) + (-0.5j / scale * self._laplacian) * (c - mirrored)
+        return self._unit * distribute.execute(modes).real
 
 
 def _point_kernels(r, alpha, contact_modulus):
@@ -192,7 +194,9 @@ class Ewald:
     @cached_property
     def loose(self):
         """The smooth sum, to a thousandth."""
-        return _SmoothSum(self.period, self.alpha, self.contact_modulus, _LOOSE_CUT, _LOOSE_NUFFT_TOLERANCE)
+        return _SmoothSum(
+            self.period, self.alpha, self.contact_modulus, _LOOSE_CUT, _LOOSE_NUFFT_TOLERANCE, np.complex64
+        )
 
     @property
     def loose_reach(self):
@@ -258,6 +262,11 @@ class HalfSpace:
     near_loose: tuple
     bases: tuple | None = None
 
+    @cached_property
+    def tree(self):
+        """The points, by where they are."""
+        return cKDTree(self.points, boxsize=self.ewald.period)
+
     @classmethod
     def at(cls, points, period, contact_modulus, free=False) -> HalfSpace:
         """The half-space with (n, 2) points in m, in a square of side `period` (m) that repeats or is single (free)."""
@@ -271,9 +280,7 @@ class HalfSpace:
         known, period = len(self.points), self.ewald.period
         points = np.mod(points, period)
         tree = cKDTree(points, boxsize=period)
-        across = tree.sparse_distance_matrix(
-            cKDTree(self.points, boxsize=period), self.ewald.reach, output_type="ndarray"
-        )
+        across = tree.sparse_distance_matrix(self.tree, self.ewald.reach, output_type="ndarray")
         among = tree.query_pairs(self.ewald.reach, output_type="ndarray")
         later = np.concatenate([across["i"], among.max(axis=1)]) + known
         earlier = np.concatenate([across["j"], among.min(axis=1) + known])

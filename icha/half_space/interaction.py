@@ -23,13 +23,15 @@ _WINDOW = 8.0
 _WINDOW_OF_MOMENTS = 16.0
 
 
-def _pairs_beyond(points, position, radius, ewald):
-    """Pairs (target, source, distance) beyond the near field at which large spots still act exactly."""
+def _pairs_beyond(tree, position, radius, ewald):
+    """Pairs (target, source, distance) beyond the near field at which large spots still act exactly.
+
+    tree: of the targets.
+    """
     reach = np.minimum(_WINDOW_OF_MOMENTS * radius, 0.5 * ewald.period)
     wide = np.flatnonzero(reach > ewald.reach)
     found = [np.empty(0, dtype=[("i", np.intp), ("j", np.intp), ("v", float)])]
     if len(wide):
-        tree = cKDTree(points, boxsize=ewald.period)
         octave = np.floor(np.log2(reach[wide] / ewald.reach))
         for one in np.unique(octave):
             group = wide[octave == one]
@@ -64,7 +66,7 @@ class NearPairs:
         close = np.flatnonzero(r <= np.max(window, initial=0.0))
         later, earlier, r = later[close], earlier[close], r[close]
         by_earlier, by_later = r <= window[earlier], r <= window[later]
-        far = _pairs_beyond(half_space.points, half_space.points, radius, ewald)
+        far = _pairs_beyond(half_space.tree, half_space.points, radius, ewald)
         r = np.concatenate([r[by_earlier], r[by_later], far[2]])
         return cls(
             np.concatenate([later[by_earlier], earlier[by_later], far[0]]),
@@ -175,7 +177,7 @@ def displacement_at(
     w = np.bincount(target, near, len(points)).astype(float)
     window = np.where(a > 0, np.maximum(_WINDOW * a, ewald.floor), -1.0)
     close = np.flatnonzero(r <= window[source])
-    far = _pairs_beyond(points, position, a, ewald)
+    far = _pairs_beyond(tree, position, a, ewald)
     target, source, r = (np.append(one[close], other) for one, other in zip((target, source, r), far, strict=True))
     exact = law.displacement(r, a[source], R[source])
     for moment, replaced in zip(moments, ewald.replaced(r), strict=True):
