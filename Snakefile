@@ -46,6 +46,7 @@ onstart:
     before_jobs.collect_again()
     before_jobs.start_without_limit(workflow)
     here.refuse_second()
+    here.refuse_unreadable()
     here.refuse_unwritable()
     if DeploymentMethod.CONDA not in workflow.deployment_settings.deployment_method:
         here.refuse_without(missing_software(CAMPAIGN))

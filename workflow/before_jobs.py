@@ -218,6 +218,16 @@ class Campaign:
         if missing:
             raise SystemExit(f"{missing} Nothing was computed.")
 
+    def refuse_unreadable(self) -> None:
+        """End the program with a message if results could be written and not read again."""
+        place = os.path.abspath(self.results)
+        if "\\" in place:
+            raise SystemExit(
+                f"{place} has a backslash, which the library of netCDF takes for a slash: no result could be read. "
+                f"Nothing was computed. Rename the folder, or work in another one: `icha run --directory FOLDER`, "
+                f"`snakemake --directory FOLDER`."
+            )
+
     def refuse_unwritable(self) -> None:
         """End the program with a message if jobs could not write their results."""
         for folder in (self.results, ".snakemake"):

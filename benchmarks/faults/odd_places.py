@@ -28,6 +28,16 @@ def odd_name(reference: Reference, name: str, way: str) -> Trial:
     return ended(place, Trial("odd place", "names of folders", WENT_ON, violations=wrong))
 
 
+def backslash(reference: Reference, way: str) -> Trial:
+    """Run in a folder with a backslash in its name, in which netCDF's library finds no file."""
+    place = reference.empty(reference.scratch / f"back\\slash{next(reference.numbers)}")
+    status, said = place.run(way)
+    words = sentence(said, "has a backslash")
+    wrong = [] if status and words and "Traceback" not in said else [f"not told: {last_words(said)}"]
+    wrong += [f"{file.name} was computed" for file in place.results.rglob("*.nc")]
+    return ended(place, Trial("odd place", "a backslash in its name", REFUSED, words[:200], tuple(wrong)))
+
+
 def odd_modules(reference: Reference, way: str) -> Trial:
     """Run in a folder whose files have the names of modules."""
     place = reference.empty()
@@ -78,6 +88,7 @@ def odd_places(reference: Reference) -> Iterator[Trial]:
     for number, name in enumerate(names):
         yield odd_name(reference, name, WAYS[number % 2])
     for way in WAYS:
+        yield backslash(reference, way)
         yield odd_modules(reference, way)
         yield long_temporary(reference, way)
     for what in OBSTACLES:

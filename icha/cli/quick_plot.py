@@ -41,6 +41,8 @@ def _campaign(tree: xr.DataTree) -> Figure:
     rows = figure.subplots(len(names), 2, squeeze=False)
     for axes, name in zip(rows, names, strict=True):
         study = tree[name].to_dataset()
+        # What has neither runs nor steps is not drawn, and xarray cannot stack snapshots of which there are none.
+        study = study.drop_dims([dim for dim in study.dims if dim not in (*LABELS, "step")])
         runs = study.stack(run=LABELS, create_index=False)
         materials, models = list(study["material"].values), study["model"].values.tolist()
         for k in range(runs.sizes["run"]):

@@ -17,7 +17,7 @@ from icha.datasets.labels import LABELS
 from icha.datasets.variables import run as variables_of_run
 from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
 from icha.datasets.variables.terms import Variable
-from icha.support.hdf5 import refuse_data_elsewhere
+from icha.support.hdf5 import refuse_traps
 from icha.support.input_files import bounded_memory, flaw_of_path, most_memory, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
@@ -127,7 +127,7 @@ def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
     try:
         most = most_memory(path)
         with bounded_memory(most):
-            refuse_data_elsewhere(path)
+            refuse_traps(path)
             data = read_campaign(path) if has_groups(path) else read_dataset(path)
         if isinstance(data, xr.DataTree):
             # Large arrays are still in the file, and read when they are used.

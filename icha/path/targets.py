@@ -199,11 +199,14 @@ def _turns(turning_points, last):
     return tuple(turns)
 
 
-def _stops(name, kind, values):
+def _stops(name, kind, given):
     try:
-        values = list(values)
+        # Bytes would be numbers.
+        values = None if isinstance(given, str | bytes) else list(given)
     except TypeError:
-        raise ValueError(f"{name}: {values!r} is not a list of numbers") from None
+        values = None
+    if values is None:
+        raise ValueError(f"{name}: {given!r} is not a list of numbers")
     if not values:
         raise ValueError(f"{name}: the list is empty")
     values = [STATES[kind].checked(f"{name}[{i}]", v) for i, v in enumerate(values)]

@@ -121,4 +121,4 @@ def _differences(found: Found, expected: dict[str, str]) -> Iterator[str]:
             if made.hexdigest() != digest:
                 yield f"{name}: is not what it was: its checksum is another one"
     for name in sorted(set(found.sizes) - set(expected) - {CHECKSUMS}):
-        yield f"{name}: was added: it is not in {CHECKSUMS}"
+        yield f"{printable(name)}: was added: it is not in {CHECKSUMS}"

@@ -24,7 +24,7 @@ from icha.publication.environment import differences
 from icha.publication.source import PROGRAM
 from icha.publication.strangers_files import Found, unpack
 from icha.support.checksums import sha256_of
-from icha.support.hdf5 import refuse_data_elsewhere
+from icha.support.hdf5 import refuse_traps
 from icha.support.in_words import counted
 from icha.support.program import own_workflow, package_of
 from icha.support.values import NAME_PATTERN
@@ -172,7 +172,7 @@ def _outcome(deposit: Found, run: str) -> tuple[int, str]:
         copy = Path(scratch, "run.nc")
         copy_file(deposit, run, copy)
         try:
-            refuse_data_elsewhere(copy)
+            refuse_traps(copy)
             with netCDF4.Dataset(copy) as file:
                 steps = file.dimensions.get("step")
                 return (len(steps) if steps is not None else 0), str(getattr(file, "incomplete", ""))

@@ -27,7 +27,7 @@ import numpy as np
 from icha.analysis.checks import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.publication.deposit_files import COMPUTED
 from icha.support.atomic_files import whole_file
-from icha.support.hdf5 import refuse_data_elsewhere
+from icha.support.hdf5 import refuse_traps
 from icha.support.printable import printable
 
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (
@@ -163,7 +163,7 @@ def _compare_datasets(deposit, rerun, path):
     try:
         for file, whose in ((deposit, "deposit"), (rerun, "rerun")):
             try:
-                refuse_data_elsewhere(file)
+                refuse_traps(file)
                 opened.append(netCDF4.Dataset(file))
             except (OSError, ValueError) as error:
                 return File(path, DIFFERENT, f"the {whose}'s cannot be opened: {error}")

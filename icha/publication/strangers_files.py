@@ -97,10 +97,12 @@ def _in_folder(folder: Path, limits: Limits) -> Found:
     sizes: dict[str, int] = {}
     flaws: list[str] = []
     for name, status in _walk(folder):
-        if stat.S_ISREG(status.st_mode):
-            sizes[name] = status.st_size
-        else:
+        if not stat.S_ISREG(status.st_mode):
             flaws.append(f"{printable(name)}: is no file of its own")
+        elif flaw := _flaw_of_mode(status.st_mode):
+            flaws.append(f"{printable(name)}: {flaw}")
+        else:
+            sizes[name] = status.st_size
         if len(sizes) + len(flaws) > limits.files:
             return Found(folder, {}, [_too_many(f"more than {limits.files:,}", limits)], _nothing)
     flaws += [f"{printable(name)}: the name {flaw}" for name in sizes if (flaw := flaw_of_name(name))]
@@ -158,10 +160,16 @@ def _flaw_of_entry(entry: zipfile.ZipInfo) -> str:
         return "is a folder, and has content"
     if stat.S_IFMT(mode) not in (0, kind):
         return "is a link, a device or something else that is no file"
-    if mode & (stat.S_ISUID | stat.S_ISGID | stat.S_ISVTX):
-        return f"has the mode {stat.S_IMODE(mode):04o}; allowed: no special bits"
+    if flaw := _flaw_of_mode(mode):
+        return flaw
     if entry.flag_bits & _ENCRYPTED or entry.compress_type not in _METHODS:
         return "is encrypted, or compressed by another method than deflate"
+    return ""
+
+
+def _flaw_of_mode(mode: int) -> str:
+    if mode & (stat.S_ISUID | stat.S_ISGID | stat.S_ISVTX):
+        return f"has the mode {stat.S_IMODE(mode):04o}; allowed: no special bits"
     return ""
 
 

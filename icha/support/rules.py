@@ -52,7 +52,10 @@ class Real:
         unit = f" (in {self.unit})"
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise ValueError(f"{name}: {value!r} is not a number{unit}")
-        value = float(value)
+        try:
+            value = float(value)
+        except OverflowError:
+            raise ValueError(f"{name}: a number beyond 1e308 is not finite{unit}") from None
         if not math.isfinite(value):
             raise ValueError(f"{name}: {value!r} is not finite{unit}")
         if self.holds(value):
@@ -89,7 +92,9 @@ class Integer:
             raise ValueError(f"{name}: {value!r} is not an integer")
         if not self.holds(value):
             bound = f"least {self.least}" if value < self.least else f"most {self.most}"
-            raise ValueError(f"{name}: {value!r} must be at {bound}")
+            # More digits Python may not write.
+            shown = f"{value!r}" if abs(value) < 10**30 else "a number of more than 30 digits"
+            raise ValueError(f"{name}: {shown} must be at {bound}")
         return int(value)
 
 

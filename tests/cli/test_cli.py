@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 import small_campaign as small
+import xarray as xr
 import yaml
 from conftest import REPOSITORY
 from typer.testing import CliRunner
@@ -781,6 +782,16 @@ def test_surfaces_and_campaigns_are_shown(tmp_path, monkeypatch):
     assert "single: " in one.output and "slopes: " not in one.output
     refused = icha("show", "campaign.nc", "--study", "none")
     assert refused.exit_code == 2 and "there are: slopes, single" in refused.output
+
+
+def test_studies_without_snapshots_are_drawn(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = small.tree()
+    without = {name: study.to_dataset().isel(snapshot=[], spot=[]) for name, study in whole.children.items()}
+    write_dataset(xr.DataTree.from_dict({"/": whole.to_dataset(), **without}), "campaign.nc")
+    shown = icha("show", "campaign.nc", "--plot", "campaign.png")
+    assert shown.exit_code == 0, shown.output
+    assert Path("campaign.png").stat().st_size
 
 
 class Clock:

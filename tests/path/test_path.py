@@ -210,6 +210,7 @@ def test_progress_tells_every_stop(surface):
         ({"reduced_pressures": [0.1], "max_step": None}, "max_step"),
         ({"reduced_pressures": [0.1], "snapshots": [("pressure", 0.1)]}, r"snapshots\[0\].*kind"),
         ({"reduced_pressures": [0.1], "snapshots": 0.1}, "snapshots: 0.1 is not a list"),
+        ({"mean_separations": b"1"}, "mean_separations: b'1' is not a list of numbers"),
         ({"reduced_pressures": [0.1], "snapshots": [0.1]}, r"snapshots\[0\]"),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", -0.1)]}, r"snapshots\[0\]"),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.9)]}, r"snapshots\[0\].*beyond"),

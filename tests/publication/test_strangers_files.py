@@ -98,6 +98,18 @@ def test_links_in_a_folder_are_not_followed(target, folder):
     assert verify_deposit(folder) == ["link: is no file of its own", "link/passwd: is missing"]
 
 
+def test_names_in_a_folder_make_no_lines_of_their_own(folder):
+    (folder / "b\ntiny: whole: 9 files").touch()
+    found = verify_deposit(folder)
+    assert len(found) == 2 and all(map(is_printable, found)) and all("b\\ntiny" in line for line in found)
+
+
+@pytest.mark.parametrize("bit", [stat.S_ISUID, stat.S_ISGID, stat.S_ISVTX])
+def test_special_modes_in_a_folder_are_refused(bit, folder):
+    (folder / "a").chmod(0o644 | bit)
+    assert verify_deposit(folder) == [f"a: has the mode {0o644 | bit:04o}; allowed: no special bits"]
+
+
 def test_a_pipe_in_a_folder_keeps_nobody_waiting(folder):
     os.mkfifo(folder / "pipe")
     assert verify_deposit(folder) == ["pipe: is no file of its own"]

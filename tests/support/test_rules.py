@@ -41,6 +41,16 @@ def test_integers_are_refused_in_both_places(value, reason):
         TypeAdapter(values.integer(rules.GRID)).validate_python(value)
 
 
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_numbers_that_no_float_holds_are_refused_by_name(digits):
+    """Of more than 4300 digits Python writes none."""
+    for value in (10**digits, -(10**digits)):
+        with pytest.raises(ValueError, match=r"^it: a number beyond 1e308 is not finite \(in m\)$"):
+            rules.LENGTH.checked("it", value)
+        with pytest.raises(ValueError, match=r"^it: a number of more than 30 digits must be at (least 8|most 32768)$"):
+            rules.GRID.checked("it", value)
+
+
 def test_what_a_rule_allows_is_returned():
     assert rules.HURST.checked("hurst", 1) == 1.0
     assert rules.GRID.checked("grid", 8) == 8

@@ -223,12 +223,45 @@ def test_a_block_of_the_users_own_before_the_file_hides_nothing(block, tmp_path)
         scan(tmp_path / "scan.h5", **LINES)
 
 
+CIRCLES = {
+    "root by another name": lambda file, group: file.__setitem__("loop", file["/"]),
+    "link to the root": lambda file, group: file.__setitem__("loop", h5py.SoftLink("/")),
+    "root in a group": lambda file, group: group.__setitem__("loop", file["/"]),
+    "link to what is above": lambda file, group: group.__setitem__("loop", h5py.SoftLink("/group")),
+    "two names": lambda file, group: file.__setitem__("other", group),
+}
+
+
+@pytest.mark.parametrize("name", ["scan.h5", "scan.nc"])
+@pytest.mark.parametrize("circle", CIRCLES)
+def test_groups_with_two_names_are_refused(circle, name, tmp_path):
+    """netCDF's library breaks down at some of them, and takes the program with it."""
+    with h5py.File(tmp_path / name, "w") as file:
+        file["height"] = HEIGHTS
+        CIRCLES[circle](file, file.create_group("group"))
+    with pytest.raises(UnfitTopography, match="is a group that has another name, too; allowed: one name for each"):
+        scan(tmp_path / name, **LINES)
+    with pytest.raises(UnknownFile, match="is a group that has another name, too"):
+        kind_of(tmp_path / name)
+
+
+def test_groups_that_lie_deep_in_one_another_are_refused_at_once(tmp_path):
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        group = file
+        for _ in range(2000):
+            group = group.create_group("g")
+        group["height"] = HEIGHTS
+    with pytest.raises(UnfitTopography, match=r"more than 100,000 names, or 50 groups in one another; allowed: fewer"):
+        scan(tmp_path / "scan.h5", **LINES)
+
+
 def test_soft_links_are_no_datasets(tmp_path):
     path = tmp_path / "scan.h5"
     with h5py.File(path, "w") as file:
         file["heights"] = HEIGHTS
         file["other"] = h5py.SoftLink("/heights")
         file["nowhere"] = h5py.SoftLink("/none")
+        file["itself"] = h5py.SoftLink("/itself")
     assert scan(path, **LINES).heights.shape == HEIGHTS.shape
     with pytest.raises(UnfitTopography, match="is no dataset of the file; allowed: heights"):
         scan(path, **LINES, data="other")

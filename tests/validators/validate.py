@@ -281,7 +281,7 @@ def main() -> int:
     """Validate what the command line names."""
     from icha.publication.deposit_files import verify_deposit
     from icha.publication.strangers_files import LARGE, LIMITS, NO_LIMITS, looked_through, unpack
-    from icha.support.hdf5 import refuse_data_elsewhere
+    from icha.support.hdf5 import refuse_traps
     from icha.support.printable import printable
 
     parser = argparse.ArgumentParser(description="Put a deposit to the validators of others, without any network.")
@@ -306,7 +306,7 @@ def main() -> int:
             unpack(found, folder)
         for file in sorted(folder.rglob("*.nc")):
             try:
-                refuse_data_elsewhere(file)
+                refuse_traps(file)
             except (OSError, ValueError) as error:
                 sys.exit(f"{name}: {printable(file.relative_to(folder))}: {printable(error)}")
         stay_off_the_network()

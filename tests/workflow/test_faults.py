@@ -60,11 +60,12 @@ def test_flipped_bits_are_found_by_the_one_of_two_calls_that_may_run(reference):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
-def test_folders_may_have_any_name_and_hold_any_file(reference, way):
+def test_folders_may_have_any_name_but_for_a_backslash_and_hold_any_file(reference, way):
     odd = odd_places.odd_name(reference, "both' of \"them & ($HOME*;", way)
     modules = odd_places.odd_modules(reference, way)
     long = odd_places.long_temporary(reference, way)
-    assert [trial.violations for trial in (odd, modules, long)] == [(), (), ()]
+    refused = odd_places.backslash(reference, way)
+    assert [trial.violations for trial in (odd, modules, long, refused)] == [(), (), (), ()]
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from icha.support.hdf5 import refuse_data_elsewhere
+from icha.support.hdf5 import refuse_traps
 from icha.support.input_files import bounded_memory, flaw_of_path
 from icha.support.rules import LENGTH
 from icha.surfaces.heights import flaw_of_heights
@@ -31,7 +31,7 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
         raise ValueError(f"{flaw}; {_ALLOWED}")
     try:
         with bounded_memory():
-            refuse_data_elsewhere(path)
+            refuse_traps(path)
             heights = _heights(path)
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
         raise ValueError(f"cannot be read ({error}); {_ALLOWED}") from None

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from icha.support import in_words
-from icha.support.hdf5 import refuse_data_elsewhere
+from icha.support.hdf5 import refuse_traps
 from icha.support.input_files import TooLarge, bounded_memory
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import read_hdf5, read_netcdf, read_npy
@@ -93,7 +93,7 @@ def _read(path, name, how):
         if name in _LIBRARIES:
             importlib.import_module(_LIBRARIES[name])
         with bounded_memory():
-            refuse_data_elsewhere(path)
+            refuse_traps(path)
             found = READERS[name](path, how)
     except UnfitTopography:
         raise
