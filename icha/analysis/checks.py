@@ -20,7 +20,7 @@ from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.datasets.variables.run import PATCHES
-from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS
+from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST
 from icha.path.open_work import integration_error, pressure_jump, unresolved_work
 from icha.path.targets import AREA_FRACTION, BETWEEN
 from icha.support.atomic_files import whole_file
@@ -385,7 +385,7 @@ def _left_open(run):
 
     An event moves the work by what it changes the pressure by, times its distance from the middle of its step; and one
     that changes the stiffness alone by a part of the difference that this makes to the integral. No step may leave more
-    open than UNRESOLVED_LOSS of what jumps have set free.
+    open than UNRESOLVED_LOSS of what jumps have set free, or than UNRESOLVED_REST of the work and losses so far.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant
@@ -393,7 +393,9 @@ def _left_open(run):
     jumped = pressure_jump(width, np.diff(run["nominal_pressure"]), slope[:-1], slope[1:])
     work = float(np.sum(events * (unresolved_work(width, jumped) + integration_error(width, slope[:-1], slope[1:]))))
     set_free = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))
-    return min(work, UNRESOLVED_LOSS * np.count_nonzero(events) * set_free)
+    lost = run["work"] - run["stored_energy"]
+    effort = float(np.sum(np.abs(np.diff(run["work"])) + np.abs(np.diff(lost))))
+    return min(work, np.count_nonzero(events) * max(UNRESOLVED_LOSS * set_free, UNRESOLVED_REST * effort))
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:

@@ -8,6 +8,8 @@ its asperities (those that a stable state of the law holds stay in contact), or 
 made of would no longer overlap.
 """
 
+import hashlib
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -36,8 +38,11 @@ _EVENT_MARGIN = 10.0
 # needed, the step of the path is too long.
 _MAX_NEWTON_STEPS = 60
 _MAX_EXACT_STEPS = 4
-# Rounds of jumps and unions in all: they end, but may be many where many summits are alike.
-_MAX_ROUNDS = 1000
+# Rounds of jumps and unions in all: they end, but may be many where many summits are alike. And those that lead to the
+# same spots: where unions are made and undone in a circle there is no equilibrium.
+_MAX_ROUNDS, _MAX_RETURNS = 1000, 10
+# Spots closer than this, in periods, are the same.
+_SAME_PLACE = 1e-6
 # Contact area fraction at which the spots have lost all meaning.
 _FULL_CONTACT = 0.5
 
@@ -60,7 +65,7 @@ def equilibrium(
     if spots_let_go:
         search = let_go(search, separation, spots_let_go)
     point = Equations(problem, search.sites, control).at(search.sites.approach, separation)
-    steps, exact_steps, rounds, quiet = 0, 0, 0, False
+    steps, exact_steps, rounds, quiet, visited = 0, 0, 0, False, Counter()
     while True:
         search, point = _without_swallowed(search, point, control)
         equations = Equations(problem, search.sites, control)
@@ -90,7 +95,9 @@ def equilibrium(
         equations = Equations(problem, search.sites, control)
         search, point = settled(search, equations.at(search.sites.approach, point.separation, point.interaction))
         steps, quiet, rounds = 0, False, rounds + 1
-        if rounds > _MAX_ROUNDS:
+        here = _places(search)
+        visited[here] += 1
+        if rounds > _MAX_ROUNDS or visited[here] > _MAX_RETURNS:
             raise NotConverged(f"no equilibrium after {rounds} rounds of jumps and unions")
 
 
@@ -112,6 +119,13 @@ def happen(search: Search, point: Point, margin: float) -> tuple[Search, bool]:
     if search.parting:
         search = undo(search, point)
     return search, changed or search is not before
+
+
+def _places(search):
+    """Where the spots are, to tell whether they are the same as before; a checksum."""
+    sites = search.sites
+    at = np.rint(sites.position[sites.status == CONTACT] / (_SAME_PLACE * search.problem.asperities.period))
+    return hashlib.sha256(np.sort(at @ (1.0, 2 / _SAME_PLACE)).tobytes()).digest()
 
 
 def _without_swallowed(search, point, control):

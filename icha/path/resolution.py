@@ -12,7 +12,7 @@ from icha.contact.model import ContactModel, State
 from icha.path.bracketing import CLOSE_TO_A_JUMP
 from icha.path.course import halved
 from icha.path.energy_balance import Step
-from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS
+from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST
 
 # Where nothing jumps, the part of the work so far that may be unknown after a step.
 UNRESOLVED_WORK = 2e-4
@@ -126,7 +126,7 @@ def _is_work_known(contact, beyond, step, account, longest):
     """Whether the work in a step is known."""
     effort = account.effort + abs(step.work) + abs(step.lost)
     jumped = UNRESOLVED_LOSS * (account.jumped + step.set_free(contact))
-    if step.unresolved > (jumped or UNRESOLVED_WORK * effort):
+    if step.unresolved > (max(jumped, UNRESOLVED_REST * effort) if jumped else UNRESOLVED_WORK * effort):
         return False
     # What a union makes of two spots depends on how far they overlap when it is found.
     if step.unites and abs(step.width) > UNITING_STEP * longest:

@@ -401,3 +401,19 @@ def test_too_few_newton_steps_are_reported_not_passed_off(monkeypatch):
     monkeypatch.setattr(icha.equilibrium.equilibrium, "_MAX_NEWTON_STEPS", 1)
     with pytest.raises(NotConverged, match="equilibrium error"):
         contact.equilibrium(contact.untouched(), 1.5 * contact.rms_height)
+
+
+def test_events_that_lead_back_to_the_same_spots_end_soon(monkeypatch):
+    """Unions made and undone in a circle: after ten rounds it is known that there is no equilibrium."""
+    rounds = 0
+
+    def always(search, point, margin):
+        nonlocal rounds
+        rounds += 1
+        return search, True
+
+    monkeypatch.setattr(icha.equilibrium.equilibrium, "happen", always)
+    contact, top = bump(ENERGY)
+    with pytest.raises(NotConverged, match="no equilibrium after 11 rounds of jumps and unions"):
+        contact.equilibrium(contact.untouched(), top)
+    assert rounds == 11
