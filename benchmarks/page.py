@@ -457,8 +457,8 @@ def _starts(results) -> list[str]:
 # Counted apart from the benchmarks, by hand; to be looked at again where the solvers change.
 MISSED_TEXT = """\
 **Boundary elements with adhesion** are bound by their transforms. At 512² a stop takes some 470 of them there and back,
-1.4 ms each: 62 % of the time, the rest being spread out. A third of these bring the fronts to the neighbourhood of the
-new load, a fifth to the load nearly, and 30 % to it within 5·10⁻¹⁰ and along all fronts to 10⁻⁹ of √(G/Δγ); 14 % are for
+which is 62 % of the time, the rest being spread out. A third of these bring the fronts to the neighbourhood of the new
+load, a fifth to the load nearly, and 30 % to it within 5·10⁻¹⁰ and along all fronts to 10⁻⁹ of √(G/Δγ); 14 % are for
 the slopes of load and area. Each decimal of a linear equation takes nine. The following was tried, and did not help:
 
 - Newton's steps of fronts and separation together: as many transforms, since each step has to be solved as exactly.
@@ -469,17 +469,17 @@ the slopes of load and area. Each decimal of a linear equation takes nine. The f
 Other libraries are faster (FFTW by a third, MKL by a half), but FFTW and ducc0 are under the GPL, and the bits of MKL
 depend on the processor.
 
-**The full surface by boundary elements** was solved once, in parts and not by this command: its first 18 equilibria took
-some 3.7 h, partly beside other work and with an error that cost steps, the last two 82 min on two cores; at most 10.2
-GiB were needed. A stop lasts the longer the more contact there is: half a minute at 0.1 % of area, forty minutes at
-10 %, where 4.5 million cells touch. On 2048² cells with the same waves a stop at 4 % of area took 745 sums over tiles
-there and back; on 8192² one takes a second at 7 %. [What came out](howto/large.md) is on another page.
+**The full surface by boundary elements** was solved once, in parts and not by this command: its first 18 equilibria
+took some 3.7 h, partly beside other work and with an error that cost steps, the last two 82 min on two cores; at most
+10.2 GiB were needed. A stop lasts the longer the more contact there is: half a minute at 0.1 % of area, forty minutes
+at 10 %, where 4.5 million cells touch. On 2048² cells with the same waves a stop at 4 % of area took 745 sums over
+tiles there and back; on 8192² one takes a second at 7 %. [What came out](howto/large.md) is on another page.
 
 **Asperities.** The time of a product with the tangent grows about in proportion to the number of spots, but a linear
 equation takes more of them: 8, 9 and 12 with 12 000, 30 000 and 105 000 spots. The larger the surface, the longer waves
 it has, and the more its spots move together. Taking these waves out beforehand, by the mean stiffness of all spots,
-halves the iterations (7 instead of 13, 8 instead of 15), but its own sums take as long as it saves. From 30 000 spots on
-arrays also leave the cache."""
+halves the iterations (7 instead of 13, 8 instead of 15), but its own sums take as long as it saves. From 30 000 spots
+on arrays also leave the cache."""
 
 TRUTH_TEXT = """\
 Campaign `cmc_truth` solves the surface of the [Contact Mechanics Challenge](howto/large.md), 8192² cells, in the limit

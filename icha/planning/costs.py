@@ -242,11 +242,15 @@ def table_cost(seconds: float, disk: float, of: Constants = FITTED) -> Cost:
     return Cost(of.gathering.table + seconds, of.workflow.forked + of.gathering.table_memory, disk)
 
 
-def figure_cost(runs: int, nodes: int, of: Constants = FITTED) -> Cost:
-    """A figure of so many runs, as PNG and PDF, with a topography of so many nodes."""
+# Arrays of a topography that a map of contacts holds at a time, by the number of models that it shows.
+MAP_ARRAYS = {1: 2, 2: 7}
+
+
+def figure_cost(runs: int, nodes: int, models: int = 1, of: Constants = FITTED) -> Cost:
+    """A figure of so many runs, as PNG and PDF, with a topography of so many nodes and contacts by so many models."""
     here = of.gathering
     seconds = here.figure + here.figure_run * runs + here.map_node * nodes
-    return Cost(seconds, of.workflow.forked + here.figure_memory + 2 * _DOUBLE * nodes, 400e3)
+    return Cost(seconds, of.workflow.forked + here.figure_memory + MAP_ARRAYS[models] * _DOUBLE * nodes, 400e3)
 
 
 def report_cost(runs: int, figures: int, of: Constants = FITTED) -> Cost:

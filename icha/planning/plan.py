@@ -172,6 +172,7 @@ def _gathered(
         cost = costs.figure_cost(
             sum(case.study in shown for case in files.runs.values()),
             max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0,
+            max((len(campaign.studies[study].models) for study in shown), default=1),
             of,
         )
         yield "figures", path, 3, _flat(inputs), cost

@@ -4,7 +4,7 @@ from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
 from icha.contact.models import ASPERITIES
 from icha.datasets.labels import RunLabels
-from icha.planning.costs import PATCH_ARRAYS, job_threads
+from icha.planning.costs import MAP_ARRAYS, PATCH_ARRAYS, job_threads
 
 _ARRAY = 8e-6
 """Megabytes of a number."""
@@ -49,4 +49,4 @@ def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
 def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
     """Megabytes for a figure, which may hold the largest topography, and who is in contact where by both models."""
     largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
-    return int(2000 + 4 * _ARRAY * largest**2 * holds_topography)
+    return int(1000 + max(MAP_ARRAYS.values()) * _ARRAY * largest**2 * holds_topography)

@@ -61,6 +61,7 @@ def test_costs_grow_with_what_is_asked_for():
     big, small = costs.surface_cost(8192), costs.surface_cost(1024)
     assert big.disk == pytest.approx(8 * 8192**2, rel=0.01) and big.memory > big.disk > 60 * small.disk
     assert costs.figure_cost(10, 0).seconds < costs.figure_cost(100, 0).seconds < costs.figure_cost(100, 10**8).seconds
+    assert costs.figure_cost(10, 10**8, models=2).memory > 3 * costs.figure_cost(10, 10**8).memory
     assert costs.report_cost(10, 2).seconds < costs.report_cost(100, 2).seconds < costs.report_cost(100, 9).seconds
 
 
