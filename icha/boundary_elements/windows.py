@@ -59,12 +59,12 @@ def relaxed_in_windows(
     gap: of the contact as its pressures are, (n, n). None if there are no such windows, or no way to rest in them.
     """
     for way in _WAYS:
-        places = _Places.around(restless, space.grid, way.around)
-        if np.sum(places.sides**2) <= way.part * space.size:
+        moving = _Places.around(restless, space.grid, way.around)
+        if np.sum(moving.sides**2) <= way.part * space.size:
             break
     else:
         return None
-    windows = places.windows(space.grid)
+    windows = moving.windows(space.grid)
     near, places = np.zeros(space.size, np.float32), surroundings(space.grid, contact.cells)
     near[places] = neighbours(space, contact.cells, contact.fraction.astype(np.float32), places)
     kernels = {side: _kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}

@@ -32,6 +32,8 @@ _ENCRYPTED, _SIZES_AFTERWARDS, _UTF8 = 0x1, 0x8, 0x800
 _ENTRY = struct.Struct("<4s5H3L2H")
 _LISTED, _END, _LARGE_END = 46, 22, 98
 _AFTERWARDS = (12, 16, 20, 24)
+# In the place of a size that takes more than 32 bits.
+_IN_EXTRA = 0xFFFFFFFF
 # Of what may follow a name there: another name, which some programs take (Info-ZIP Unicode Path).
 _OTHER_NAME = 0x7075
 
@@ -200,9 +202,12 @@ def _flaw_of_layout(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo], si
         header = raw.read(_ENTRY.size)
         if len(header) < _ENTRY.size or not header.startswith(zipfile.stringFileHeader):
             return f"{name}: is not where the zip's list of contents says"
-        *_, named, more = _ENTRY.unpack(header)
+        _, _, flags, method, _, _, _, packed, _, named, more = _ENTRY.unpack(header)
         if raw.read(named) != _encoded(entry):
             return f"{name}: has another name in the zip's list of contents than before its content"
+        sizes = (entry.compress_size, _IN_EXTRA, *[0] * bool(flags & _SIZES_AFTERWARDS))
+        if method != entry.compress_type or packed not in sizes:
+            return f"{name}: has another size or method in the zip's list of contents than before its content"
         if _has_other_name(raw.read(more)):
             return f"{name}: {_OTHER}"
         end, before = entry.header_offset + _ENTRY.size + named + more + entry.compress_size, entry

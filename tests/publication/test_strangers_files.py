@@ -261,6 +261,17 @@ def test_an_entry_is_called_the_same_in_both_places(tmp_path):
     assert said == "tiny/b/: has another name in the zip's list of contents than before its content"
 
 
+@pytest.mark.parametrize(("field", "value"), [(8, zipfile.ZIP_DEFLATED), (18, 2)])
+def test_an_entry_has_the_same_size_and_method_in_both_places(field, value, tmp_path):
+    path = packed(tmp_path / "a.zip", "tiny/a")
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<H", content, content.index(b"PK\x03\x04", 4) + field, value)
+    path.write_bytes(content)
+    assert verify_deposit(path) == [
+        "tiny/a: has another size or method in the zip's list of contents than before its content"
+    ]
+
+
 @pytest.mark.parametrize("name", ["", "\0x"])
 def test_a_name_of_nothing_is_none(name, tmp_path):
     path = packed(tmp_path / "a.zip", "Q" * max(len(name), 1))
