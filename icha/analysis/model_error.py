@@ -15,7 +15,7 @@ from scipy.stats import wasserstein_distance
 
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.contact.models import ASPERITIES
-from icha.datasets.attributes import DERIVED, collected
+from icha.datasets.attributes import DERIVED, collected, why_no_result
 from icha.datasets.bins import bin_values
 from icha.datasets.build import described, variable
 from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spots_of
@@ -113,7 +113,7 @@ def model_error(
             raise ValueError(f"{_name(labels)}: this solution is given twice")
         try:
             run = select(labels.run)
-            if "incomplete" in run.attrs:
+            if why_no_result(run.attrs):
                 states[labels] = None
                 continue
             at = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
@@ -152,7 +152,7 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
 def _compare_stops(labels, run, truth):
     """The states of a run by boundary elements and of the one by asperities, by their labels; None where one failed."""
     check_same_contact(run, truth)
-    failed = "incomplete" in run.attrs or "incomplete" in truth.attrs
+    failed = why_no_result(run.attrs) or why_no_result(truth.attrs)
     found = {}
     stops, true_stops = _stops(run), _stops(truth)
     for load in dict.fromkeys((*stops, *true_stops)):

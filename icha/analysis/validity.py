@@ -14,7 +14,7 @@ import numpy as np
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.contact.models import ASPERITIES
 from icha.datasets.labels import LABELS
-from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE
+from icha.datasets.variables.campaign import COMPUTED_RUNS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -127,7 +127,7 @@ def _outside(study):
     energy = runs["surface_energy"].values
     for s, surface in enumerate(runs["surface"].values):
         for m, material in enumerate(runs["material"].values):
-            there = np.isin(status[s, ..., m], (COMPLETE, INCOMPLETE))
+            there = np.isin(status[s, ..., m], COMPUTED_RUNS)
             loadings = zip(share[s, ..., m, :][there], leg[s, ..., m, :][there] == 0, strict=True)
             ends = [own[loading][-1] for own, loading in loadings if loading.any()]
             if ends:

@@ -8,6 +8,7 @@ import typer
 from icha.cli.project import Mistake
 from icha.cli.scans import check_picture
 from icha.cli.terminal import say
+from icha.datasets.attributes import why_no_result
 from icha.support.printable import printable
 
 _BARS = " ▁▂▃▄▅▆▇█"
@@ -76,8 +77,10 @@ def show_run(run, name: str) -> None:
         f"surface:  period {quantity(value('period'), 'm')}, rms slope {value('rms_slope'):.4g}, rms height "
         f"{quantity(value('rms_height'), 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
     )
-    if "incomplete" in run.attrs:
-        say(f"failed:   {printable(run.attrs['incomplete'])}", fg="red")
+    if reason := why_no_result(run.attrs):
+        say(f"failed:   {printable(reason)}", fg="red")
+    if reason := run.attrs.get("applicability"):
+        say(f"warning:  {printable(reason)}", fg="red")
     steps = run.sizes["step"]
     if not steps:
         say("no step was reached")

@@ -7,6 +7,7 @@ import typer
 
 from icha.cli.project import FAILED, Mistake
 from icha.contact.models import ASPERITIES, MODELS
+from icha.datasets.attributes import why_no_result
 from icha.support.input_files import flaw_of_path
 
 
@@ -120,7 +121,7 @@ def simulate(
         raise Mistake(str(error)) from None
     write_dataset(run, output)
     show_run(run, str(output))
-    if "incomplete" in run.attrs:
+    if why_no_result(run.attrs):
         raise typer.Exit(FAILED)
 
 

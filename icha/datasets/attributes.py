@@ -22,6 +22,11 @@ INPUT, COMPUTED, COLLECTED, DERIVED, THEORY = (
 )
 
 
+def why_no_result(attrs: Mapping) -> str:
+    """Return why a run is no result, by its attributes: it ended early, or its checks failed; "" if it is one."""
+    return str(attrs.get("incomplete") or attrs.get("failed_checks", ""))
+
+
 def discovery(
     title: str,
     summary: str,

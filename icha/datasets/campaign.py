@@ -11,7 +11,7 @@ import xarray as xr
 from icha.datasets.campaign_file.write import write_campaign
 from icha.datasets.files import read_campaign
 from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED
+from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED
 from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN
 
@@ -34,7 +34,7 @@ def run_labels(tree: xr.DataTree) -> list[RunLabels]:
     found = []
     for study, node in tree.children.items():
         axes = [node[label].values.tolist() for label in LABELS]
-        there = np.isin(node["status"].transpose(*LABELS).values, (COMPLETE, INCOMPLETE))
+        there = np.isin(node["status"].transpose(*LABELS).values, COMPUTED_RUNS)
         found += [
             RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True)))
             for index in np.argwhere(there).tolist()
@@ -45,7 +45,8 @@ def run_labels(tree: xr.DataTree) -> list[RunLabels]:
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     """Take one run out of a campaign dataset, with the steps that it has and its own spots.
 
-    One that is incomplete has the reason in its attribute `incomplete`, as its file has.
+    Its attributes give reasons, as those of its file do: `incomplete` why it ended early, `failed_checks` which checks
+    failed, `applicability` why its model is not applicable.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     study = tree.children[labels.study].dataset
     index = {label: _position(study, labels, label) for label in LABELS}
     place = tuple(index.values())
-    status, steps, failure = (study.variables[name].transpose(*LABELS)[place] for name in _OF_THE_CAMPAIGN)
+    status, steps, failure = (study.variables[name].transpose(*LABELS)[place] for name in _OF_EVERY_CAMPAIGN)
     if int(status) in (MISSING, NOT_IN_DESIGN):
         raise ValueError(f"{labels}: this run is {'missing' if int(status) == MISSING else 'not in the design'}")
     part = (
@@ -77,7 +78,12 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         there = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
         part["snapshot"] = np.flatnonzero(np.isfinite(there))
     of_others = {name for model, names in FURTHER.items() if model != labels.model for name in names}
-    left_out = {*_OF_THE_CAMPAIGN, *of_others, *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
+    left_out = {
+        *_OF_EVERY_CAMPAIGN,
+        "applicability",
+        *of_others,
+        *(f"{dim}_{label}" for dim in RAGGED for label in LABELS),
+    }
     variables = {}
     for name, variable in study.variables.items():
         if name in left_out:
@@ -91,12 +97,18 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
             # Its snapshots are counted without those that only others have.
             own = xr.Variable(own.dims, np.searchsorted(part["snapshot"], own.values), own.attrs)
         variables[name] = own
-    attrs = study.attrs | {"contact_model": labels.model} | ({"incomplete": failure.item()} if incomplete else {})
+    attrs = study.attrs | {"contact_model": labels.model}
+    if incomplete:
+        attrs["incomplete"] = failure.item()
+    if int(status) == FAILED_CHECKS:
+        attrs["failed_checks"] = failure.item()
+    if "applicability" in study.variables:  # which campaigns of earlier versions lack
+        attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
     return variables, attrs
 
 
 # What the dataset of a campaign says of a run.
-_OF_THE_CAMPAIGN = ("status", "step_count", "failure")
+_OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
 
 
 def _position(study, labels, label):

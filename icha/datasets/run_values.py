@@ -26,7 +26,7 @@ Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 _DIMS = {name: description.dims for name, description in (RUN | PATCHES | CYCLE | LOOP).items()}
 # Dimensions stand among the variables in HDF5.
 _DIMENSIONS = {dim for dims in _DIMS.values() for dim in dims}
-_ATTRIBUTES = ("contact_model", "config_sha256", "incomplete")
+_ATTRIBUTES = ("contact_model", "config_sha256", "incomplete", "failed_checks", "applicability")
 _WIDTH_OF_TEXT = re.compile(r"string\d+")
 
 

@@ -12,6 +12,7 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.settings import run_settings, run_sha256
 from icha.contact.models import ASPERITIES
 from icha.datasets import results as results_files
+from icha.datasets.attributes import why_no_result
 from icha.datasets.results import ResultFiles, job_file
 from icha.figures.registry import DECLARATIONS
 from icha.planning import costs
@@ -210,6 +211,10 @@ def _loads(path, snapshots, rms_slope):
     return [loads[kind](value) for kind, value in stops]
 
 
+# Attributes of a run's file that say with which settings it was computed and what it is worth.
+_OF_STATE = ("config_sha256", "incomplete", "failed_checks")
+
+
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
     """State of a run's file, and the reason why the run failed, if it did."""
     if not file.is_file():
@@ -220,8 +225,8 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
         return DAMAGED, ""
     if attributes.get("config_sha256") != sha256:
         return CHANGED, ""
-    if reason := attributes.get("incomplete"):
-        return FAILED, str(reason)
+    if reason := why_no_result(attributes):
+        return FAILED, reason
     return DONE, ""
 
 
@@ -243,7 +248,7 @@ def read_attributes(file: Path) -> dict[str, str]:
 
     try:
         with h5py.File(file, "r") as data:
-            return {name: text(data.attrs[name]) for name in ("config_sha256", "incomplete") if name in data.attrs}
+            return {name: text(data.attrs[name]) for name in _OF_STATE if name in data.attrs}
     except OSError as error:
         if error.errno is not None:  # no permission, for one: that says nothing of the content
             raise
@@ -251,7 +256,7 @@ def read_attributes(file: Path) -> dict[str, str]:
 
 
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
-    """Paths of the runs that did not reach the end of their path with the present settings, with their reasons."""
+    """Paths of the runs that are no results with the present settings, with their reasons."""
     states = {
         case.path: run_state(results / path, run_sha256(campaign, case))
         for path, case in campaign_files(campaign).runs.items()

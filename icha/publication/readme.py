@@ -17,7 +17,7 @@ from icha.configuration.publication import Publication
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.model_paper import MODEL_PAPER
-from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
+from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.planning.costs import Cost
 from icha.planning.software import further_software
 from icha.publication.attributes import acknowledgement
@@ -186,7 +186,8 @@ def _asked(campaign: Campaign) -> dict:
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check], model_error) -> dict:
     """Runs that are complete and that are not, and how far both can be trusted."""
     designs = study_designs(dataset)
-    complete, incomplete = (_runs_of_status(dataset, status) for status in (COMPLETE, INCOMPLETE))
+    complete = _runs_of_status(dataset, COMPLETE)
+    incomplete = [*_runs_of_status(dataset, INCOMPLETE), *_runs_of_status(dataset, FAILED_CHECKS)]
     known = {failure.run: failure.reason for failure in publication.known_failures}
     incomplete = [IncompleteRun(*run, known.get(str(run[0]), "")) for run in incomplete]
     return {

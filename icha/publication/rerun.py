@@ -17,6 +17,7 @@ from pathlib import Path
 import netCDF4
 
 from icha.configuration.yaml_files import read_yaml
+from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
 from icha.planning.software import BY_TAMAAS, TAMAAS
 from icha.publication.deposit_files import CHECKSUMS, COMPUTED, SOURCE, copy_file, read_file
@@ -167,7 +168,7 @@ def _smallest(deposit: Found, runs: list[str]) -> str:
 
 
 def _outcome(deposit: Found, run: str) -> tuple[int, str]:
-    """Number of steps of a run, and why it is incomplete; an empty text if it is complete."""
+    """Number of steps of a run, and why it is no result; an empty text if it is one."""
     with tempfile.TemporaryDirectory() as scratch:
         copy = Path(scratch, "run.nc")
         copy_file(deposit, run, copy)
@@ -175,7 +176,7 @@ def _outcome(deposit: Found, run: str) -> tuple[int, str]:
             refuse_traps(copy)
             with netCDF4.Dataset(copy) as file:
                 steps = file.dimensions.get("step")
-                return (len(steps) if steps is not None else 0), str(getattr(file, "incomplete", ""))
+                return (len(steps) if steps is not None else 0), why_no_result(file.__dict__)
         except (OSError, ValueError, RuntimeError) as error:  # the last one for what the library cannot read
             raise Refused(f"{deposit.path}: {run}: is no run: {error}") from None
 

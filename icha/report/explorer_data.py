@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from icha.contact.models import ASPERITIES
+from icha.datasets.attributes import why_no_result
 from icha.datasets.campaign import reduced_gap, spots_of
 from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
 from icha.figures.fig8_patch_sizes import patch_areas, patch_density, patches_above
@@ -57,7 +58,7 @@ def run_entry(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
     """
     kinds, targets = run["step_kind"].values.astype(str), run["step_target"].values
     return {
-        "failure": run.attrs.get("incomplete", ""),
+        "failure": why_no_result(run.attrs),
         "period": float(run["period"]),
         "periodic": str(run["boundary"].values) == "periodic",
         "grid": int(run["grid"]),

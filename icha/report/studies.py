@@ -10,7 +10,7 @@ from icha.analysis.checks import IDENTITY_LIMIT
 from icha.analysis.common_loads import at_round_pressures
 from icha.datasets.campaign import loading_stops, select_run
 from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, RAGGED
+from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, RAGGED
 from icha.figures.style import quantity, unit_for
 from icha.report.template import MOST_ROWS, scientific
 from icha.support.statistics import ensemble
@@ -26,18 +26,18 @@ def study_section(campaign, name, comparison):
         places = np.argwhere(status == kind).tolist()
         return [RunLabels(name, *(axes[label][i] for label, i in zip(LABELS, at, strict=True))) for at in places]
 
-    complete = labels_of(COMPLETE)
+    complete, failed = labels_of(COMPLETE), [*labels_of(INCOMPLETE), *labels_of(FAILED_CHECKS)]
     # Spots and events are many, and not shown.
     small = xr.DataTree.from_dict({f"/{name}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])})
     runs = [(each, select_run(small, each)) for each in complete[:MOST_ROWS]]
     return {
         "name": name,
-        "asked": int(np.isin(status, (COMPLETE, INCOMPLETE, MISSING)).sum()),
+        "asked": int(np.isin(status, (*COMPUTED_RUNS, MISSING)).sum()),
         "complete": len(complete),
-        "failed": int((status == INCOMPLETE).sum()),
+        "failed": len(failed),
         "missing": int((status == MISSING).sum()),
         "combinations": status.size,
-        "failures": [(each, _failure(dataset, each)) for each in labels_of(INCOMPLETE)[:MOST_ROWS]],
+        "failures": [(each, _failure(dataset, each)) for each in failed[:MOST_ROWS]],
         "lacking": labels_of(MISSING)[:MOST_ROWS],
         "axes": axes,
         # Their mean gap is not the mean separation, which is that from the half-space far away.

@@ -215,6 +215,19 @@ def test_snapshots_met_in_another_order_are_put_together():
     assert len(orders) == 2, "the small campaign must hold both orders for the test above to mean anything"
 
 
+def test_a_run_with_failed_checks_keeps_its_values_and_reasons(tmp_path):
+    """It has its own status; its values stay in the file, and what is told of one run is not told of another."""
+    (first, run), (second, other) = [each for each in small.runs() if each[0].study == "slopes"][:2]
+    reasons = {"failed_checks": "loss: -0.1 (a loss)", "applicability": "asperity model not applicable: a reason"}
+    tree = campaign_tree([(first, run.assign_attrs(reasons)), (second, other)])
+    taken, whole = select_run(tree, first), select_run(tree, second)
+    assert {name: taken.attrs[name] for name in reasons} == reasons
+    assert "failed_checks" not in whole.attrs and whole.attrs["applicability"] == ""
+    status = np.array(tree["slopes"]["status"].attrs["flag_meanings"].split())[tree["slopes"]["status"].values]
+    assert sorted(set(status.flat) - {"not_in_design"}) == ["complete", "failed_checks"]
+    np.testing.assert_array_equal(taken["contact_area_fraction"].values, run["contact_area_fraction"].values)
+
+
 def test_combinations_that_nobody_asked_for_are_not_in_the_design(tmp_path):
     """A design along its diagonal: two slopes and two materials, of which two runs are asked for and one is there."""
     asked = {labels: run for labels, run in small.runs() if labels.study == "slopes"}
@@ -224,7 +237,7 @@ def test_combinations_that_nobody_asked_for_are_not_in_the_design(tmp_path):
     write_dataset(campaign_tree([(steep, asked[steep])], design=[steep, other]), tmp_path / "c.nc")
     tree = read_campaign(tmp_path / "c.nc")
     status = tree["slopes"]["status"]
-    assert status.attrs["flag_meanings"] == "complete incomplete missing not_in_design"
+    assert status.attrs["flag_meanings"] == "complete incomplete missing not_in_design failed_checks"
     table = np.array(status.attrs["flag_meanings"].split())[status.values]
     assert status["rms_slope"].values.tolist() == [0.2, 1.0] and status["material"].values.tolist() == ["soft", "hertz"]
     assert table.tolist() == [[[[["not_in_design", "missing"], ["complete", "not_in_design"]]]]]

@@ -10,7 +10,15 @@ import xarray as xr
 from icha.datasets.campaign_file.spool import Entry, Members, plain
 from icha.datasets.files import read_run
 from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED, VARIES_WITH
+from icha.datasets.variables.campaign import (
+    COMPLETE,
+    FAILED_CHECKS,
+    INCOMPLETE,
+    MISSING,
+    NOT_IN_DESIGN,
+    RAGGED,
+    VARIES_WITH,
+)
 from icha.datasets.variables.run import CELLS
 
 
@@ -22,7 +30,7 @@ class Arrangement:
     all models. origins : global attributes of a run of every model. widths : of
     texts, in bytes. sizes : of the dimensions that runs have in common. snapshots : position of every kind and target.
     entries : the runs there are, in the order of the axes; positions (n, 5) : of these; failures : why each of these is
-    incomplete, an empty text if it is not. status, step_count : along `LABELS`.
+    no result, an empty text if it is one. status, step_count : along `LABELS`.
     """
 
     name: str
@@ -105,7 +113,11 @@ def _arranged_study(name, members, design):
     shape = tuple(len(axes[label]) for label in LABELS)
     status = np.full(shape, NOT_IN_DESIGN, np.int8)
     status[tuple(np.transpose(list(position.values())))] = MISSING
-    status[tuple(positions.T)] = [INCOMPLETE if failure else COMPLETE for failure in failures]
+    status[tuple(positions.T)] = [
+        INCOMPLETE if failure else FAILED_CHECKS if entry.failed_checks else COMPLETE
+        for entry, failure in zip(entries, failures, strict=True)
+    ]
+    failures = [failure or entry.failed_checks for entry, failure in zip(entries, failures, strict=True)]
     step_count = np.zeros(shape, np.int32)
     step_count[tuple(positions.T)] = _sizes(entries, "step")
     return Arrangement(

@@ -22,7 +22,7 @@ from icha.datasets.netcdf import (
     is_text,
 )
 from icha.datasets.storage import COMPRESSION, LEAST_COMPRESSED
-from icha.datasets.variables.campaign import CAMPAIGN, FAILURE, RAGGED, place_of
+from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, place_of
 from icha.datasets.variables.run import FURTHER
 
 # A block holds at most so many runs, and of each variable so many values: some megabytes of all together.
@@ -67,7 +67,7 @@ class Group:
 
     study : what belongs there. block : how many neighbouring runs are written at once, along every label. columns : the
     variables of the runs. places : of what is ragged, by dimension and label, to which run it belongs. known :
-    variables whose values need no run, with these. failure : why runs are incomplete.
+    variables whose values need no run, with these. texts : reasons, by name, with what each of the study's runs has.
     """
 
     study: Arrangement
@@ -75,7 +75,7 @@ class Group:
     columns: dict[str, Column]
     places: dict[tuple[str, str], netCDF4.Variable]
     known: list[tuple[netCDF4.Variable, np.ndarray]]
-    failure: netCDF4.Variable
+    texts: list[tuple[netCDF4.Variable, list[str]]]
 
 
 def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str]) -> Group:
@@ -103,8 +103,13 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
             )
             columns[name] = _define_column(group, study, storage, name, attributes)
     known = [*_define_numbers_along(group, study), *_define_of_campaign(group, study, storage)]
-    width = max(1, *(len(failure.encode()) for failure in study.failures))
-    failure = define_text(group, "failure", LABELS, width, FAILURE.attributes, **storage.options(LABELS, (), width))
+    texts = [
+        (_define_reasons(group, storage, name, own), own)
+        for name, own in (
+            ("failure", study.failures),
+            ("applicability", [entry.applicability for entry in study.entries]),
+        )
+    ]
     places = {
         (dim, label): define_numbers(
             group, f"{dim}_{label}", (dim,), np.int32, place_of(dim, label).attributes, **storage.options((), (dim,))
@@ -112,7 +117,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
         for dim in counts
         for label in LABELS
     }
-    return Group(study, storage.block, columns, places, known, failure)
+    return Group(study, storage.block, columns, places, known, texts)
 
 
 @dataclass(frozen=True)
@@ -174,6 +179,12 @@ def _define_column(group, study, storage, name, attributes):
     return Column(define_numbers(group, name, along + own, dtype, attributes, **options), along, own, fill)
 
 
+def _define_reasons(group, storage, name, own):
+    """Make a variable of texts, one for each run, as wide as the longest of its `own` texts."""
+    width = max(1, *(len(text.encode()) for text in own))
+    return define_text(group, name, LABELS, width, CAMPAIGN[name].attributes, **storage.options(LABELS, (), width))
+
+
 def _define_numbers_along(group, study):
     """Make the variables that number the positions along the dimensions of runs, and give them with their values."""
     for dim, size in study.sizes.items():
@@ -186,7 +197,7 @@ def _define_of_campaign(group, study, storage):
     """Make the variables that say what runs there are, and give them with their values."""
     values = {"status": study.status, "step_count": study.step_count, **study.axes}
     for name, (dims, _, _, dtype, *_) in CAMPAIGN.items():
-        if name == "failure":
+        if name in ("failure", "applicability"):
             continue
         attributes = CAMPAIGN[name].attributes
         if dtype is str:

@@ -24,6 +24,8 @@ class Entry(NamedTuple):
     sizes: tuple[tuple[str, int], ...]
     snapshots: tuple[tuple[bytes, float], ...]
     failure: str
+    failed_checks: str
+    applicability: str
 
     def size(self, dim: str) -> int:
         """Size of a dimension of the run, 0 if it has none of that name."""
@@ -76,7 +78,14 @@ def spooled(
         sizes = {dim: n for dims, v in values.values() for dim, n in zip(dims, v.shape, strict=False)}
         alike = frozenset(values), tuple(sorted(sizes.items())), _snapshots(values)
         alike = (shared.setdefault(each, each) for each in alike)
-        members.entries[labels] = Entry(labels, spool.tell(), *alike, _failure(values, attrs))
+        members.entries[labels] = Entry(
+            labels,
+            spool.tell(),
+            *alike,
+            _failure(values, attrs),
+            str(attrs.get("failed_checks", "")),
+            str(attrs.get("applicability", "")),
+        )
         pickle.dump(values, spool, protocol=5)
         for name, (_, v) in values.items():
             if is_text(v.dtype):

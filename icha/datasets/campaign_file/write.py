@@ -46,7 +46,8 @@ def write_campaign(
     along `spot` and `event`; `spot_model`, `spot_surface`, `spot_seed`, `spot_rms_slope` and `spot_material`,
     `event_model` and so on, and `spot_snapshot`, are positions along these dimensions, from 0. `status(model, surface,
     seed, rms_slope, material)` says of every combination whether its run is complete, incomplete,
-    missing or not in the design; `failure` says why a run is incomplete. What is not known of an incomplete run, and
+    missing, not in the design or no result because its checks failed; `failure` says why it is incomplete or which
+    checks failed, `applicability` why its model is not applicable. What is not known of an incomplete run, and
     everything of those that are not there, is missing; so is what only runs of another model have.
 
     Parameters
@@ -96,10 +97,11 @@ def _write(group: Group, spool: BinaryIO) -> None:
     """Write all values of a group, those of the runs from the spool, block by block."""
     for variable, values in group.known:
         variable[...] = values
-    for position, failure in zip(group.study.positions, group.study.failures, strict=True):
-        if failure:
-            text = characters(np.array(failure))
-            group.failure[(*position, slice(0, len(text)))] = text
+    for variable, own in group.texts:
+        for position, reason in zip(group.study.positions, own, strict=True):
+            if reason:
+                text = characters(np.array(reason))
+                variable[(*position, slice(0, len(text)))] = text
     common = {name: _Common(name, column) for name, column in group.columns.items() if _is_common(column)}
     ragged = _Ragged(group)
     for start, members in _blocks(group):

@@ -6,8 +6,11 @@ from icha.datasets.bins import bin_table
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.terms import Variable
 
-COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN = range(4)
-STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design")
+# Runs of the first kind alone are results. A run with failed checks has all of its values, which are not to be used.
+COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS = range(5)
+STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks")
+# Status of runs that have a file, whatever it is worth.
+COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS)
 
 STATUS = Variable(
     LABELS,
@@ -27,7 +30,12 @@ STEP_COUNT = Variable(
     np.int32,
     {"comment": "from this position on along step, numbers are filled with _FillValue and texts are empty"},
 )
-FAILURE = Variable(LABELS, "1", "why the run is incomplete; empty where it is not", str)
+FAILURE = Variable(
+    LABELS, "1", "why the run is incomplete or which of its checks failed; empty where it is complete", str
+)
+APPLICABILITY = Variable(
+    LABELS, "1", "why the model is not applicable to the surface and material of the run; empty where it is", str
+)
 CAMPAIGN = {
     "status": STATUS,
     "step_count": STEP_COUNT,
@@ -37,6 +45,7 @@ CAMPAIGN = {
     "surface": Variable(("surface",), "1", "name of the surface", str, coordinate=True),
     "material": Variable(("material",), "1", "name of the material", str, coordinate=True),
     "failure": FAILURE,
+    "applicability": APPLICABILITY,
 }
 
 # Of these every run has as many as it has: in the campaign they stand one after the other.
