@@ -21,7 +21,7 @@ from icha.boundary_elements.states import CellState
 from icha.contact.events import Events
 from icha.contact.failures import NotConverged
 from icha.contact.model import PRESSURE, Control
-from icha.surfaces.summits import Asperities, find_summits
+from icha.surfaces.summits import Asperities, locate_summits
 from icha.surfaces.surface import Surface
 
 # The gap at which a cell lets go, over the largest height, below which it is lost in the rounding of heights.
@@ -55,10 +55,10 @@ class BoundaryElements:
         Raises
         ------
         ValueError
-            If the surface is a free square or has no summits, or adhesion is lost in the rounding of its heights.
+            If the surface is a free square, or adhesion is lost in the rounding of its heights.
         """
         surface.require_periodic("a model of boundary elements")
-        law, asperities, h = JKR(material), find_summits(surface), surface.spacing
+        law, asperities, h = JKR(material), locate_summits(surface), surface.spacing
         column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
         cell = row * surface.grid + column
         jump_in = law.jump_in_approach(asperities.radius_of_curvature)
@@ -104,7 +104,8 @@ class BoundaryElements:
         """The state at which the first summit, or a plateau without any, is about to make contact."""
         separation = float(self.heights.max())
         if self.adhesive:
-            separation = max(separation, float(np.max(self.asperities.height + self.summits.reach * self.spacing)))
+            first = self.asperities.height + self.summits.reach * self.spacing
+            separation = float(np.max(first, initial=separation))
         nothing = np.zeros(0)
         return CellState(separation, nothing.astype(int), nothing, nothing, nothing)
 

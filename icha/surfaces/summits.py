@@ -1,6 +1,6 @@
 """Summits of a surface: positions, heights and radii of curvature, found below the grid."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.ndimage
@@ -42,6 +42,12 @@ _MAX_NEWTON_STEPS = 30
 _CONVERGED = 1e-9
 _FARTHEST = 1.5
 _SAME_SUMMIT = 1e-3
+# Largest rise of a supported summit above the nodes around it, in units of that of a parabola with their second
+# differences. Of the summits of smooth random surfaces (H 0.3 to 0.9, six seeds) 99.5 % stay below 0.91 with 12 nodes
+# per shortest wave, 1.09 with 8, 1.16 with 6 and 1.69 with 5; beside steps and single pixels, nearly all lie above.
+_MAX_RISE = 1.5
+# Smallest rise that is not rounding, in units of the range of heights.
+_ROUNDING = 1e-9
 # Less curvature than this part of the surface's mean is rounding on a plateau.
 _FLAT = 1e-6
 # Nodes beyond the edges of a free square, after which the spline has forgotten what follows: 0.43^32 = 2e-12.
@@ -60,6 +66,8 @@ class Asperities:
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
     free : whether it is single, on a free half-space, or repeats.
+    unsupported_height : (m,) array, heights of the maxima of the spline that the nodes around do not support, m. They
+        are no asperities.
     """
 
     position: np.ndarray
@@ -67,6 +75,7 @@ class Asperities:
     radius_of_curvature: np.ndarray
     period: float
     free: bool = False
+    unsupported_height: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
     def cell(self) -> float:
@@ -79,7 +88,26 @@ class Asperities:
 
 
 def find_summits(surface: Surface) -> Asperities:
-    """All summits of a surface: the maxima, with negative-definite curvature, of a quintic spline through its nodes.
+    """Find the summits of a surface, at least one, as `locate_summits` does.
+
+    Raises
+    ------
+    ValueError
+        If the surface has no summit with negative-definite curvature, or none that its nodes support.
+    """
+    found = locate_summits(surface)
+    if len(found):
+        return found
+    if unsupported := len(found.unsupported_height):
+        raise ValueError(
+            f"heights: none of the {unsupported} summits of the surface is supported by the nodes around it, as where "
+            "heights have steps; expected smooth summits. Use a cutoff, or the model boundary_elements"
+        )
+    raise ValueError("heights: the surface has no summit with negative-definite curvature")
+
+
+def locate_summits(surface: Surface) -> Asperities:
+    """Locate the summits of a surface: the maxima, with negative-definite curvature, of a quintic spline.
 
     Comparing every node with its neighbours misses and misplaces elongated summits: on a crest oblique to the grid
     the highest node can lie cells away from the summit, or there is none, and the contact area then depends on the
@@ -90,14 +118,12 @@ def find_summits(surface: Surface) -> Asperities:
     The edges of a free square have no maxima: a crest that runs over an edge has its top outside. There the heights go
     on by point reflection at the edge, and summits count that lie between the outermost nodes.
 
+    Beside steps, pits, single pixels and plateaus the spline rises where the surface does not. A maximum is a summit
+    only if the nodes around it support its height (`_is_supported`).
+
     Returns
     -------
-    Asperities, ordered as the nodes from which they were found.
-
-    Raises
-    ------
-    ValueError
-        If the surface has no summit with negative-definite curvature.
+    Asperities, ordered as the nodes from which they were found; possibly none.
     """
     spacing, beyond = surface.spacing, _BEYOND if surface.free else 0
     heights = surface.heights
@@ -113,27 +139,46 @@ def find_summits(surface: Surface) -> Asperities:
     at = np.delete(at, twice[:, 1], axis=0)
     if surface.free:
         at = at[np.all((at > beyond) & (at < beyond + surface.grid - 1), axis=1)]
-    if not len(at):
-        raise ValueError("heights: the surface has no summit with negative-definite curvature")
     there = on_cores(lambda some: _spline(coefficients, at[some]), blocks(len(at), _POINTS))
-    height, _, _, hyy, hyx, hxx = np.concatenate(there, axis=1)
-    position = (at[:, ::-1] - beyond) * spacing
+    height, _, _, hyy, hyx, hxx = np.concatenate([np.empty((6, 0)), *there], axis=1)
+    supported = _is_supported(heights, at, height)
+    position = (at[supported, ::-1] - beyond) * spacing
     position[position >= surface.period] = 0.0
     return Asperities(
         position=position,
-        height=height,
-        radius_of_curvature=spacing**2 / np.sqrt(hyy * hxx - hyx**2),
+        height=height[supported],
+        radius_of_curvature=spacing**2 / np.sqrt(hyy * hxx - hyx**2)[supported],
         period=surface.period,
         free=surface.free,
+        unsupported_height=height[~supported],
     )
+
+
+def _is_supported(heights, at, height):
+    """Whether the nodes around the summits at points (k, 2), in cells, support their heights (k,).
+
+    Along each axis a parabola through nodes of second difference -d rises at most d/8 above the higher of two
+    neighbours. Of the second differences at the two nodes on either side of the summit the smaller one counts: at the
+    edge of a plateau one of them is large, the other is not (the limiter `minmod` of A. Suresh and H. T. Huynh,
+    J. Comput. Phys. 136 (1997) 83-99, doi:10.1006/jcph.1997.5745).
+    """
+    grid = len(heights)
+    (row, column), (y, x) = np.floor(at).astype(int).T, np.mod(np.rint(at).astype(int), grid).T
+    rows, columns = np.mod([row, row + 1], grid), np.mod([column, column + 1], grid)
+
+    def bend(line, before, after):
+        return 2 * line - before - after
+
+    bend_x = bend(heights[y, columns], heights[y, columns - 1], heights[y, (columns + 1) % grid])
+    bend_y = bend(heights[rows, x], heights[rows - 1, x], heights[(rows + 1) % grid, x])
+    rise = (np.maximum(bend_x.min(axis=0), 0.0) + np.maximum(bend_y.min(axis=0), 0.0)) / 8
+    corners = heights[rows[:, None], columns[None, :]].max(axis=(0, 1))
+    return height - corners <= _MAX_RISE * rise + _ROUNDING * np.ptp(heights)
 
 
 def count_summits(surface: Surface) -> int:
     """Number of summits of a surface; 0 if it has none."""
-    try:
-        return len(find_summits(surface))
-    except ValueError:
-        return 0
+    return len(locate_summits(surface))
 
 
 def _spline_coefficients(heights):

@@ -6,7 +6,8 @@ import scipy.optimize
 from scipy.spatial import cKDTree
 
 from icha import SelfAffineSpectrum, Surface
-from icha.surfaces.summits import find_summits
+from icha.surfaces.summit_coverage import SummitCoverage
+from icha.surfaces.summits import find_summits, locate_summits
 
 PERIOD = 100e-6
 SPECTRUM = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 16, 0.8)
@@ -185,11 +186,67 @@ def test_no_summit_lies_above_the_surface_around_it():
 def test_noise_on_every_node_is_no_obstacle():
     heights = np.random.default_rng(8).normal(size=(64, 64))
     summits = find_summits(Surface(heights, 1.0))
-    assert len(summits) > 0.1 * 64**2
+    assert len(summits) + len(summits.unsupported_height) > 0.1 * 64**2
     assert np.all(np.isfinite(summits.radius_of_curvature))
+    # Two nodes a wave are no evidence of how high a summit is between them.
+    assert len(summits.unsupported_height) > len(summits)
 
 
 def test_a_ridge_without_summits_is_refused():
     x = 2 * np.pi * np.arange(32) / 32
     with pytest.raises(ValueError, match="heights"):
         find_summits(Surface(np.cos(x)[None, :] * np.ones((32, 1)), 1.0))
+
+
+def test_every_summit_of_a_resolved_surface_is_supported():
+    """Of smooth surfaces with eight and more nodes per shortest wave nothing is left out but a summit in a thousand."""
+    for cells, most in ((12, 0.0), (8, 2e-3), (5, 0.02)):
+        spectrum = SelfAffineSpectrum(1.0, 0.25, cells / 256, hurst=0.8, rms_slope=0.3)
+        found = [find_summits(spectrum.realise(256, seed)) for seed in (1, 2, 3)]
+        left_out = sum(len(each.unsupported_height) for each in found)
+        assert left_out <= most * sum(map(len, found))
+
+
+def stepped(surface):
+    """The surface with one half of it raised by forty rms heights: edges of a plateau, where the spline overshoots."""
+    heights = np.array(surface.heights)
+    heights[:, :32] += 40 * surface.rms_height
+    return Surface(heights, surface.period)
+
+
+def with_lost_line(surface):
+    """The surface with one line far below all others, beside which the spline rises."""
+    heights = np.array(surface.heights)
+    heights[20] -= 40 * surface.rms_height
+    return Surface(heights, surface.period)
+
+
+@pytest.mark.parametrize("damage", [stepped, with_lost_line])
+def test_no_summit_lies_above_what_its_nodes_support(damage):
+    """Beside a step or a lost line the spline rises by rms heights above all nodes; such maxima are left out and counted."""
+    surface = SelfAffineSpectrum(1.0, 0.25, 10 / 64, hurst=0.8, rms_slope=0.3).realise(64, 4)
+    smooth, found = locate_summits(surface), locate_summits(damage(surface))
+    heights = damage(surface).heights
+    assert found.unsupported_height.max() > heights.max() + surface.rms_height
+    assert found.height.max() < heights.max() + 0.1 * surface.rms_height
+    # What lies away from the damage is found as before.
+    assert len(found) > 0.5 * len(smooth)
+
+
+def test_a_plateau_is_a_high_place_without_a_summit():
+    surface = SelfAffineSpectrum(1.0, 0.25, 10 / 64, hurst=0.8, rms_slope=0.3).realise(64, 4)
+    whole = SummitCoverage.of(surface, locate_summits(surface))
+    separations = np.array([2.0, 1.0]) * surface.rms_height
+    assert whole.reasons_against(separations) == []
+    cut = Surface(np.minimum(surface.heights, 0.8 * surface.rms_height), 1.0)
+    clipped = SummitCoverage.of(cut, locate_summits(cut))
+    assert clipped.uncovered_share(0.5 * surface.rms_height) > 0.5
+    assert clipped.reasons_against(separations)
+
+
+def test_summits_that_all_lack_support_are_refused_with_what_to_do():
+    heights = np.where(np.add.outer(np.arange(32) // 8, np.arange(32) // 8) % 2, 1.0, 0.0)
+    surface = Surface(heights, 1.0)
+    assert len(locate_summits(surface)) == 0 and len(locate_summits(surface).unsupported_height)
+    with pytest.raises(ValueError, match=r"heights: none of the \d+ summits .* supported .* boundary_elements"):
+        find_summits(surface)
