@@ -16,6 +16,7 @@ from icha.contact.events import Events
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel
 from icha.contact.models import ASPERITIES, MODELS
+from icha.contact.observables import summit_counts
 from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.bins import bin_values
 from icha.datasets.build import build, described, joined, of, stacked
@@ -29,7 +30,7 @@ from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD
 from icha.path.waypoints import Waypoint
 from icha.support.rules import Integer
 from icha.surfaces.moments import spectral_moments
-from icha.surfaces.summits import count_summits
+from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
 
 # Snapshots farther up, in h_rms, are far above any contact.
@@ -105,7 +106,9 @@ def simulate(
         observables = chosen.observables(surface, material, path)
         contact = observables.contact if kept is None else chosen.kept(observables.contact, kept)
         met = _followed(contact, observables, path, material.contact_modulus * surface.rms_slope, progress)
-        dataset = _dataset(surface, material, path, model, seed, met, observables.of_contact())
+        loading = [step["mean_separation"] for step in met.steps if step["leg"] == 0]
+        reasons = observables.reasons_against(loading)
+        dataset = _dataset(surface, material, path, model, seed, met, observables.of_contact(), reasons)
     if met.failure:
         raise ConvergenceError(met.failure, dataset) from None
     if path.unload:
@@ -123,10 +126,10 @@ def unfollowed(
     Arguments are those of `simulate`.
     """
     met = _Met([], [], [], reason)
-    return _dataset(surface, material, path, model, seed, met, {"asperity_count": count_summits(surface)})
+    return _dataset(surface, material, path, model, seed, met, summit_counts(locate_summits(surface)))
 
 
-def _dataset(surface, material, path, name, seed, met, of_contact):
+def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
     """All of a run but the loop as a whole; with the reason why it ends early, if it does."""
     chosen, table = _model(name), RUN | FURTHER[name]
     values = {
@@ -139,6 +142,7 @@ def _dataset(surface, material, path, name, seed, met, of_contact):
     }
     described_here = table | CYCLE | _targets(table, path)
     dataset = build(described_here, values, _attributes(surface, material, path, name, chosen))
+    dataset.attrs["applicability"] = f"asperity model not applicable: {'; '.join(reasons)}" if reasons else ""
     return dataset.assign_attrs(incomplete=met.failure) if met.failure else dataset
 
 

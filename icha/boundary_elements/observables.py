@@ -1,5 +1,6 @@
 """Observables of boundary elements: what a run's dataset has of their states, by the names of its variables."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from icha.boundary_elements.patches import centres, edges, labelled, labels_at
 from icha.boundary_elements.states import CellState
 from icha.contact.bins import PRESSURE_BINS, gap_bins
 from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
+from icha.contact.observables import summit_counts
 from icha.surfaces.surface import Surface
 
 
@@ -21,7 +23,7 @@ class PatchObservables:
 
     def of_contact(self) -> dict:
         """What holds for all states."""
-        return {"asperity_count": len(self.contact.asperities)}
+        return summit_counts(self.contact.asperities)
 
     def of_step(self, state: CellState) -> dict:
         """Residuals of the equilibrium, events so far, and how far Wu's formula is known to hold."""
@@ -63,6 +65,10 @@ class PatchObservables:
             "contact_pressure": on_grid(state.cells, state.pressure, np.float32),
             **self._patches(state, cells),
         }
+
+    def reasons_against(self, separations: Iterable[float]) -> list[str]:
+        """No reasons: the cells are the surface itself."""
+        return []
 
     @property
     def largest_tension(self) -> float:

@@ -1,8 +1,15 @@
 """The interface of what a run keeps of the states of a model, beyond what a path needs to know of it."""
 
+from collections.abc import Iterable
 from typing import Any, Protocol
 
 from icha.contact.model import ContactModel, S
+from icha.surfaces.summits import Asperities
+
+
+def summit_counts(asperities: Asperities) -> dict[str, int]:
+    """Numbers of the summits of a surface, by the names of their variables."""
+    return {"asperity_count": len(asperities), "unsupported_summit_count": len(asperities.unsupported_height)}
 
 
 class Observables(Protocol[S]):
@@ -20,6 +27,9 @@ class Observables(Protocol[S]):
 
     def of_snapshot(self, state: S) -> dict[str, Any]:
         """Distributions of gap and pressure, and the spots."""
+
+    def reasons_against(self, separations: Iterable[float]) -> list[str]:
+        """Reasons why the model does not stand for the surface at these mean separations (m) of the first loading."""
 
     @property
     def largest_tension(self) -> float:

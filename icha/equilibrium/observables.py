@@ -1,12 +1,15 @@
 """Observables of interacting asperities: what a run's dataset has of their states, by the names of its variables."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from icha.contact.observables import summit_counts
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import ContactState
+from icha.surfaces.summit_coverage import SummitCoverage
 from icha.surfaces.surface import Surface
 
 
@@ -19,7 +22,7 @@ class AsperityObservables:
 
     def of_contact(self) -> dict:
         """What holds for all states."""
-        return {"asperity_count": len(self.contact.asperities)}
+        return summit_counts(self.contact.asperities)
 
     def of_step(self, state: ContactState) -> dict:
         """Error of the equilibrium, events so far, and how far Wu's formula is known to hold."""
@@ -57,6 +60,10 @@ class AsperityObservables:
             "spot_curvature_radius": spots.radius_of_curvature,
             "spot_members": spots.members,
         }
+
+    def reasons_against(self, separations: Iterable[float]) -> list[str]:
+        """Reasons why asperities do not stand for the surface at these mean separations, m."""
+        return SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
 
     @property
     def largest_tension(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,9 +67,9 @@ class SummitCoverage:
         unsupported = np.count_nonzero(self.unsupported_height > separation)
         return unsupported / max(unsupported + np.count_nonzero(self.summit_height > separation), 1)
 
-    def reasons_against(self, separations: np.ndarray) -> list[str]:
+    def reasons_against(self, separations: Iterable[float]) -> list[str]:
         """Reasons why asperities do not stand for the surface at these mean separations (m); none if they do."""
-        separations, found = np.unique(separations), []
+        separations, found = np.unique(list(separations)), []
         uncovered = max(map(self.uncovered_share, separations), default=0.0)
         if uncovered > MAX_SHARE:
             found.append(

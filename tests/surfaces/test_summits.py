@@ -223,7 +223,7 @@ def with_lost_line(surface):
 
 @pytest.mark.parametrize("damage", [stepped, with_lost_line])
 def test_no_summit_lies_above_what_its_nodes_support(damage):
-    """Beside a step or a lost line the spline rises by rms heights above all nodes; such maxima are left out and counted."""
+    """Beside a step or a lost line the spline rises by rms heights above all nodes; such maxima are left out."""
     surface = SelfAffineSpectrum(1.0, 0.25, 10 / 64, hurst=0.8, rms_slope=0.3).realise(64, 4)
     smooth, found = locate_summits(surface), locate_summits(damage(surface))
     heights = damage(surface).heights

@@ -104,6 +104,9 @@ RUN = {
     **terms("seed", "tabor_parameter"),
     "stickiness": Variable((), "1", "attraction over repulsion after Pastewka and Robbins; above 1 surfaces stick"),
     "asperity_count": Variable((), "1", "number of asperities on the surface", int),
+    "unsupported_summit_count": Variable(
+        (), "1", "number of maxima of the interpolated surface that are no asperities, as no nodes support them", int
+    ),
     "control": Variable((), "1", "what is imposed: separation or load", str),
     "united_until": Variable(
         (),
