@@ -24,7 +24,7 @@ def test_all_values_come_back_with_their_dimensions(tmp_path, spots):
         given = run[name].values
         assert dims == run[name].dims
         np.testing.assert_array_equal(own, characters(given) if is_text(given.dtype) else given, strict=True)
-    assert attrs == {name: run.attrs[name] for name in ("contact_model", "config_sha256")}
+    assert attrs == {name: run.attrs[name] for name in ("contact_model", "config_sha256", "applicability")}
 
 
 def test_why_a_run_is_incomplete_is_read_and_variables_can_be_left_out(tmp_path):
