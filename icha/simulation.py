@@ -29,7 +29,7 @@ from icha.path.hysteresis import hysteresis
 from icha.path.limits import LEAST_PRESSURE, MAX_REDUCED_PRESSURE
 from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
 from icha.path.waypoints import Waypoint
-from icha.support.rules import Integer
+from icha.support.rules import ALL_MODELS, Integer
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.summits import count_summits
 from icha.surfaces.surface import Surface
@@ -93,7 +93,7 @@ def simulate(
     Raises
     ------
     ValueError
-        If an argument is of the wrong type, there is no such model, a target lies beyond what the model covers on this
+        If an argument is of the wrong type, there is no such model, a target lies beyond what is allowed on this
         surface, or the surface has no summits or cannot be computed by the model.
     ConvergenceError
         If an equilibrium is not found or a target cannot be reached; its `dataset` holds the stops before.
@@ -173,8 +173,10 @@ def _check_arguments(surface, material, path):
         if target.kind == RELATIVE_LOAD:
             asked = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
             if target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
-                beyond = f"lies beyond what the model covers (a reduced pressure of at most {MAX_REDUCED_PRESSURE})"
-                raise ValueError(f"{asked} {beyond}")
+                raise ValueError(
+                    f"{asked} lies beyond the range of the asperity model (a reduced pressure of at most "
+                    f"{MAX_REDUCED_PRESSURE}), {ALL_MODELS}"
+                )
             if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
                 raise ValueError(
                     f"{asked} is next to no load; allowed: a reduced pressure of at least {LEAST_PRESSURE} in absolute "

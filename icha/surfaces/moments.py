@@ -17,6 +17,17 @@ if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
 
+# Cells of a wave in which its summits are resolved, and cells of a summit where the shortest waves have half of them:
+# isotropic surfaces have about 0.2 summits for every square of the shortest wave.
+RESOLVED_CELLS = 8
+LEAST_CELLS_OF_SUMMIT = 80
+
+
+def cells_per_short_wave(grid: int, summits: float) -> float:
+    """Nodes along the shortest waves of a surface of `grid` nodes a side, as the number of its summits tells it."""
+    return RESOLVED_CELLS / 2 * math.sqrt(grid**2 / max(summits, 1) / LEAST_CELLS_OF_SUMMIT)
+
+
 def summit_density(m2: float, m4: float) -> float:
     """Maxima of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), of its moments; m^-2 (Nayak 1971)."""
     return m4 / (6 * math.sqrt(3) * math.pi * m2)
