@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
+from icha.asperity.full_contact import full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
@@ -22,14 +23,15 @@ from icha.datasets.bins import bin_values
 from icha.datasets.build import build, described, joined, of, stacked
 from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
+from icha.models.applicability import asperity_applicability
 from icha.models.model import Model
 from icha.path.follow import follow
 from icha.path.hysteresis import hysteresis
 from icha.path.limits import LEAST_PRESSURE, MAX_REDUCED_PRESSURE
 from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
 from icha.path.waypoints import Waypoint
-from icha.support.rules import Integer
-from icha.surfaces.moments import spectral_moments
+from icha.support.rules import ALL_MODELS, Integer
+from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
 
@@ -86,12 +88,13 @@ def simulate(
     -------
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable carries units and
     a long name. A path that goes on after the first loading has all its equilibria as steps, and a dimension event. The
-    attribute `contact_model` names the model; boundary elements have dimensions row and column, besides.
+    attribute `contact_model` names the model, and `applicability` says why it is not applicable to this contact, or is
+    empty; boundary elements have dimensions row and column, besides.
 
     Raises
     ------
     ValueError
-        If an argument is of the wrong type, there is no such model, a target lies beyond what the model covers on this
+        If an argument is of the wrong type, there is no such model, a target lies beyond what is allowed on this
         surface, or the surface has no summits or cannot be computed by the model.
     ConvergenceError
         If an equilibrium is not found or a target cannot be reached; its `dataset` holds the stops before.
@@ -142,8 +145,16 @@ def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
     }
     described_here = table | CYCLE | _targets(table, path)
     dataset = build(described_here, values, _attributes(surface, material, path, name, chosen))
-    dataset.attrs["applicability"] = f"asperity model not applicable: {'; '.join(reasons)}" if reasons else ""
+    dataset.attrs["applicability"] = _applicability(name, values, met, reasons)
     return dataset.assign_attrs(incomplete=met.failure) if met.failure else dataset
+
+
+def _applicability(name, values, met, reasons):
+    """Why the model is not applicable to the run; an empty text where it is."""
+    if name != ASPERITIES:
+        return ""
+    largest = max((step["contact_area_fraction"] for step in met.steps), default=0.0)
+    return asperity_applicability(values["full_contact_energy_ratio"], reasons, largest)
 
 
 def _model(name: str) -> Model:
@@ -165,8 +176,10 @@ def _check_arguments(surface, material, path):
         if target.kind == RELATIVE_LOAD:
             asked = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
             if target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
-                beyond = f"lies beyond what the model covers (a reduced pressure of at most {MAX_REDUCED_PRESSURE})"
-                raise ValueError(f"{asked} {beyond}")
+                raise ValueError(
+                    f"{asked} lies beyond the range of the asperity model (a reduced pressure of at most "
+                    f"{MAX_REDUCED_PRESSURE}), {ALL_MODELS}"
+                )
             if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
                 raise ValueError(
                     f"{asked} is next to no load; allowed: a reduced pressure of at least {LEAST_PRESSURE} in absolute "
@@ -299,7 +312,7 @@ def _unit_of(kinds: set[str], named_by: str) -> dict:
 
 def _of_surface(surface: Surface, material: Material, seed: int) -> dict:
     """What is pressed against what."""
-    moments = spectral_moments(surface)
+    moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
     return {
         **of(material, *MATERIAL),
         **of(surface, *ROUGHNESS, "period", "boundary", "grid"),
@@ -310,6 +323,12 @@ def _of_surface(surface: Surface, material: Material, seed: int) -> dict:
         "nayak_parameter": moments.nayak_parameter,
         "tabor_parameter": material.tabor_parameter(1 / surface.rms_curvature),
         "stickiness": stickiness(moments, material),
+        "full_contact_energy_ratio": full_contact_energy_ratio(
+            surface.full_contact_energy, material.contact_modulus, material.surface_energy
+        ),
+        "height_skewness": skewness,
+        "height_kurtosis": kurtosis,
+        "slope_anisotropy": slope_anisotropy(surface),
     }
 
 

@@ -19,7 +19,8 @@ from icha.contact.tolerances import HELD_CELLS, HELD_PART, RESIDUAL_TOLERANCE, S
 from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
-from icha.datasets.variables.run import PATCHES
+from icha.datasets.variables.run import PATCHES, RUN
+from icha.datasets.variables.terms import INFINITE
 from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST
 from icha.path.open_work import integration_error, pressure_jump, unresolved_work
 from icha.path.targets import AREA_FRACTION, BETWEEN
@@ -41,6 +42,7 @@ SEPARATION_RISE_LIMIT = 1e-2
 # The check of every run of a campaign that it reached its end.
 COMPLETED = "completed"
 
+_MAY_BE_INFINITE = {name for name, description in RUN.items() if INFINITE in description.further}
 
 # Name, value, limit and description of what is checked.
 Finding = tuple[str, float, float, str]
@@ -92,7 +94,8 @@ def _checked(variables: Mapping[Hashable, xr.Variable], attrs: Mapping[str, str]
 
 
 def _findings(run: _Run) -> Iterator[Finding]:
-    yield "finite", _not_finite(run.values.values()), 0, "number of values that are not finite"
+    values = (own[~np.isposinf(own)] if name in _MAY_BE_INFINITE else own for name, own in run.values.items())
+    yield "finite", _not_finite(values), 0, "number of values that are not finite"
     steps = run.sizes["step"]
     yield "steps", int(steps == 0), 0, "1 if the run has no step at all"
     if steps == 0:

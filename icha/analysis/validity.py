@@ -6,15 +6,19 @@ campaign is run, after it, and on top of its report.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.analysis.validated_range import VALIDATED, outside_validation, surface_in_words
+from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, MEANING
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.contact.models import ASPERITIES
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS
+from icha.surfaces.moments import cells_per_short_wave
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +30,11 @@ VALIDATION = {
     False: {"contact area": (-21.4, -4.9), "mean separation": (-36.4, -0.8)},
 }
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
+
+# Runs by boundary elements of sticky surfaces, at 50 mJ/m^2, took 4 to 21 times as long as expected.
+MOST_OVER_EXPECTED = 20
+
+_RATIO = "full_contact_energy_ratio"
 
 # Of single spots so many may lie outside the range of Wu's formula before it is said where: of every surface some do.
 _FEW = 0.05
@@ -41,11 +50,32 @@ class Statement(NamedTuple):
     good: bool = True
 
 
+class Case(NamedTuple):
+    """A run, as far as it matters how well its model is known to hold.
+
+    Parameters
+    ----------
+    model : name of the model.
+    surface : name of the surface.
+    material : name of the material.
+    facts : values by the names of `icha.analysis.validated_range.VALIDATED`, the ratio of energies among them.
+    """
+
+    model: str
+    surface: str
+    material: str
+    facts: Mapping[str, float]
+
+    @property
+    def ratio(self) -> float:
+        """Elastic energy of full contact over the work of adhesion; infinite without adhesion."""
+        return self.facts[_RATIO]
+
+
 def statements(
     models: Mapping[str, Collection[str]],
-    adhesive: Collection[bool],
-    outside: str | None,
-    others: Collection[str],
+    cases: Iterable[Case],
+    outside: str | None = None,
     sticky: Collection[str] = (),
 ) -> list[Statement]:
     """What is to be known of the models of a campaign, one line of each kind.
@@ -53,54 +83,114 @@ def statements(
     Parameters
     ----------
     models : those of every study.
-    adhesive : whether there are runs of asperities with adhesion, and without.
+    cases : the runs.
     outside : where jumps into contact lie outside what was verified, `named`; None if nothing jumps.
-    others : surfaces that are not of the kind that the model was validated on.
     sticky : materials on surfaces that stick to each other without load, as `in_words_if_sticky` names them.
     """
-    found = [Statement("models", _used(models))]
+    cases = list(cases)
+    found = [Statement("models", _used(models)), *_full_contact(cases)]
     if outside is not None:
         verified = f"Wu's distance is verified for Tabor parameters of {WU_HOLDS_FROM:g} and more"
         found.append(Statement("jump-in", f"{verified}; {outside or 'all cases inside'}", not outside))
     if sticky:
-        text = f"attraction outweighs repulsion: {named(sticky)}; there errors can be many times those below"
+        text = f"attraction outweighs repulsion: {named(sticky)}; errors can be many times those of the validation"
         found.append(Statement("sticky", text, False))
-    if adhesive:
-        are = "are not self-affine surfaces" if len(others) > 1 else "is not a self-affine surface"
-        but = f"; {named(others)} {are}: errors may be others there" if others else ""
-        found.append(Statement("accuracy", f"{_error(adhesive)} {_VALIDATED}{but}", not others))
+    of_asperities = [case for case in cases if case.model == ASPERITIES]
+    if of_asperities:
+        found += [_surfaces(of_asperities), _accuracy(of_asperities)]
     return found
 
 
-def named(cases: Iterable[str]) -> str:
+def _full_contact(cases):
+    """The statement on the energy of full contact, where there is adhesion."""
+    adhesive = [case for case in cases if case.ratio < math.inf]
+    if not adhesive:
+        return
+    lowest = min(adhesive, key=lambda case: case.ratio)
+    text = f"U_full/dgamma is {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}); {MEANING}"
+    if any(case.model == ASPERITIES and case.ratio < FULL_CONTACT_BELOW for case in cases):
+        text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
+    if any(case.model != ASPERITIES and case.ratio < HIGH_PULL_OFF_BELOW for case in cases):
+        text += f"; boundary elements may take up to {MOST_OVER_EXPECTED} times as long as expected"
+    yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
+
+
+def _surfaces(cases):
+    """The statement on what the surfaces are."""
+    of_surface: dict[str, list] = {}
+    for case in cases:
+        of_surface.setdefault(case.surface, []).append(case.facts)
+    described = (f"{name}: {surface_in_words(facts)}" for name, facts in of_surface.items())
+    return Statement("surfaces", named(described, ". "))
+
+
+def _accuracy(cases):
+    """The statement on the error of asperities: known where surface and material are within the validation."""
+    unknown, adhesive = {}, set()
+    for case in cases:
+        of_surface = outside_validation({name: case.facts[name] for name in case.facts if name != _RATIO})
+        if of_surface:
+            unknown.setdefault(case.surface, of_surface)
+        elif of_material := outside_validation({_RATIO: case.ratio}):
+            unknown.setdefault(f"{case.material} on {case.surface}", of_material)
+        else:
+            adhesive.add(case.ratio < math.inf)
+    quoted = f"{_error(adhesive)} {_VALIDATED}" if adhesive else ""
+    if not unknown:
+        return Statement("accuracy", quoted)
+    places = [f"{place}: {'; '.join(reasons)}" for place, reasons in unknown.items()]
+    text = (
+        f"nothing is known of the accuracy {'of the others' if adhesive else 'here'} ({named(places, '. ')}); "
+        "`models: [asperities, boundary_elements]` would tell"
+    )
+    return Statement("accuracy", f"{quoted}; {text}" if quoted else text, False)
+
+
+def named(cases: Iterable[str], between: str = ", ") -> str:
     """The first of some cases, and how many there are besides."""
     cases = list(cases)
     more = len(cases) - _MOST_NAMES
-    return ", ".join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+    return between.join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def of_dataset(campaign: xr.DataTree, others: Collection[str] = ()) -> list[Statement]:
+def of_dataset(campaign: xr.DataTree) -> list[Statement]:
     """The statements on what was computed; other than complete runs count as far as they went.
 
     Parameters
     ----------
     campaign : the campaign dataset; of one that is left in its file only a few variables are read.
-    others : as in `statements`.
     """
-    models, adhesive, shares, sticky = {}, set(), {}, {}
+    models, cases, shares, sticky = {}, [], {}, {}
     for name, node in campaign.children.items():
         study = node.to_dataset()
         models[name] = [str(model) for model in study["model"].values]
+        cases += _cases(study)
         if ASPERITIES not in models[name]:
             continue
         for surface, material, share in _outside(study):
-            adhesive.add(share is not None)
             if share is not None:
                 shares[surface, material] = max(share, shares.get((surface, material), 0.0))
                 found = study["stickiness"].sel(surface=surface, material=material)
                 sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
     outside = _shares_in_words(shares) if shares else None
-    return statements(models, adhesive, outside, others, in_words_if_sticky(sticky))
+    return statements(models, cases, outside, in_words_if_sticky(sticky))
+
+
+def _cases(study):
+    """The runs of a study that were computed."""
+    measured = [name for name in VALIDATED if name in study]
+    status = study["status"].transpose(*LABELS)
+    values = {
+        name: study[name].broadcast_like(status).transpose(*LABELS).values
+        for name in (*measured, "grid", "asperity_count", "boundary")
+    }
+    labels = [study[label].values for label in LABELS]
+    for at in map(tuple, np.argwhere(np.isin(status.values, COMPUTED_RUNS))):
+        model, surface, _, _, material = (str(own[index]) for own, index in zip(labels, at, strict=True))
+        facts = {name: float(values[name][at]) for name in measured}
+        facts["nodes_per_short_wave"] = cells_per_short_wave(values["grid"][at], values["asperity_count"][at])
+        facts["free_edges"] = float(values["boundary"][at] != "periodic")
+        yield Case(model, surface, material, facts)
 
 
 def in_words_if_sticky(found: Mapping[tuple[str, str], float]) -> list[str]:

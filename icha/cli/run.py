@@ -389,7 +389,7 @@ def _tell_what_it_is_worth(campaign, results: Path) -> None:
     passed = sum(check.passed for check in found)
     say(f"checks:  {passed if passed < len(found) else 'all'} of {len(found)} passed: the equations are solved")
     say("Whether the models hold here is another question:")
-    _say_what_holds(found_validity(campaign, results / files.dataset))
+    _say_what_holds(found_validity(results / files.dataset))
 
 
 def _say_what_holds(statements) -> None:

@@ -67,6 +67,8 @@ def show_run(run, name: str) -> None:
     place = [printable(run.attrs[key]) for key in ("campaign", "study") if run.attrs.get(key)]
     if place:
         say(f"campaign {' and study '.join(place)}")
+    if run.attrs.get("applicability"):
+        say(printable(run.attrs["applicability"]), fg="yellow")
     say(f"model:    {printable(run.attrs.get('contact_model', 'unknown')).replace('_', ' ')}")
     say(
         f"material: E* {quantity(value('contact_modulus'), 'Pa')}, surface energy "

@@ -66,6 +66,7 @@ class Topography(NamedTuple):
     boundary: str
     rms_slope: float | None  # None where no study asks for it
     sha256: str
+    full_contact_energy: float  # U_full/E* at rms slope 1, m; NaN where nothing may adhere
 
 
 class Defaults(Section):

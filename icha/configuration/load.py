@@ -1,6 +1,7 @@
 """From the text of a configuration file to a campaign, or to a list of everything that is wrong with it."""
 
 import itertools
+import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from icha.configuration.campaign import Campaign, Topography
 from icha.configuration.defaults import excessive_defaults, merged, place_in_defaults, with_defaults
 from icha.configuration.design import designed
 from icha.configuration.errors import MOST_TOLD, ConfigurationError, line, problem_of
+from icha.configuration.full_contact import sticky_runs
 from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.configuration.plausibility import (
     CONFIRMED,
@@ -95,6 +97,7 @@ def load_configuration(
     for name, each in topographies.items():
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
+    unusual += sticky_runs(campaign)
     slips = list(plausibility_problems(unusual, meant))
     fail(itertools.chain(campaign.problems(), slips, needless_confirmations(unusual, meant)))
     confirmed = [
@@ -134,13 +137,14 @@ def _topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Probl
     """What there is to know of every topography that is pressed and comes from a file; what is wrong with them."""
     contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
     asking = {each.surface for each in contacts if each.rms_slope == MEASURED}
+    adhering = {each.surface for each in contacts if campaign.materials[each.material].surface_energy > 0}
     found, wrong = {}, []
     for name in dict.fromkeys(each.surface for each in contacts):
         surface = campaign.surfaces[name]
         if surface.random:
             continue
         try:
-            grid, period, boundary, slope, sha256 = _facts(surface, name in asking)
+            grid, period, boundary, slope, sha256, energy = _facts(surface, name in asking, name in adhering)
         except (ValueError, MemoryError) as error:
             key = getattr(error, "key", "path")
             origin = campaign.origin("surfaces", name)
@@ -150,23 +154,26 @@ def _topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Probl
             wrong.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
             continue
         # Six digits name the files, and are more than any instrument has.
-        found[name] = Topography(grid, period, boundary, None if slope is None else float(f"{slope:.6g}"), sha256)
+        slope = None if slope is None else float(f"{slope:.6g}")
+        found[name] = Topography(grid, period, boundary, slope, sha256, energy)
     return found, wrong
 
 
-def _facts(surface, with_slope: bool) -> tuple[int, float, str, float | None, str]:
+def _facts(surface, with_slope: bool, with_energy: bool) -> tuple[int, float, str, float | None, str, float]:
     if isinstance(surface, MeasuredSurface):
         # Slow to import, and not for every campaign.
         from icha.surfaces.measured.topography import topography_facts
 
         facts = topography_facts(surface.path, surface.preparation)
         slope = facts.rms_slope if with_slope else None
-        return facts.grid, facts.period, facts.boundary, slope, facts.source_sha256
+        return facts.grid, facts.period, facts.boundary, slope, facts.source_sha256, facts.full_contact_energy
     heights = read_height_map(surface.path, surface.metres_per_unit)
-    slope = None
-    if with_slope:
+    slope, energy = None, math.nan
+    if with_slope or with_energy:
         # Imports SciPy's transforms, for which no other call should wait.
         from icha.surfaces.surface import Surface
 
-        slope = Surface(heights, surface.period).rms_slope
-    return len(heights), surface.period, "periodic", slope, sha256_of(Path(surface.path))
+        topography = Surface(heights, surface.period)
+        slope = topography.rms_slope if with_slope else None
+        energy = topography.full_contact_energy / topography.rms_slope**2 if with_energy else math.nan
+    return len(heights), surface.period, "periodic", slope, sha256_of(Path(surface.path)), energy

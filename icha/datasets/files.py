@@ -20,6 +20,7 @@ from icha.datasets.netcdf import (
     define_dimensions,
     define_numbers,
     define_text,
+    is_refused,
     is_text,
     not_finite,
 )
@@ -93,7 +94,7 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
             raise ValueError(f"{where}: variable {name!r} has no units")
         if variable.dtype.kind not in "fc":
             continue
-        bad = ~np.isfinite(variable.values)
+        bad = is_refused(variable.values, variable.attrs)
         if "missing" in variable.attrs:
             bad &= ~np.isnan(variable.values)
         if excused is not None and set(variable.dims) & set(excused.dims):

@@ -14,6 +14,7 @@ import xarray as xr
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.files import has_groups, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
+from icha.datasets.netcdf import is_refused
 from icha.datasets.variables import run as variables_of_run
 from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
 from icha.datasets.variables.terms import Variable
@@ -303,7 +304,7 @@ def _flaws_of_variables(data, table, names, there) -> Iterator[str]:
 def _flaws_of_numbers(data) -> Iterator[str]:
     for name, variable in data.variables.items():
         if variable.dtype.kind == "f" and "missing" not in variable.attrs:
-            bad = int(np.count_nonzero(~np.isfinite(variable.values)))
+            bad = int(np.count_nonzero(is_refused(variable.values, variable.attrs)))
             if bad:
                 yield f"{name}: {bad} of {variable.size} values are not finite"
 

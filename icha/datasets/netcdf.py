@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import netCDF4
 import numpy as np
 
+from icha.datasets.variables.terms import INFINITE
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -64,6 +66,12 @@ def _define(group, name, dtype, dims, attrs, storage):
     variable.set_auto_maskandscale(False)
     variable.set_auto_chartostring(False)
     return variable
+
+
+def is_refused(values: np.ndarray, attrs: Mapping[str, object]) -> np.ndarray:
+    """Which numbers of a variable are not finite, but for infinite ones where its attributes allow them."""
+    refused = ~np.isfinite(values)
+    return refused & ~np.isposinf(values) if INFINITE in attrs else refused
 
 
 def not_finite(name: Hashable, dims: tuple[Hashable, ...], bad: np.ndarray) -> str:

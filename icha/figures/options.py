@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from icha.contact.models import BOUNDARY_ELEMENTS, first_of
+from icha.contact.models import BOUNDARY_ELEMENTS, MODELS, first_of
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.declaration import Campaign, FigureOptions, Inputs
@@ -133,10 +133,16 @@ class ComparedFigure(StudyFigure):
         """A study without boundary elements is one more."""
         yield from super().study_problems(campaign, study)
         if not is_compared(campaign, self.study):
-            reason = (
-                "has no boundary elements beside it; allowed: a study with both `models` and reduced pressures for "
-                "targets, or one that an entry of boundary_elements names"
-            )
+            if set(study.models) == set(MODELS):
+                reason = (
+                    f"has boundary elements, but its targets are {study.targets.last[0]}s, and errors are compared at "
+                    "the same load; allowed: a study with both `models` and reduced_pressures for targets"
+                )
+            else:
+                reason = (
+                    "has no boundary elements beside it; allowed: a study with both `models` and reduced pressures "
+                    "for targets, or one that an entry of boundary_elements names"
+                )
             yield ("study",), self.study, reason
 
 

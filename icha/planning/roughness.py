@@ -6,6 +6,14 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.planning.costs import Roughness, roughness_of, self_affine_moments
+from icha.surfaces.moments import (
+    SpectralMoments,
+    cells_per_short_wave,
+    height_statistics,
+    slope_anisotropy,
+    spectral_moments,
+    summit_density,
+)
 
 
 def roughness(campaign: Campaign, name: str) -> Roughness:
@@ -28,6 +36,35 @@ def rms_curvature(campaign: Campaign, name: str) -> float:
     return surface.rms_curvature / surface.rms_slope
 
 
+def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
+    """Values of a surface by the names of `icha.analysis.validated_range.VALIDATED`, as far as a surface has them.
+
+    A random surface is Gaussian and isotropic; one from a file is measured.
+    """
+    section = campaign.surfaces[name]
+    if isinstance(section, SelfAffineSurface):
+        lengths = section.period, section.rolloff_wavelength, section.short_wavelength
+        moments = SpectralMoments(*self_affine_moments(*lengths, section.hurst))
+        skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, False
+        summits = section.period**2 * summit_density(moments.m2, moments.m4)
+        grid = section.grid
+    else:
+        from icha.surfaces.summits import count_summits
+
+        surface = _read(section)
+        moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
+        anisotropy, free = slope_anisotropy(surface), surface.free
+        summits, grid = count_summits(surface), surface.grid
+    return {
+        "slope_anisotropy": anisotropy,
+        "height_skewness": skewness,
+        "height_kurtosis": kurtosis,
+        "nayak_parameter": moments.nayak_parameter,
+        "nodes_per_short_wave": cells_per_short_wave(grid, summits),
+        "free_edges": float(free),
+    }
+
+
 def _read(section):
     # SciPy, for which campaigns without such a surface do not wait.
     if isinstance(section, MeasuredSurface):
@@ -42,7 +79,6 @@ def _read(section):
 
 def measured_roughness(surface) -> Roughness:
     """Of an `icha.Surface` that is there."""
-    from icha.surfaces.moments import spectral_moments
     from icha.surfaces.summits import count_summits
 
     moments = spectral_moments(surface)

@@ -4,14 +4,15 @@ import math
 from functools import cache
 from pathlib import Path
 
-from icha.analysis.validity import Statement, in_words_if_sticky, named, of_dataset, statements
+from icha.analysis.validity import Case, Statement, in_words_if_sticky, named, of_dataset, statements
+from icha.asperity.full_contact import full_contact_energy_ratio
 from icha.asperity.material import WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
-from icha.configuration.surfaces import SelfAffineSurface
+from icha.configuration.full_contact import full_contact_energy
 from icha.contact.models import ASPERITIES
-from icha.planning.roughness import rms_curvature
+from icha.planning.roughness import rms_curvature, surface_facts
 from icha.surfaces.moments import SpectralMoments
 
 # Radius of the mean curvature of the summits of a Gaussian surface times its rms curvature (McCool 1986, as in
@@ -24,14 +25,17 @@ _LEAST = 0.84
 
 def expected_validity(campaign: Campaign) -> list[Statement]:
     """What is to be expected, with Tabor parameters of summits of the mean curvature that a Gaussian surface has."""
+    facts = cache(lambda surface: surface_facts(campaign, surface))
     curvature = cache(lambda surface: rms_curvature(campaign, surface))
-    adhesive, tabor, sticky = set(), {}, {}
+    cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
         section = campaign.materials[case.material]
-        if case.model != ASPERITIES:
-            continue
-        adhesive.add(section.surface_energy > 0)
-        if section.surface_energy > 0:
+        energy = full_contact_energy(campaign, case.surface) * case.rms_slope**2
+        ratio = full_contact_energy_ratio(energy, section.contact_modulus, section.surface_energy)
+        # Only of asperities it matters how far a surface is from those of the validation.
+        own = facts(case.surface) if case.model == ASPERITIES else {}
+        cases.append(Case(case.model, case.surface, case.material, {**own, "full_contact_energy_ratio": ratio}))
+        if case.model == ASPERITIES and section.surface_energy > 0:
             material = Material(section.contact_modulus, section.surface_energy, section.interaction_range)
             curved = curvature(case.surface) * case.rms_slope
             tabor_parameter = float(material.tabor_parameter(_SUMMIT_RADIUS / curved))
@@ -41,7 +45,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             sticky[at] = max(value, sticky.get(at, 0.0))
     models = {name: study.models for name, study in campaign.studies.items()}
     outside = _expected_outside(tabor) if tabor else None
-    return statements(models, adhesive, outside, unlike_validated(campaign), in_words_if_sticky(sticky))
+    return statements(models, cases, outside, in_words_if_sticky(sticky))
 
 
 def _expected_outside(tabor):
@@ -57,15 +61,9 @@ def _roughly(mu):
     return f"{float(f'{mu:.2g}'):g}"
 
 
-def unlike_validated(campaign: Campaign) -> list[str]:
-    """Surfaces that asperities press and that are not of the kind on which they were validated, self-affine."""
-    pressed = dict.fromkeys(case.surface for case in run_cases(campaign) if case.model == ASPERITIES)
-    return [name for name in pressed if not isinstance(campaign.surfaces[name], SelfAffineSurface)]
-
-
-def found_validity(campaign: Campaign, dataset: Path) -> list[Statement]:
-    """What the campaign's dataset says."""
+def found_validity(dataset: Path) -> list[Statement]:
+    """What a campaign's dataset says."""
     import xarray as xr
 
     with xr.open_datatree(dataset, engine="netcdf4") as tree:
-        return of_dataset(tree, unlike_validated(campaign))
+        return of_dataset(tree)

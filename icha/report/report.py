@@ -108,7 +108,7 @@ def write_report(
         spectra=spectra(surfaces),
         checks=worst(checks),
         check_count=len(checks),
-        validity=of_dataset(campaign, _not_self_affine(surfaces)),
+        validity=of_dataset(campaign),
         failed=[check for check in checks if not check.passed],
         times=link(times_path) if times_path is not None else None,
         configuration=configuration,
@@ -147,11 +147,6 @@ def _pictures(figures, studies, link):
         }
         for study, figure in ordered
     ]
-
-
-def _not_self_affine(surfaces):
-    """Names of the surfaces that were not made from a spectrum."""
-    return list(dict.fromkeys(each.attrs.get("surface", "") for each in surfaces if "hurst" not in each))
 
 
 def _entries(model_error):

@@ -8,12 +8,15 @@ import math
 import numbers
 from dataclasses import dataclass
 
+# What the limits of the asperity model have to do with boundary elements, which could go further.
+ALL_MODELS = "to which boundary elements are limited, too"
+
 
 @dataclass(frozen=True)
 class Real:
     """A finite real number: in `unit`, greater than `above`, at least `least`, at most `most`.
 
-    `model_ends` says that beyond `most` it is the model that does not hold.
+    `model_ends` says that beyond `most` the asperity model does not hold, and that all models end there.
     """
 
     unit: str = "1"
@@ -45,7 +48,7 @@ class Real:
             words = "a number greater than 0" if self.least is None else "a number, 0 or greater"
         else:
             words = f"a number in {self.interval}"
-        return f"{words}, which the model covers" if self.model_ends else words
+        return f"{words}, where the asperity model holds" if self.model_ends else words
 
     def checked(self, name: str, value) -> float:
         """The value of argument `name` as a float; ValueError naming it if it breaks the rule."""
@@ -61,7 +64,9 @@ class Real:
         if self.holds(value):
             return value
         if self.model_ends and value > self.most:
-            raise ValueError(f"{name}: {value!r} lies beyond what the model covers (at most {self.most})")
+            raise ValueError(
+                f"{name}: {value!r} lies beyond the range of the asperity model (at most {self.most}), {ALL_MODELS}"
+            )
         if self.most is not None:
             raise ValueError(f"{name}: {value!r} must lie in {self.interval}{'' if self.unit == '1' else unit}")
         raise ValueError(

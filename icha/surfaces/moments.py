@@ -17,9 +17,57 @@ if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
 
+# Cells of a wave in which its summits are resolved, and cells of a summit where the shortest waves have half of them:
+# isotropic surfaces have about 0.2 summits for every square of the shortest wave.
+RESOLVED_CELLS = 8
+LEAST_CELLS_OF_SUMMIT = 80
+
+
+def cells_per_short_wave(grid: int, summits: float) -> float:
+    """Nodes along the shortest waves of a surface of `grid` nodes a side, as the number of its summits tells it."""
+    return RESOLVED_CELLS / 2 * math.sqrt(grid**2 / max(summits, 1) / LEAST_CELLS_OF_SUMMIT)
+
+
 def summit_density(m2: float, m4: float) -> float:
     """Maxima of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), of its moments; m^-2 (Nayak 1971)."""
     return m4 / (6 * math.sqrt(3) * math.pi * m2)
+
+
+# A smaller mean square slope, over that across it, is rounding.
+_NO_SLOPE = 1e-12
+# Waves shorter than this part of the period are so dense that sums over them are integrals.
+_DENSE = 64
+
+
+def self_affine_full_contact_energy(
+    period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
+) -> float:
+    """Elastic energy of full contact per area over E* (m) of a self-affine surface of rms slope 1; lengths in m.
+
+    `icha.surfaces.surface.Surface.full_contact_energy` of the surfaces of a
+    `icha.surfaces.spectrum.SelfAffineSpectrum`, without its modes: long waves are summed, the others integrated.
+    """
+    roll, last = period / rolloff_wavelength, period / short_wavelength
+    # Just below the cut-off, as in the spectrum, whatever the rounding of the quotient.
+    dense = min(_DENSE, last * (1 - 1e-9))
+    k = np.arange(-math.ceil(dense), math.ceil(dense) + 1)
+    k = np.hypot(k[:, None], k).ravel()
+    k = k[(k > 0) & (k < dense)]
+
+    def moment(order):
+        total = np.sum(np.maximum(k / roll, 1.0) ** (-2 * (1 + hurst)) * k**order)
+        return float(total) + 2 * math.pi * (integral(order + 1, last) - integral(order + 1, dense))
+
+    def integral(order, end):
+        """Integral of k^order C/C0 from 0 to end, flat up to the roll-off, falling as k^(-2 - 2 H) beyond."""
+        flat = min(end, roll) ** (order + 1) / (order + 1)
+        if end <= roll:
+            return flat
+        power = order - 1 - 2 * hurst
+        falling = math.log(end / roll) if power == 0 else math.expm1(power * math.log(end / roll)) / power
+        return flat + roll ** (order + 1) * falling
+
+    return period * moment(1) / (8 * math.pi * moment(2))
 
 
 class SpectralMoments(NamedTuple):
@@ -59,6 +107,26 @@ def spectral_moments(surface: Surface) -> SpectralMoments:
     """Moments of a profile of the surface, averaged over its directions."""
     height, slope, laplacian = surface.spectral_moments
     return SpectralMoments(height, slope / 2, 3 / 8 * laplacian)
+
+
+def height_statistics(surface: Surface) -> tuple[float, float]:
+    """Skewness and kurtosis of the heights; 0 and 3 for a Gaussian surface."""
+    z = surface.heights
+    variance = np.mean(z**2)
+    return float(np.mean(z**3) / variance**1.5), float(np.mean(z**4) / variance**2)
+
+
+def slope_anisotropy(surface: Surface) -> float:
+    """Largest over smallest rms slope of profiles along all directions: 1 if isotropic, infinite for straight grooves.
+
+    They are along the principal axes of the slope tensor, of the mean slopes of the cells between four nodes.
+    """
+    z = surface.heights if surface.free else np.pad(surface.heights, ((0, 1), (0, 1)), mode="wrap")
+    # Between opposite corners, along axes turned by 45 degrees, which changes no principal value.
+    one, other = z[1:, 1:] - z[:-1, :-1], z[1:, :-1] - z[:-1, 1:]
+    tensor = [[np.mean(one**2), np.mean(one * other)], [np.mean(one * other), np.mean(other**2)]]
+    least, most = np.linalg.eigvalsh(tensor)
+    return math.sqrt(most / least) if least > _NO_SLOPE * most else math.inf
 
 
 def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ the second x; node (iy, ix) lies at (x, y) = (ix, iy) * spacing.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -152,6 +153,21 @@ class Surface:
         """
         return (3 / 8 * self.spectral_moments[2]) ** 0.5
 
+    @property
+    def full_contact_energy(self) -> float:
+        """Elastic energy of full contact per nominal area over E*, U_full/E* = 1/4 sum q |h_q|^2, m.
+
+        In full contact a wave of amplitude h_q is pressed flat by the pressure q E* h_q/2. A free square is taken as
+        one quarter of the periodic surface that it makes with its mirror images, which has no steps at the edges.
+        """
+        if self.free:
+            return _mirrored_energy(self.heights, self.period)
+
+        def sums(k2, _, power):
+            return float(np.sum(np.sqrt(k2) * power))
+
+        return math.pi / (2 * self.period) * sum(self.by_wave_vector(sums))
+
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """The same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
         rms_slope = SLOPE.checked("rms_slope", rms_slope)
@@ -203,3 +219,11 @@ def _mean_squares(heights, spacing):
 
     slope2 = sum(sum(on_cores(along, blocks(n, _LINES))) for along in (along_x, along_y))
     return float(np.mean(heights**2)), float(slope2 / n**2), float(np.mean(laplacian**2))
+
+
+def _mirrored_energy(heights, period):
+    """`Surface.full_contact_energy` of a square and its mirror images, by a cosine series of period 2 L."""
+    power = scipy.fft.dctn(heights, norm="ortho", workers=1) ** 2
+    k2 = np.arange(len(heights)) ** 2.0
+    # Parseval: with orthonormal coefficients the mean square height is their sum of squares over the nodes.
+    return math.pi / (4 * period) * float(np.sum(np.sqrt(k2[:, None] + k2) * power)) / heights.size

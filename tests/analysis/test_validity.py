@@ -1,13 +1,20 @@
 """What is said of whether the model holds: numbers that are those of the validation, and what the data say."""
 
+import math
 import re
 
 import pytest
 import small_campaign as small
 from conftest import REPOSITORY
 
-from icha.analysis.validity import VALIDATION, named, of_dataset, statements
+import icha
+from icha.analysis.validated_range import VALIDATED, outside_validation
+from icha.analysis.validity import VALIDATION, Case, named, of_dataset, statements
+from icha.configuration.load import load_configuration
 from icha.datasets.campaign import campaign_tree
+from icha.planning.roughness import surface_facts
+from icha.surfaces.moments import cells_per_short_wave, height_statistics, slope_anisotropy, spectral_moments
+from icha.surfaces.summits import count_summits
 
 
 @pytest.mark.parametrize("adhesive", [False, True])
@@ -22,27 +29,125 @@ def test_the_errors_are_those_of_the_page_of_the_validation(adhesive):
         assert low < high < 0
 
 
+INSIDE = {
+    "slope_anisotropy": 1.0,
+    "height_skewness": 0.0,
+    "height_kurtosis": 3.0,
+    "nayak_parameter": 14.0,
+    "nodes_per_short_wave": 8.0,
+    "free_edges": 0.0,
+    "full_contact_energy_ratio": 140.0,
+}
+BARE = {**INSIDE, "full_contact_energy_ratio": math.inf}
+
+
+def case(facts, surface="rough", model="asperities", material="soft"):
+    return Case(model, surface, material, facts)
+
+
 def told(*arguments):
     return {statement.about: (statement.text, statement.good) for statement in statements(*arguments)}
 
 
 def test_each_kind_is_said_in_one_line():
-    found = told({"load": ["asperities", "boundary_elements"], "pull": ["asperities"]}, {True, False}, "", [])
+    models = {"load": ["asperities", "boundary_elements"], "pull": ["asperities"]}
+    found = told(models, [case(INSIDE), case(BARE, material="bare")], "")
+    assert list(found) == ["models", "adhesion", "jump-in", "surfaces", "accuracy"]
     assert found["models"] == ("asperities in load, pull; boundary elements in load", True)
     assert found["jump-in"] == ("Wu's distance is verified for Tabor parameters of 1 and more; all cases inside", True)
     text, good = found["accuracy"]
     assert good and text.startswith("contact area 8 to 25 % too small with adhesion and 5 to 21 % without, mean sep")
-    assert "contact area 5 to 21 % too small, mean" in told({}, {False}, None, ["scan"])["accuracy"][0]
-    assert told({}, {False}, None, ["scan"])["accuracy"][0].endswith(
-        "; scan is not a self-affine surface: errors may be others there"
+    assert found["surfaces"][0].startswith(
+        "rough: anisotropy of slopes 1, skewness of heights 0, kurtosis of heights 3"
     )
-    assert set(told({"load": ["boundary_elements"]}, set(), None, [])) == {"models"}
+    assert "contact area 5 to 21 % too small, mean" in told({}, [case(BARE)])["accuracy"][0]
+    assert set(told({}, [case({"full_contact_energy_ratio": math.inf}, model="boundary_elements")])) == {"models"}
     assert named("abcdef") == "a, b, c, d and 2 more" and named("ab") == "a, b"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("slope_anisotropy", 12.0, "anisotropy of slopes 12, validated: 1 to 1.2"),
+        ("slope_anisotropy", math.inf, "anisotropy of slopes inf, validated: 1 to 1.2"),
+        ("height_skewness", -0.7, "skewness of heights -0.7, validated: -0.2 to 0.2"),
+        ("height_kurtosis", 1.4, "kurtosis of heights 1.4, validated: 2.3 to 3.5"),
+        ("nayak_parameter", 87.0, "Nayak's parameter 87, validated: 1.5 to 47"),
+        ("nodes_per_short_wave", 3.2, "nodes per shortest wave 3.2, validated: 5.8 and more"),
+        ("free_edges", 1.0, "free edges, which boundary elements cannot have: give `boundary: window`"),
+    ],
+)
+def test_no_accuracy_is_quoted_of_surfaces_outside_the_validation(name, value, reason):
+    other = {**INSIDE, name: value}
+    text, good = told({}, [case(other, "scan")])["accuracy"]
+    assert not good and "%" not in text
+    assert text == (
+        f"nothing is known of the accuracy here (scan: {reason}); `models: [asperities, boundary_elements]` would tell"
+    )
+    text, _ = told({}, [case(other, "scan"), case(BARE)])["accuracy"]
+    assert text.startswith("contact area 5 to 21 % too small, mean")
+    assert f"; nothing is known of the accuracy of the others (scan: {reason})" in text
+
+
+def test_sticky_materials_are_named():
+    sticky = {**INSIDE, "full_contact_energy_ratio": 0.138}
+    found = told({}, [case(sticky, material="pdms"), case(INSIDE), case(sticky, model="boundary_elements")])
+    assert "(pdms on rough: U_full/dgamma 0.14, validated: 76 and more)" in found["accuracy"][0]
+    assert found["adhesion"] == (
+        "U_full/dgamma is 0.138 or more (pdms on rough); below 1 full contact has the lower energy; below about 2 high "
+        "pull-off is expected; the asperity model is not applicable below 1; boundary elements may take up to 20 times "
+        "as long as expected",
+        False,
+    )
+    assert told({}, [case(INSIDE)])["adhesion"] == (
+        "U_full/dgamma is 140 or more (soft on rough); below 1 full contact has the lower energy; below about 2 high "
+        "pull-off is expected",
+        True,
+    )
+
+
+def test_the_range_of_the_validation_is_that_of_its_surfaces():
+    campaign = load_configuration(REPOSITORY / "config/campaigns/validation.yaml").campaign
+    study = campaign.studies["short_range"]
+    found = {name: [] for name in VALIDATED}
+    for name in study.surfaces:
+        section = campaign.surfaces[name]
+        lengths = section.period, section.rolloff_wavelength, section.short_wavelength
+        material = campaign.materials["cmc"]
+        # What is expected of it, before a run, is inside.
+        expected = surface_facts(campaign, name)
+        assert not outside_validation(expected)
+        for seed in study.seeds:
+            surface = icha.SelfAffineSpectrum(*lengths, section.hurst).realise(section.grid, seed)
+            skewness, kurtosis = height_statistics(surface)
+            energy = surface.full_contact_energy
+            measured = {
+                "slope_anisotropy": slope_anisotropy(surface),
+                "height_skewness": skewness,
+                "height_kurtosis": kurtosis,
+                "nayak_parameter": spectral_moments(surface).nayak_parameter,
+                "nodes_per_short_wave": cells_per_short_wave(section.grid, count_summits(surface)),
+                "free_edges": 0,
+                "full_contact_energy_ratio": energy * material.contact_modulus / material.surface_energy,
+            }
+            assert not outside_validation(measured)
+            for key, value in measured.items():
+                found[key].append(value)
+    # Nothing much wider than what was validated, where there is an end.
+    assert max(found["nayak_parameter"]) > 0.98 * VALIDATED["nayak_parameter"].most
+    assert min(found["nodes_per_short_wave"]) < 1.02 * VALIDATED["nodes_per_short_wave"].least
+    assert min(found["full_contact_energy_ratio"]) < 1.02 * VALIDATED["full_contact_energy_ratio"].least
+    assert max(map(abs, found["height_skewness"])) > 0.15
+    assert min(found["height_kurtosis"]) < 2.4 and max(found["height_kurtosis"]) > 3.4
 
 
 def test_the_data_say_where_spots_lay_outside():
     found = {each.about: each for each in of_dataset(small.tree())}
     assert found["models"].text == "asperities in slopes, single"
+    assert "nodes per shortest wave" in found["accuracy"].text and not found["accuracy"].good
+    assert found["surfaces"].text.startswith("rough: anisotropy of slopes 1, skewness of heights ")
+    least = min(float(run["full_contact_energy_ratio"]) for _, run in small.runs())
+    assert found["adhesion"].text.startswith(f"U_full/dgamma is {least:.3g} or more (soft on rough)")
     assert found["jump-in"].good and found["jump-in"].text.endswith("; all cases inside")
     sticky = [float(run["stickiness"]) for labels, run in small.runs() if labels.material == "soft"]
     said = f"soft on rough (stickiness {max(sticky):.2g})"

@@ -538,7 +538,8 @@ def test_what_the_models_were_verified_for_is_told_before_a_run(project, small_m
         told = " ".join(said.split())
         assert "models: asperities in load" in told
         assert "jump-in: Wu's distance is verified for Tabor parameters of 1 and more; " in told
-        assert "accuracy: contact area 8 to 25 % too small with adhesion" in told
+        assert "adhesion: U_full/dgamma is " in told
+        assert "accuracy: nothing is known of the accuracy here (rough: " in told
 
 
 def test_checks_and_validity_are_told_apart_after_a_run(project, capsys):
@@ -547,11 +548,12 @@ def test_checks_and_validity_are_told_apart_after_a_run(project, capsys):
     write_campaign(small.runs(), results / "dataset/tiny.nc")
     write_checks(check_campaign(small.tree()), results / "checks.json")
     sys.modules["icha.cli.run"]._tell_what_it_is_worth(campaign, results)
-    checks, question, models, jumps, accuracy = capsys.readouterr().out.splitlines()
+    checks, question, models, energy, jumps, surfaces, accuracy = capsys.readouterr().out.splitlines()
     assert re.fullmatch(r"checks:  all of \d+ passed: the equations are solved", checks)
     assert question == "Whether the models hold here is another question:"
     assert models == "models:   asperities in slopes, single" and jumps.endswith("; all cases inside")
-    assert accuracy.startswith("accuracy: contact area ")
+    assert energy.startswith("adhesion: U_full/dgamma is ") and surfaces.startswith("surfaces: rough: anisotropy ")
+    assert accuracy.startswith("accuracy: nothing is known of the accuracy here (rough: ")
 
 
 def test_files_that_were_cut_off_are_damaged_and_to_do_again(project):

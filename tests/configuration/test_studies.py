@@ -45,9 +45,13 @@ BAD = {
     "pressure beyond the model": (
         "studies.one.targets.reduced_pressures",
         [0.3],
-        "[1e-12, 0.15], which the model covers",
+        "[1e-12, 0.15], where the asperity model holds",
     ),
-    "area beyond the model": ("studies.one.targets", {"area_fractions": [0.5]}, "[1e-9, 0.25], which the model covers"),
+    "area beyond the model": (
+        "studies.one.targets",
+        {"area_fractions": [0.5]},
+        "[1e-9, 0.25], where the asperity model holds",
+    ),
     "zero target": ("studies.one.targets.reduced_pressures", [0, 0.1], "is out of range"),
     "unknown snapshot": ("studies.one.snapshots", [{"area": 0.1}], "studies.one.snapshots[0].area: unknown key"),
     "snapshot of two kinds": (

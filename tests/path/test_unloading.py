@@ -346,7 +346,7 @@ def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
     surface = paraboloid(32, 16.0)
     beyond = 1.01 * MAX_REDUCED_PRESSURE * float(surface.rms_slope)
     path = Path([1e-3], turning_points=[("reduced_pressure", 0.0), ("relative_load", beyond)])
-    with pytest.raises(ValueError, match=r"^path: relative_load = .*beyond what the model covers"):
+    with pytest.raises(ValueError, match=r"^path: relative_load = .*beyond the range of the asperity model"):
         icha.simulate(surface, STICKY, path)
 
 

@@ -14,10 +14,15 @@ OUTSIDE = [
     (
         STATES["area_fraction"],
         0.3,
-        "lies beyond what the model covers",
-        "a number in [1e-9, 0.25], which the model covers",
+        "lies beyond the range of the asperity model",
+        "a number in [1e-9, 0.25], where the asperity model holds",
     ),
-    (STATES["reduced_pressure"], 0.0, "must lie in [1e-12, 0.15]", "a number in [1e-12, 0.15], which the model covers"),
+    (
+        STATES["reduced_pressure"],
+        0.0,
+        "must lie in [1e-12, 0.15]",
+        "a number in [1e-12, 0.15], where the asperity model holds",
+    ),
     (rules.LENGTH, 1e100, "must lie in [1e-24, 1e9] (in m)", "a number in [1e-24, 1e9]"),
     (rules.POSITIVE, True, "is not a number", "a number greater than 0"),
 ]

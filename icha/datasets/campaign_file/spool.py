@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from icha.datasets.labels import RunLabels
-from icha.datasets.netcdf import characters, is_text, not_finite
+from icha.datasets.netcdf import characters, is_refused, is_text, not_finite
 from icha.datasets.run_values import Values, read_run_values
-from icha.datasets.variables.run import CELLS
+from icha.datasets.variables.run import CELLS, RUN
 
 
 class Entry(NamedTuple):
@@ -140,8 +140,11 @@ def _check_labels(labels, values, attrs):
 
 def _refuse_values_not_finite(labels, values):
     for name, (dims, v) in values.items():
-        if v.dtype.kind == "f" and not np.isfinite(v).all():
-            raise ValueError(f"{labels}: variable {not_finite(name, dims, ~np.isfinite(v))}")
+        if v.dtype.kind != "f" or np.isfinite(v).all():
+            continue
+        bad = is_refused(v, RUN[name].further if name in RUN else {})
+        if bad.any():
+            raise ValueError(f"{labels}: variable {not_finite(name, dims, bad)}")
 
 
 def _snapshots(values):

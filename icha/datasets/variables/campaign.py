@@ -66,6 +66,7 @@ VARIES_WITH = {
     **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range"), ("material",)),
     **dict.fromkeys(("rms_height", "rms_curvature", "nayak_parameter"), _TOPOGRAPHY),
     **dict.fromkeys(("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"), _TOPOGRAPHY),
+    **dict.fromkeys(("height_skewness", "height_kurtosis", "slope_anisotropy"), _TOPOGRAPHY),
     **dict.fromkeys(("period", "grid", "boundary"), ("surface",)),
     **dict.fromkeys(bin_table("gap", "m"), _TOPOGRAPHY),
     **dict.fromkeys(bin_table("pressure", "Pa"), ("rms_slope", "material")),

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from icha.asperity.full_contact import MEANING
 from icha.contact.events import EVENT_KINDS
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets.bins import bin_table
-from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Variable, term, terms
+from icha.datasets.variables.terms import INFINITE, MATERIAL, ROUGHNESS, Variable, term, terms
 
 _STEP, _SNAPSHOT, _SPOT, _EVENT = ("step",), ("snapshot",), ("spot",), ("event",)
 _GAP_BIN, _PRESSURE_BIN = ("snapshot", "gap_bin"), ("snapshot", "pressure_bin")
@@ -103,6 +104,20 @@ RUN = {
     "grid": Variable((), "1", "nodes along a side of the cell", int),
     **terms("seed", "tabor_parameter"),
     "stickiness": Variable((), "1", "attraction over repulsion after Pastewka and Robbins; above 1 surfaces stick"),
+    "full_contact_energy_ratio": Variable(
+        (),
+        "1",
+        f"elastic energy of full contact over the work of adhesion, U_full/dgamma; {MEANING}",
+        further={INFINITE: "without adhesion"},
+    ),
+    "height_skewness": Variable((), "1", "skewness of the heights; 0 for a Gaussian surface"),
+    "height_kurtosis": Variable((), "1", "kurtosis of the heights; 3 for a Gaussian surface"),
+    "slope_anisotropy": Variable(
+        (),
+        "1",
+        "largest over smallest rms slope along all directions; 1 for an isotropic surface",
+        further={INFINITE: "for straight grooves"},
+    ),
     "asperity_count": Variable((), "1", "number of asperities on the surface", int),
     "unsupported_summit_count": Variable(
         (), "1", "number of maxima of the interpolated surface that are no asperities, as no nodes support them", int

@@ -24,6 +24,9 @@ class Variable(NamedTuple):
         return {"units": self.units, "long_name": self.long_name, **self.further}
 
 
+# Attribute of a variable that may be infinite (inf, a value as any other); it says where.
+INFINITE = "infinite"
+
 Table = dict[str, Variable]
 
 # What has the same meaning in several kinds of files, whatever its dimensions there.

@@ -11,7 +11,13 @@ import scipy.fft
 
 from icha.surfaces.measured.cutoff import LEAST_PIXELS
 from icha.surfaces.measured.topography import prepared_topography
-from icha.surfaces.moments import radial_power_spectrum, ring_edges
+from icha.surfaces.moments import (
+    LEAST_CELLS_OF_SUMMIT,
+    RESOLVED_CELLS,
+    cells_per_short_wave,
+    radial_power_spectrum,
+    ring_edges,
+)
 from icha.surfaces.summits import count_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface
 
@@ -20,10 +26,6 @@ from icha.surfaces.surface import FREE, PERIODIC, Surface
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
 # A floor so far below the largest power is rounding.
 _ROUNDING = 1e-20
-# Cells of a wave in which its summits are resolved, and cells of a summit where the shortest waves have half of them:
-# isotropic surfaces have about 0.2 summits for every square of the shortest wave.
-RESOLVED_CELLS = 8
-LEAST_CELLS_OF_SUMMIT = 80
 # A grid is worth changing if it loses this part of its nodes along a side.
 _WORTH = 0.75
 
@@ -70,7 +72,7 @@ class ScanResolution:
     @property
     def cells_per_short_wave(self) -> float:
         """Nodes of the prepared surface along its shortest waves, as the number of its summits tells it."""
-        return RESOLVED_CELLS / 2 * math.sqrt(self.cells_per_summit / LEAST_CELLS_OF_SUMMIT)
+        return cells_per_short_wave(self.used.grid, self.summits)
 
     @cached_property
     def noise(self) -> NoiseFloor | None:

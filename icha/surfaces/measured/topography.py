@@ -85,13 +85,24 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
 
 @dataclass(frozen=True)
 class TopographyFacts:
-    """What a plan needs to know of a measured surface and its file: side (m), nodes, slope, boundary, checksum."""
+    """What a plan needs to know of a measured surface and its file.
+
+    Parameters
+    ----------
+    grid : nodes a side.
+    period : side of the square, m.
+    rms_slope : of the prepared surface.
+    boundary : "periodic" or "free".
+    source_sha256 : checksum of the file.
+    full_contact_energy : U_full/E* of the surface at rms slope 1, m.
+    """
 
     grid: int
     period: float
     rms_slope: float
     boundary: str
     source_sha256: str
+    full_contact_energy: float
 
 
 def topography_facts(path: str | os.PathLike, preparation: Mapping) -> TopographyFacts:
@@ -104,7 +115,9 @@ def topography_facts(path: str | os.PathLike, preparation: Mapping) -> Topograph
 def _facts(path, modified, size, preparation):
     prepared = prepared_topography(path, json.loads(preparation))
     surface = prepared.surface
-    return TopographyFacts(surface.grid, surface.period, surface.rms_slope, surface.boundary, prepared.source_sha256)
+    energy = surface.full_contact_energy / surface.rms_slope**2
+    own = surface.grid, surface.period, surface.rms_slope, surface.boundary
+    return TopographyFacts(*own, prepared.source_sha256, energy)
 
 
 def _existing(path):

@@ -1,0 +1,108 @@
+"""Energy of full contact, and what it says of runs of asperities."""
+
+import math
+
+import numpy as np
+import pytest
+import scipy.fft
+
+import icha
+from icha.asperity.full_contact import full_contact_energy_ratio
+from icha.datasets.campaign import campaign_tree, select_run
+from icha.datasets.files import read_run, write_dataset
+from icha.datasets.format import RUN, flaws
+from icha.models.applicability import asperity_applicability
+from icha.surfaces.moments import self_affine_full_contact_energy
+
+L, A = 3e-6, 1e-8
+
+
+@pytest.mark.parametrize("waves", [(1, 0), (0, 3), (2, 3)])
+def test_a_single_wave_takes_a_quarter_of_the_wave_number_times_its_mean_square(waves):
+    x = np.arange(32) * L / 32
+    k = 2 * np.pi / L * np.array(waves)
+    surface = icha.Surface(A * np.cos(k[0] * x[None, :] + k[1] * x[:, None]), L)
+    assert surface.full_contact_energy == pytest.approx(np.hypot(*k) * A**2 / 8)
+
+
+def test_a_free_square_has_the_energy_of_its_mirror_images():
+    x = (np.arange(32) + 0.5) * L / 32
+    heights = A * np.cos(3 * np.pi / L * x)[None, :] * np.cos(2 * np.pi / L * x)[:, None]
+    expected = np.sqrt(13) * np.pi / L * A**2 / 16
+    assert icha.Surface(heights, L, "free").full_contact_energy == pytest.approx(expected)
+    heights = np.random.default_rng(1).normal(size=(24, 24))
+    mirrored = np.block([[heights, heights[:, ::-1]], [heights[::-1], heights[::-1, ::-1]]])
+    expected = icha.Surface(mirrored, 2 * L).full_contact_energy
+    assert icha.Surface(heights, L, "free").full_contact_energy == pytest.approx(expected)
+
+
+def test_it_is_the_work_of_the_pressure_that_flattens_the_surface():
+    surface = icha.SelfAffineSpectrum(100e-6, 40e-6, 14.3e-6, 0.8, 0.7).realise(33, 1)
+    k = scipy.fft.fftfreq(33, surface.spacing) * 2 * np.pi
+    pressure = scipy.fft.ifft2(np.hypot(k[:, None], k) / 2 * scipy.fft.fft2(surface.heights)).real
+    assert surface.full_contact_energy == pytest.approx(np.mean(pressure * surface.heights) / 2)
+    assert surface.scaled_to_rms_slope(1.4).full_contact_energy == pytest.approx(4 * surface.full_contact_energy)
+
+
+@pytest.mark.parametrize(
+    "lengths",
+    [(100e-6, 20e-6, 1.5625e-6, 0.8), (100e-6, 50e-6, 1e-6, 0.3), (90e-6, 90e-6, 30e-6, 0.8), (1e-3, 8e-6, 6e-6, 0.5)],
+)
+def test_of_a_self_affine_surface_it_is_known_without_making_one(lengths):
+    grid = math.ceil(2 * lengths[0] / lengths[2]) + 2
+    with pytest.warns(UserWarning, match="cells per shortest"):
+        surface = icha.SelfAffineSpectrum(*lengths).realise(grid, 1)
+    assert self_affine_full_contact_energy(*lengths) == pytest.approx(surface.full_contact_energy, rel=1e-3)
+
+
+def test_the_ratio_of_a_sticky_silicone_is_known():
+    spectrum = icha.SelfAffineSpectrum(40e-6, 10e-6, 0.2e-6, 0.8)
+    energy = self_affine_full_contact_energy(40e-6, 10e-6, 0.2e-6, 0.8) * (100e-9 / spectrum.rms_height) ** 2
+    assert full_contact_energy_ratio(energy, 2.667e6, 0.05) == pytest.approx(0.138, abs=5e-4)
+    assert full_contact_energy_ratio(energy, 2.667e6, 0.0) == math.inf
+
+
+def test_reasons_are_named_one_after_the_other():
+    assert asperity_applicability(math.inf) == asperity_applicability(1.0, (), 0.25) == ""
+    assert asperity_applicability(0.138, ["spikes", "pits"], 0.3) == (
+        "asperity model not applicable: full contact has the lower energy (U_full/dgamma = 0.138, less than 1); "
+        "spikes; pits; contact area A/A0 = 0.3, beyond 0.25"
+    )
+
+
+def pressed(energy, model="asperities", **path):
+    surface = icha.SelfAffineSpectrum(100e-6, 40e-6, 14.3e-6, 0.8).realise(32, 1)
+    material = icha.Material(0.3e6, energy, 8e-9)
+    try:
+        return icha.simulate(surface, material, icha.Path(**path), model=model)
+    except icha.ConvergenceError as error:
+        return error.dataset
+
+
+def test_runs_say_where_asperities_are_not_applicable():
+    sticky = pressed(0.5, reduced_pressures=[1e-2])
+    assert float(sticky["full_contact_energy_ratio"]) == pytest.approx(0.698, abs=1e-3)
+    assert sticky.attrs["applicability"].startswith("asperity model not applicable: full contact has the lower energy")
+    assert pressed(0.5, "boundary_elements", reduced_pressures=[1e-2]).attrs["applicability"] == ""
+    wide = pressed(0.0, mean_separations=[0.5e-6])
+    assert float(wide["contact_area_fraction"][-1]) > 0.25
+    assert "; contact area" not in wide.attrs["applicability"]
+    assert "contact area A/A0 = 0." in wide.attrs["applicability"]
+
+
+def test_an_infinite_ratio_is_a_value_of_every_file(tmp_path):
+    run = pressed(0.0, reduced_pressures=[1e-2])
+    assert np.isposinf(run["full_contact_energy_ratio"]) and run.attrs["applicability"] == ""
+    write_dataset(run, tmp_path / "run.nc")
+    back = read_run(tmp_path / "run.nc")
+    assert np.isposinf(back["full_contact_energy_ratio"]) and not [
+        flaw for flaw in flaws(RUN, back) if "finite" in flaw
+    ]
+    labels = ("one", "asperities", "rough", -1, 1.0, "bare")
+    for source in (run, tmp_path / "run.nc"):
+        tree = campaign_tree([(labels, source)])
+        assert np.isposinf(select_run(tree, labels)["full_contact_energy_ratio"])
+    with pytest.raises(ValueError, match="'full_contact_energy_ratio' holds 1 of 1 values that are not finite"):
+        write_dataset(run.assign(full_contact_energy_ratio=-run["full_contact_energy_ratio"]), tmp_path / "no.nc")
+    with pytest.raises(ValueError, match="'stickiness' holds 1 of 1 values that are not finite"):
+        write_dataset(run.assign(stickiness=run["stickiness"] + np.inf), tmp_path / "no.nc")
