@@ -7,10 +7,13 @@ Where each has slopes of its own, as measured surfaces have, a square of surface
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from icha.datasets.labels import LABELS, RunLabels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,6 +41,12 @@ def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
     if most == len(common):
         return np.array(common, float)
     return np.array([sorted(own) + [np.nan] * (most - len(own)) for own in found.values()], float)
+
+
+def count_cells(runs: Sequence[RunLabels]) -> int:
+    """Number of combinations of the labels of a study's runs that have a place in its dataset."""
+    others = (len({getattr(run, label) for run in runs}) for label in LABELS if label != "rms_slope")
+    return math.prod(others) * arrange_slopes((run.surface, run.rms_slope) for run in runs).shape[-1]
 
 
 def slope_dims(slopes: np.ndarray) -> tuple[str, ...]:
