@@ -4,6 +4,7 @@ In the limit of a short range those are runs of the same study by another model,
 ranges they are solutions of Tamaas beside the study.
 """
 
+import contextlib
 import itertools
 import warnings
 from collections.abc import Iterable, Mapping
@@ -20,6 +21,7 @@ from icha.datasets.bins import bin_values
 from icha.datasets.build import described, variable
 from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spots_of
 from icha.datasets.labels import LABELS, RunLabels, SolutionLabels
+from icha.datasets.places import arrange_slopes, labels_at, place_of, slope_dims
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
 from icha.datasets.variables.model_error import ASKED, BINS, FINITE_RANGE, MODEL_ERROR, SHORT_RANGE
 from icha.datasets.variables.terms import MATERIAL, Variable
@@ -360,17 +362,21 @@ def _entry_dataset(campaign, entry, states):
         raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")
     study = campaign[studies[0]].to_dataset()
     axes = _axes(study, states)
-    grid = [SolutionLabels(entry, studies[0], *values) for values in itertools.product(*axes.values())]
+    coords = {
+        label: xr.Variable(label, np.array(axes[label], dtype=study[label].dtype), study[label].attrs)
+        for label in _LABELS
+        if label != "rms_slope"
+    }
+    slopes = axes["rms_slope"]
+    coords["rms_slope"] = xr.Variable(slope_dims(slopes), slopes, study["rms_slope"].attrs)
+    coords["reduced_pressure"] = variable(ASKED, axes["reduced_pressure"])
+    shape = tuple(slopes.shape[-1] if label == "rms_slope" else len(values) for label, values in axes.items())
+    labelled = xr.Dataset(coords=coords)
+    grid = [SolutionLabels(entry, studies[0], *labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
     contacts = {labels.run for labels in states}
     if missing := [labels for labels in grid if labels.run in contacts and labels not in states]:
         raise ValueError(f"{_name(missing[0])}: no solution, nor of {len(missing) - 1} other states of this entry")
 
-    shape = tuple(map(len, axes.values()))
-    coords = {
-        label: xr.Variable(label, np.array(axes[label], dtype=study[label].dtype), study[label].attrs)
-        for label in _LABELS
-    }
-    coords["reduced_pressure"] = variable(ASKED, axes["reduced_pressure"])
     # Of a contact that was compared at some loads the best one counts.
     of_state = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
     variables = {"status": variable(STATUS._replace(dims=_LABELS), np.reshape(of_state, shape).min(axis=-1))}
@@ -379,18 +385,33 @@ def _entry_dataset(campaign, entry, states):
     bins = described(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
     result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
-    own = study.sel(model=ASPERITIES, surface=axes["surface"], seed=axes["seed"], material=axes["material"])
-    own = own.sel(rms_slope=axes["rms_slope"], method="nearest").assign_coords(rms_slope=result["rms_slope"])
-    for name in (*MATERIAL, "tabor_parameter"):
-        result[name] = own[name].drop_vars("model", errors="ignore")
+    for name in MATERIAL:
+        result[name] = study[name].sel(material=axes["material"])
+    result["tabor_parameter"] = _of_asperities(study["tabor_parameter"], labelled)
     return result
 
 
+def _of_asperities(quantity, labelled):
+    """A quantity of the runs by asperities at all labels of a dataset; missing where the study has no such labels."""
+    values = np.full([labelled.sizes[label] for label in _LABELS], np.nan)
+    for place in np.ndindex(values.shape):
+        labels = dict(zip(_LABELS, labels_at(labelled, place, _LABELS), strict=True))
+        with contextlib.suppress(KeyError):
+            values[place] = quantity.isel(place_of(quantity.to_dataset(), {"model": ASPERITIES} | labels))
+    return xr.Variable(_LABELS, values, quantity.attrs)
+
+
 def _axes(study, states):
-    """Values of `AXES` that an entry asks for."""
+    """Values of `AXES` that an entry asks for; rms slopes as `arrange_slopes` has them."""
     asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
-    axes = {label: [value for value in study[label].values.tolist() if value in asked[label]] for label in _LABELS}
-    return axes | {axis: sorted(asked[axis]) for axis in ("rms_slope", "reduced_pressure")}
+    axes = {
+        label: [value for value in study[label].values.tolist() if value in asked[label]]
+        for label in ("surface", "seed", "material")
+    }
+    order = axes["surface"].index
+    pairs = sorted({(labels.surface, labels.rms_slope) for labels in states}, key=lambda pair: order(pair[0]))
+    axes |= {"rms_slope": arrange_slopes(pairs), "reduced_pressure": sorted(asked["reduced_pressure"])}
+    return {axis: axes[axis] for axis in AXES}
 
 
 def _along_axes(states, shape):

@@ -147,6 +147,7 @@ def _show_surface(surface, file) -> None:
 
 def _show_campaign(tree, file) -> None:
     from icha.datasets.labels import LABELS
+    from icha.datasets.places import labels_at
 
     say(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
     say(printable(" ".join(str(tree.attrs.get("summary", "")).split())))
@@ -165,7 +166,7 @@ def _show_campaign(tree, file) -> None:
                 say(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
         if "failure" in study:
             for where in zip(*(study["failure"] != "").values.nonzero(), strict=True):
-                labels = [str(study[d].values[k]) for d, k in zip(study["failure"].dims, where, strict=True)]
+                labels = map(str, labels_at(study, where, study["failure"].dims))
                 reason = printable(study["failure"].values[where])
                 say(f"  failed: {printable(', '.join(labels))}: {reason}", fg="red")
 

@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import xarray as xr
 from icha.datasets.campaign_file.write import write_campaign
 from icha.datasets.files import read_campaign
 from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.places import labels_at, place_of, slopes_at
 from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED
 from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN
@@ -33,13 +34,35 @@ def run_labels(tree: xr.DataTree) -> list[RunLabels]:
     """Labels of all runs in a campaign dataset, complete or not, in its order."""
     found = []
     for study, node in tree.children.items():
-        axes = [node[label].values.tolist() for label in LABELS]
-        there = np.isin(node["status"].transpose(*LABELS).values, COMPUTED_RUNS)
-        found += [
-            RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True)))
-            for index in np.argwhere(there).tolist()
-        ]
+        found += runs_of_status(node.to_dataset(), study, COMPUTED_RUNS)
     return found
+
+
+def runs_of_status(study: xr.Dataset, name: str, asked: Collection[int]) -> list[RunLabels]:
+    """Labels of the runs of a study whose status is one of those asked for, in the order of the dataset."""
+    there = np.isin(study["status"].transpose(*LABELS).values, tuple(asked))
+    return [RunLabels(name, *labels_at(study, place, LABELS)) for place in np.argwhere(there).tolist()]
+
+
+def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
+    """Position of a run along the labels of its study's dataset.
+
+    Raises
+    ------
+    ValueError
+        If the study has no such value of a label; the message says what it has.
+    """
+    wanted = {label: getattr(labels, label) for label in LABELS}
+    try:
+        return place_of(study, wanted)
+    except KeyError as error:
+        (label,) = error.args
+        known = study[label].values.tolist()
+        if label == "rms_slope":
+            row = place_of(study, {"surface": labels.surface})
+            known = [f"{slope:g}" for slope in slopes_at(study, row) if np.isfinite(slope)]
+        there = ", ".join(map(str, known))
+        raise ValueError(f"study {labels.study}: no {label} {wanted[label]!r}; there are {there}") from None
 
 
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
@@ -65,7 +88,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     if labels.study not in tree.children:
         raise ValueError(f"no study {labels.study!r}; there are {', '.join(tree.children)}")
     study = tree.children[labels.study].dataset
-    index = {label: _position(study, labels, label) for label in LABELS}
+    index = run_place(study, labels)
     place = tuple(index.values())
     status, steps, failure = (study.variables[name].transpose(*LABELS)[place] for name in _OF_EVERY_CAMPAIGN)
     if int(status) in (MISSING, NOT_IN_DESIGN):
@@ -109,16 +132,6 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
 
 # What the dataset of a campaign says of a run.
 _OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
-
-
-def _position(study, labels, label):
-    """Where a run stands along a label."""
-    values, wanted = study.variables[label].values, getattr(labels, label)
-    at = np.flatnonzero(np.isclose(values, wanted, rtol=1e-9) if label == "rms_slope" else values == wanted)
-    if not len(at):
-        there = ", ".join(f"{value:g}" if label == "rms_slope" else str(value) for value in values)
-        raise ValueError(f"study {labels.study}: no {label} {wanted!r}; there are {there}")
-    return int(at[0])
 
 
 def _own(study, dim, place):

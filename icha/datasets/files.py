@@ -24,13 +24,10 @@ from icha.datasets.netcdf import (
     is_text,
     not_finite,
 )
-from icha.datasets.storage import COMPRESSED_SIZES, COMPRESSION
+from icha.datasets.storage import COMPRESSED_SIZES, COMPRESSION, LEFT_IN_FILE
 from icha.datasets.variables.campaign import COMPLETE
 from icha.datasets.variables.run import CELLS
 from icha.support.atomic_files import whole_file
-
-# Bytes of an array from which on it is not read as a whole.
-_LEFT_IN_FILE = 2**26
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
@@ -140,9 +137,9 @@ def read_campaign(path: str | os.PathLike) -> xr.DataTree:
 def _load_small(tree):
     variables = [variable for node in tree.subtree for variable in node.variables.values()]
     for variable in variables:
-        if variable.nbytes <= _LEFT_IN_FILE:
+        if variable.nbytes <= LEFT_IN_FILE:
             variable.load()
-    if all(variable.nbytes <= _LEFT_IN_FILE for variable in variables):
+    if all(variable.nbytes <= LEFT_IN_FILE for variable in variables):
         tree.close()
     return tree
 

@@ -6,3 +6,6 @@ LEAST_COMPRESSED = 1024
 # Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
 COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
+
+# Bytes of an array of a campaign dataset beyond which it is not read as a whole.
+LEFT_IN_FILE = 2**26

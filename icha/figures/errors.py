@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.datasets.places import place_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
@@ -127,7 +128,8 @@ def draw_errors(
     for row, shown in zip(panels, rows, strict=True):
         own = [key for key in curves.keys if key[-1] in shown]
         for k, (entry, surface, slope, material) in enumerate(own):
-            errors = curves.entries[entry].sel(surface=surface, rms_slope=slope, material=material)
+            errors = curves.entries[entry]
+            errors = errors.isel(place_of(errors, {"surface": surface, "rms_slope": slope, "material": material}))
             name, look = curves.look(own[k])
             handle = _draw_curve(row, errors, quantities, look, _APART ** (k - (len(own) - 1) / 2), counts)
             named.setdefault(name, handle)
@@ -175,10 +177,10 @@ def _curves(model_error, study, quantities, palette):
     keys = [
         (entry, surface, slope, material)
         for entry, errors in entries.items()
-        for material, surface, slope in itertools.product(
-            *(errors[label].values.tolist() for label in ("material", "surface", "rms_slope"))
+        for material, (surface, slope) in itertools.product(
+            errors["material"].values.tolist(), surfaces_and_slopes(errors)
         )
-        # Of measured surfaces each has its own slope alone.
+        # Not all combinations of an entry are asked for.
         if _compared(errors, quantities, material=material, surface=surface, rms_slope=slope)
     ]
     places = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in keys))
@@ -190,7 +192,8 @@ def _curves(model_error, study, quantities, palette):
 
 def _compared(errors, quantities, **at):
     """Whether there is a state of a quantity at given labels."""
-    return any(np.isfinite(errors[each.name].sel(at).values).any() for each in quantities)
+    own = errors.isel(place_of(errors, at)) if at else errors
+    return any(np.isfinite(own[each.name].values).any() for each in quantities)
 
 
 def _draw_curve(row, errors, quantities, look, apart, counts):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.datasets import results
+from icha.datasets.places import place_of
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
@@ -221,11 +222,13 @@ def _from_runs(runs, truths, points, *, logarithmic):
 def _errors_of(labels, entries):
     """The error of the runs of a line from the first of some entries that has it, or None."""
     for errors in entries:
-        slopes = np.flatnonzero(np.isclose(errors["rms_slope"].values, labels.rms_slope, rtol=1e-6))
-        if labels.material in errors["material"].values and labels.surface in errors["surface"].values and len(slopes):
-            own = errors.sel(material=labels.material, surface=labels.surface).isel(rms_slope=slopes[0])
-            if np.isfinite(own["area_error"].values).any():
-                return own.dropna("reduced_pressure", how="all", subset=["area_error"])
+        try:
+            at = place_of(errors, {label: getattr(labels, label) for label in ("surface", "rms_slope", "material")})
+        except KeyError:
+            continue
+        own = errors.isel(at)
+        if np.isfinite(own["area_error"].values).any():
+            return own.dropna("reduced_pressure", how="all", subset=["area_error"])
     return None
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.datasets import results
+from icha.datasets.places import place_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import material_looks, model_name, plausible, say_which_snapshots
 from icha.figures.declaration import Campaign, Declaration, Inputs
@@ -236,15 +237,15 @@ def _solutions(entries, line, loads):
 def _solution(entries, labels, load):
     """The first boundary-element solution of a run's state at a reduced pressure, or None."""
     for errors in entries.values():
-        at = {"surface": labels.surface, "seed": labels.seed, "material": labels.material}
-        if any(value not in errors[label].values for label, value in at.items()):
+        try:
+            at = place_of(
+                errors, {label: getattr(labels, label) for label in ("surface", "seed", "rms_slope", "material")}
+            )
+        except KeyError:
             continue
-        close = {
-            label: np.flatnonzero(np.isclose(errors[label].values, value, rtol=1e-6))
-            for label, value in (("rms_slope", labels.rms_slope), ("reduced_pressure", load))
-        }
-        if all(map(len, close.values())):
-            truth = errors.sel(at).isel({label: found[0] for label, found in close.items()})
+        loads = np.flatnonzero(np.isclose(errors["reduced_pressure"].values, load, rtol=1e-6))
+        if len(loads):
+            truth = errors.isel(at | {"reduced_pressure": loads[0]})
             if np.isfinite(truth["gap_density"].values).all():
                 return truth
     return None

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.contact.models import BOUNDARY_ELEMENTS, first_of
-from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.labels import RunLabels
+from icha.datasets.places import slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.style import number, slope_label
 
@@ -37,23 +38,19 @@ def study_runs(
     """
     import xarray as xr
 
-    from icha.datasets.campaign import reduced_gap, select_run
+    from icha.datasets.campaign import reduced_gap, runs_of_status, select_run
     from icha.datasets.variables.campaign import COMPLETE, RAGGED
 
     _check_study(campaign, study)
     dataset = campaign[study].to_dataset()
-    axes = [dataset[label].values.tolist() for label in LABELS]
-    status = dataset["status"].transpose(*LABELS).values
     asked = model or shown_model(dataset)
-    by_model = np.reshape(dataset["model"].values == asked, (-1, *[1] * (status.ndim - 1)))
-    complete = np.argwhere((status == COMPLETE) & by_model)
-    if not len(complete):
+    found = [labels for labels in runs_of_status(dataset, study, (COMPLETE,)) if labels.model == asked]
+    if not found:
         raise NothingToDraw(f"study {study}: no run is complete, so there is nothing to draw")
     if not ragged:
         campaign = xr.DataTree.from_dict(
             {f"/{study}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])}
         )
-    found = (RunLabels(study, *(axis[i] for axis, i in zip(axes, index, strict=True))) for index in complete.tolist())
     runs = [(labels, select_run(campaign, labels)) for labels in found]
     return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
 
@@ -117,7 +114,7 @@ def pick_run(
     ValueError
         If there is no such study or run.
     """
-    from icha.datasets.campaign import run_labels, select_run
+    from icha.datasets.campaign import run_labels, run_place, select_run
     from icha.datasets.variables.campaign import COMPLETE
 
     _check_study(campaign, study)
@@ -131,7 +128,7 @@ def pick_run(
     adhesive = [labels.material for labels in runs if float(energy.sel(material=labels.material)) > 0]
     material = pick("material", material, adhesive + [labels.material for labels in runs])
     labels = next(labels for labels in runs if labels.material == material)
-    status = campaign[study]["status"].sel({label: getattr(labels, label) for label in LABELS})
+    status = campaign[study]["status"].isel(run_place(campaign[study].to_dataset(), labels))
     if int(status) != COMPLETE:
         raise NothingToDraw(f"{labels}: this run is not complete, so there is nothing to draw")
     return labels, select_run(campaign, labels)
@@ -231,8 +228,8 @@ def same_snapshots_by_boundary_elements(campaign: xr.DataTree, lines: Sequence[S
 
 def name_of_place(dataset: xr.Dataset, surface: str, rms_slope: float) -> str:
     """A surface and rms slope in words, as far as their study has several of them."""
-    words = {"surface": surface, "rms_slope": slope_label(rms_slope)}
-    return ", ".join(text for label, text in words.items() if dataset.sizes[label] > 1)
+    several = {surface: dataset.sizes["surface"] > 1, slope_label(rms_slope): len(slopes_of(dataset)) > 1}
+    return ", ".join(text for text, shown in several.items() if shown)
 
 
 _KIND_LABELS = {

@@ -164,7 +164,11 @@ class Gathering:
     report_figure: float = 0.014
     """A figure in it; s."""
     table_memory: float = 4 * MiB
-    """What making a file of all runs takes; bytes."""
+    """What making a file of all runs takes, without their values; bytes."""
+    blocks: float = 35 * MiB
+    """Most that the dataset's job holds of the values of runs; bytes."""
+    copies: float = 2.7
+    """Memory that reading and using the dataset takes, over its arrays: chunks, decoded values and selected runs."""
     figure_memory: float = 85 * MiB
     """What drawing a figure takes; bytes."""
     report_memory: float = 18 * MiB

@@ -12,8 +12,10 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from icha.datasets.storage import COMPRESSED_SIZES
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.datasets.storage import COMPRESSED_SIZES, LEFT_IN_FILE
 from icha.path.limits import DEFAULT_STEP
 from icha.planning.constants import FITTED, Constants, MiB
 from icha.support.parallel import LARGE_GRID
@@ -22,13 +24,28 @@ from icha.surfaces.moments import summit_density
 _DOUBLE = 8
 
 
+class Recorded(NamedTuple):
+    """Numbers of steps and snapshots of a run, and of spots in all of its snapshots."""
+
+    steps: float
+    snapshots: int
+    spots: float
+
+
 @dataclass(frozen=True)
 class Cost:
-    """Seconds on one core, largest memory that is the job's own in bytes, and disk in bytes."""
+    """Cost of a job.
+
+    seconds : on one core.
+    memory : largest memory that is the job's own; bytes.
+    disk : bytes.
+    recorded : what a run adds to the campaign dataset.
+    """
 
     seconds: float
     memory: float
     disk: float
+    recorded: Recorded | None = None
 
     def slower(self, factor: float) -> Cost:
         """The same on a machine that takes `factor` times as long."""
@@ -145,9 +162,11 @@ def sweep_cost(rough: Roughness, sweep: Sweep, of: Constants = FITTED) -> Cost:
     if sweep.legs:
         steps = cyclic_steps(most, sweep, of)
         seconds += steps * (of.cycle.step + of.cycle.spot * most)
-    disk = 58e3 + 57 * most * max(sweep.snapshots + bool(sweep.legs), 1) + 160 * steps + 20e3 * bool(sweep.legs)
+    kept = sweep.snapshots + bool(sweep.legs)
+    disk = 58e3 + 57 * most * max(kept, 1) + 160 * steps + 20e3 * bool(sweep.legs)
     memory = before + here.memory * (2 if sweep.legs else 1) + _DOUBLE * nodes + 9 * 1024 * rough.summits
-    return Cost(start + _shared_out(seconds, rough.grid, of), memory, disk)
+    recorded = Recorded(steps, kept, most * kept)
+    return Cost(start + _shared_out(seconds, rough.grid, of), memory, disk, recorded)
 
 
 def _crowded(count, here):
@@ -182,13 +201,16 @@ def patch_cost(rough: Roughness, sweep: Sweep, of: Constants = FITTED) -> Cost:
     harder = [(load / 0.01) ** here.load for load in sweep.loads]
     at_stops = sum(harder) + here.way * DEFAULT_STEP / sweep.max_step * max(harder)
     seconds = of.loading.run + at_stops * here.stop * transforms * longer
+    most = max(spots(rough, load) for load in sweep.loads)
     if sweep.legs:
-        here, states = of.patch_cycle, cyclic_steps(max(spots(rough, load) for load in sweep.loads), sweep, of)
+        here, states = of.patch_cycle, cyclic_steps(most, sweep, of)
         seconds += states * (here.step + here.cell * transforms) * (here.adhesion if sweep.adhesion else 1)
     start, before = _before(rough.grid, of)
-    disk = 80e3 + 160 * states + _MAPS * cells * (sweep.snapshots + bool(sweep.legs))
+    kept = sweep.snapshots + bool(sweep.legs)
+    disk = 80e3 + 160 * states + _MAPS * cells * kept
     memory = before + of.loading.memory + PATCH_ARRAYS * _DOUBLE * cells
-    return Cost(start + _shared_out(seconds, rough.grid, of), memory, disk)
+    recorded = Recorded(states, kept, most * kept)
+    return Cost(start + _shared_out(seconds, rough.grid, of), memory, disk, recorded)
 
 
 def cyclic_steps(most: float, sweep: Sweep, of: Constants = FITTED) -> float:
@@ -237,27 +259,67 @@ def theories_cost(of: Constants = FITTED) -> Cost:
     return Cost(of.gathering.theories, of.workflow.forked, 35e3)
 
 
-def table_cost(seconds: float, disk: float, of: Constants = FITTED) -> Cost:
-    """A file that holds something of every run, which takes so many seconds for all of them."""
-    return Cost(of.gathering.table + seconds, of.workflow.forked + of.gathering.table_memory, disk)
+# Arrays along the steps and the spots of runs; texts count for several.
+_STEP_ARRAYS, _SPOT_ARRAYS = 30, 11
+
+
+def dataset_memory(cells: int, runs: Sequence[Recorded]) -> float:
+    """Bytes of the arrays of a study that are read as a whole from the campaign dataset.
+
+    Parameters
+    ----------
+    cells : number of combinations of the labels in the dataset, whether they have runs or not.
+    runs : what is recorded of each run.
+    """
+    steps, snapshots = cells * max(run.steps for run in runs), cells * max(run.snapshots for run in runs)
+    gaps, pressures = len(GAP_BINS), len(PRESSURE_BINS)
+    # Number of arrays, and values of each: densities, edges and bounds of bins, steps and spots.
+    arrays = [
+        (2, snapshots * pressures),
+        (1, snapshots * gaps),
+        (2, cells * pressures),
+        (1, 2 * cells * pressures),
+        (4, cells * gaps),
+        (_STEP_ARRAYS, steps),
+        (_SPOT_ARRAYS, sum(run.spots for run in runs)),
+    ]
+    return sum(count * _DOUBLE * values for count, values in arrays if _DOUBLE * values <= LEFT_IN_FILE)
+
+
+def dataset_cost(seconds: float, disk: float, held: float, of: Constants = FITTED) -> Cost:
+    """The campaign dataset, whose arrays take `held` bytes and are written block by block."""
+    here = of.gathering
+    memory = of.workflow.forked + here.table_memory + min(here.copies * held, here.blocks)
+    return Cost(here.table + seconds, memory, disk)
+
+
+def table_cost(seconds: float, disk: float, held: float, of: Constants = FITTED) -> Cost:
+    """A file made of a dataset whose arrays take `held` bytes, which takes so many seconds for all runs."""
+    here = of.gathering
+    return Cost(here.table + seconds, of.workflow.forked + here.table_memory + here.copies * held, disk)
 
 
 # Arrays of a topography that a map of contacts holds at a time, by the number of models that it shows.
 MAP_ARRAYS = {1: 2, 2: 7}
 
 
-def figure_cost(runs: int, nodes: int, models: int = 1, of: Constants = FITTED) -> Cost:
-    """A figure of so many runs, as PNG and PDF, with a topography of so many nodes and contacts by so many models."""
+def figure_cost(runs: int, nodes: int, models: int = 1, held: float = 0.0, of: Constants = FITTED) -> Cost:
+    """A figure of so many runs, as PNG and PDF, with a topography of so many nodes and contacts by so many models.
+
+    The arrays of the campaign dataset take `held` bytes.
+    """
     here = of.gathering
     seconds = here.figure + here.figure_run * runs + here.map_node * nodes
-    return Cost(seconds, of.workflow.forked + here.figure_memory + MAP_ARRAYS[models] * _DOUBLE * nodes, 400e3)
+    memory = here.figure_memory + MAP_ARRAYS[models] * _DOUBLE * nodes + here.copies * held
+    return Cost(seconds, of.workflow.forked + memory, 400e3)
 
 
-def report_cost(runs: int, figures: int, of: Constants = FITTED) -> Cost:
-    """The report, which holds its figures."""
+def report_cost(runs: int, figures: int, held: float = 0.0, of: Constants = FITTED) -> Cost:
+    """The report, which holds its figures; the arrays of the campaign dataset take `held` bytes."""
     here = of.gathering
     seconds = here.report + here.report_run * runs + here.report_figure * figures
-    return Cost(seconds, of.workflow.forked + here.report_memory, 700e3 + 250e3 * figures)
+    memory = of.workflow.forked + here.report_memory + here.copies * held
+    return Cost(seconds, memory, 700e3 + 250e3 * figures)
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:

@@ -13,6 +13,7 @@ from icha.configuration.settings import run_settings, run_sha256
 from icha.contact.models import ASPERITIES
 from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
+from icha.datasets.places import count_cells
 from icha.datasets.results import ResultFiles, job_file
 from icha.figures.registry import DECLARATIONS
 from icha.planning import costs
@@ -156,10 +157,12 @@ def _gathered(
     runs, here = len(files.runs), of.gathering
     size = sum(item.cost.disk for item in computed if item.is_run)
 
-    def table(path, stage, inputs, each, disk):
-        return "dataset and checks", path, stage, inputs, costs.table_cost(each, disk, of)
+    held = _dataset_memory(files, computed)
 
-    yield table(files.dataset, 1, files.runs, here.dataset_run * runs, 0.5 * size)
+    def table(path, stage, inputs, each, disk, cost=costs.table_cost):
+        return "dataset and checks", path, stage, inputs, cost(each, disk, held, of)
+
+    yield table(files.dataset, 1, files.runs, here.dataset_run * runs, 0.5 * size, costs.dataset_cost)
     yield table(files.comparison, 2, [files.dataset], here.comparison_run * runs, 0.03 * size + 90e3)
     beside = [*files.compared, *files.solutions]
     for path in files.model_error:
@@ -174,10 +177,24 @@ def _gathered(
             sum(case.study in shown for case in files.runs.values()),
             max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0,
             max((len(campaign.studies[study].models) for study in shown), default=1),
+            held,
             of,
         )
         yield "figures", path, 3, _flat(inputs), cost
-    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, of)
+    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, held, of)
+
+
+def _dataset_memory(files, computed):
+    """Bytes of the arrays of the campaign dataset that are read as a whole."""
+    studies: dict[str, list] = {}
+    for item in computed:
+        if item.is_run:
+            case = files.runs[item.path]
+            studies.setdefault(case.study, []).append((case, item.cost.recorded))
+    return sum(
+        costs.dataset_memory(count_cells([case for case, _ in own]), [recorded for _, recorded in own])
+        for own in studies.values()
+    )
 
 
 def _flat(inputs):

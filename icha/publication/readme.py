@@ -15,8 +15,10 @@ from icha.analysis.checks import COMPLETED, Check, worst
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
 from icha.configuration.surfaces import SelfAffineSurface
+from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.places import slopes_of
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.planning.costs import Cost
 from icha.planning.software import further_software
@@ -189,12 +191,16 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
     complete = _runs_of_status(dataset, COMPLETE)
     incomplete = [*_runs_of_status(dataset, INCOMPLETE), *_runs_of_status(dataset, FAILED_CHECKS)]
     known = {failure.run: failure.reason for failure in publication.known_failures}
+    example = (complete or incomplete)[0][0]
+    study = dataset[example.study].to_dataset()
     incomplete = [IncompleteRun(*run, known.get(str(run[0]), "")) for run in incomplete]
     return {
         "designs": designs,
         "partial": [study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
         "incomplete": incomplete,
-        "example": (complete or incomplete)[0][0],
+        "example": example,
+        # Where surfaces have slopes of their own, these have no index by which to select.
+        "slope_place": run_place(study, example)["rms_slope"] if study["rms_slope"].ndim == 2 else None,
         "checks": [_meant(check) for check in worst(checks)],
         "failed": [check for check in checks if not check.passed and check.name != COMPLETED],
         "known": known,
@@ -229,7 +235,10 @@ def study_designs(dataset: xr.DataTree) -> list[StudyDesign]:
         found.append(
             StudyDesign(
                 name,
-                *(tuple(study[label].values.tolist()) for label in LABELS),
+                *(
+                    tuple(slopes_of(study) if label == "rms_slope" else study[label].values.tolist())
+                    for label in LABELS
+                ),
                 {meaning: int(np.count_nonzero(status == k)) for k, meaning in enumerate(STATUS_MEANINGS)},
             )
         )
@@ -262,11 +271,11 @@ def _runs_of_status(dataset: xr.DataTree, asked: int) -> list[tuple[RunLabels, i
     """The runs of a status in a campaign dataset: number of steps, and the reason why they failed, if they did."""
     found = []
     for name, node in dataset.children.items():
-        status, steps, failure = (node[each].transpose(*LABELS).values for each in ("status", "step_count", "failure"))
-        axes = [node[label].values.tolist() for label in LABELS]
-        for place in map(tuple, np.argwhere(status == asked).tolist()):
-            labels = RunLabels(name, *(axis[k] for axis, k in zip(axes, place, strict=True)))
-            found.append((labels, int(steps[place]), str(failure[place])))
+        study = node.to_dataset()
+        for labels in runs_of_status(study, name, (asked,)):
+            place = run_place(study, labels)
+            steps, failure = (study[each].isel(place) for each in ("step_count", "failure"))
+            found.append((labels, int(steps), str(failure.values)))
     return found
 
 

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from icha.analysis.model_error import SUMMARISED
+from icha.datasets.places import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.support.statistics import ensemble
 
@@ -22,12 +23,13 @@ def entry_section(errors):
         return float(over.mean), float(over.confidence) if several else None
 
     rows = []
-    for surface, slope, material in itertools.product(
-        *(errors[label].values.tolist() for label in ("surface", "rms_slope", "material"))
+    for (surface, slope), material in itertools.product(
+        surfaces_and_slopes(errors), errors["material"].values.tolist()
     ):
+        contact = errors.isel(place_of(errors, {"surface": surface, "rms_slope": slope, "material": material}))
         for p in errors["reduced_pressure"].values.tolist():
-            state = errors.sel(surface=surface, rms_slope=slope, material=material, reduced_pressure=p)
-            # Of measured surfaces each has its own slope alone.
+            state = contact.sel(reduced_pressure=p)
+            # Not all combinations of an entry are asked for.
             if not np.isfinite(state["area_error"]).any():
                 continue
             rows.append(
@@ -53,7 +55,10 @@ def entry_section(errors):
         "name": errors.attrs["entry"],
         "study": errors.attrs["study"],
         "short_range": errors.attrs["truth"] == SHORT_RANGE,
-        "axes": {label: errors[label].values.tolist() for label in ("rms_slope", "material", "seed")},
+        "axes": {
+            "rms_slope": slopes_of(errors),
+            **{label: errors[label].values.tolist() for label in ("material", "seed")},
+        },
         "states": int(errors["area_error"].count()),
         "grids": sorted({int(n) for n in errors["solution_grid"].values.ravel() if np.isfinite(n)}),
         "adhesive": bool((errors["surface_energy"] > 0).any()),

@@ -8,8 +8,9 @@ from markupsafe import Markup
 
 from icha.analysis.checks import IDENTITY_LIMIT
 from icha.analysis.common_loads import at_round_pressures
-from icha.datasets.campaign import loading_stops, select_run
+from icha.datasets.campaign import loading_stops, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.places import labels_at, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, RAGGED
 from icha.figures.style import quantity, unit_for
 from icha.report.template import MOST_ROWS, scientific
@@ -19,12 +20,11 @@ from icha.support.statistics import ensemble
 def study_section(campaign, name, comparison):
     """What the page says about one study."""
     dataset = campaign[name].to_dataset()
-    status = dataset["status"].transpose(*LABELS).values
-    axes = {label: dataset[label].values.tolist() for label in LABELS}
+    status = dataset["status"].values
+    axes = {label: dataset[label].values.tolist() for label in LABELS} | {"rms_slope": slopes_of(dataset)}
 
     def labels_of(kind):
-        places = np.argwhere(status == kind).tolist()
-        return [RunLabels(name, *(axes[label][i] for label, i in zip(LABELS, at, strict=True))) for at in places]
+        return runs_of_status(dataset, name, (kind,))
 
     complete, failed = labels_of(COMPLETE), [*labels_of(INCOMPLETE), *labels_of(FAILED_CHECKS)]
     # Spots and events are many, and not shown.
@@ -69,7 +69,7 @@ def _failure(dataset, labels):
     """Why a run is not complete, as far as it is known."""
     if "failure" not in dataset:
         return ""
-    return str(dataset["failure"].sel({label: getattr(labels, label) for label in LABELS}).item())
+    return str(dataset["failure"].isel(run_place(dataset, labels)).item())
 
 
 def _lines(complete):
@@ -90,7 +90,7 @@ def _means(dataset, complete):
     for line, own in list(lines.items())[:MOST_ROWS]:
         cells: dict[float, list] = {}
         for labels in own:
-            run = steps.sel({label: getattr(labels, label) for label in LABELS})
+            run = steps.isel(run_place(dataset, labels))
             for p, *state in at_round_pressures(run.isel(step=slice(0, int(run["step_count"])))):
                 cells.setdefault(p, []).append(state)
         over = {p: ensemble(states) for p, states in cells.items() if len(states) == len(own)}
@@ -171,10 +171,10 @@ def _loops(dataset):
         return {"rows": [], "parts": {}, "count": 0}
     status = dataset["status"].transpose(*LABELS)
     whole = (status.values == COMPLETE) & np.isfinite(_of_runs(dataset, "hysteresis_loss"))
-    axes = {label: dataset[label].values.tolist() for label in LABELS}
     lines: dict[tuple, list] = {}
     for place in np.argwhere(whole).tolist():
-        line = tuple((label, axes[label][k]) for label, k in zip(LABELS, place, strict=True) if label != "seed")
+        labels = zip(LABELS, labels_at(dataset, place, LABELS), strict=True)
+        line = tuple((label, value) for label, value in labels if label != "seed")
         lines.setdefault(line, []).append(tuple(place))
     rows = [_loop(dataset, line, members) for line, members in list(lines.items())[:MOST_ROWS]]
     shown = {name for row in rows for name, share in row["shares"].items() if share}

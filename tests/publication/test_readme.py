@@ -1,10 +1,13 @@
 """The page of a deposit: texts shown as they are written, and what it says of a campaign in memory."""
 
 import itertools
+import re
 from dataclasses import replace
 
+import own_slopes_campaign as crops
 import pytest
 import small_campaign as small
+import xarray as xr
 from conftest import REPOSITORY
 from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
@@ -13,6 +16,7 @@ from publications import ALL, COMMIT, LEAST
 from icha.analysis.checks import check_campaign
 from icha.configuration.load import load_configuration
 from icha.configuration.publication import Author, Funding, KnownFailure
+from icha.datasets.campaign_file.write import write_campaign
 from icha.planning.costs import Cost
 from icha.publication.licences import known_licence
 from icha.publication.readme import markdown, readme
@@ -183,3 +187,27 @@ def test_the_page_says_what_failed_and_that_it_fails_again(small_readme):
     assert "The check `completed` fails for the run that is listed under *Design*" in page
     assert "What failed here fails again" in page
     assert "The results take 2.34 MB of disk, 200 MB of memory" in page
+
+
+def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path, monkeypatch):
+    runs = [(labels, run) for labels, run in crops.runs().items() if labels.model == "asperities"]
+    tree = small.campaign_tree(runs, attrs={"campaign": "crops"})
+    page = readme(
+        LEAST,
+        campaign=load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign,
+        licence=known_licence("CC0-1.0"),
+        revision=COMMIT,
+        dataset=tree,
+        checks=check_campaign(tree),
+        model_error=None,
+        dictionary=[],
+        sizes={"dataset/smoke.nc": 2_000_000},
+        cost=Cost(60.0, 2e8, 7e6),
+    )
+    write_campaign(runs, tmp_path / "dataset/smoke.nc")
+    monkeypatch.chdir(tmp_path)
+    example = re.search(r"^study = .*\nruns = .*$", page, re.MULTILINE)[0]
+    namespace = {"xr": xr}
+    exec(example, namespace)
+    assert namespace["runs"].sizes["material"] == 2 and float(namespace["runs"]["rms_slope"]) == 0.5
+    assert "| crops | asperities | crop1, crop2, crop3 | 1 | 0.21, 0.34, 0.5 |" in page

@@ -10,6 +10,7 @@ import xarray as xr
 from icha.datasets.campaign_file.spool import Entry, Members, plain
 from icha.datasets.files import read_run
 from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.places import arrange_slopes, slope_dims
 from icha.datasets.variables.campaign import (
     COMPLETE,
     FAILED_CHECKS,
@@ -26,15 +27,16 @@ from icha.datasets.variables.run import CELLS
 class Arrangement:
     """The runs of a study along its axes.
 
-    name : of the study. axes : values of every label. sample : a run that shows what variables there are, with those of
-    all models. origins : global attributes of a run of every model. widths : of
-    texts, in bytes. sizes : of the dimensions that runs have in common. snapshots : position of every kind and target.
+    name : of the study. axes : values of every label; rms slopes as `arrange_slopes` returns them. sample : a run that
+    shows what variables there are, with those of all models. origins : global attributes of a run of every model.
+    widths : of texts, in bytes. sizes : of the dimensions that runs have in common. snapshots : position of every kind
+    and target.
     entries : the runs there are, in the order of the axes; positions (n, 5) : of these; failures : why each of these is
     no result, an empty text if it is one. status, step_count : along `LABELS`.
     """
 
     name: str
-    axes: dict[str, list]
+    axes: dict[str, list | np.ndarray]
     sample: xr.Dataset
     origins: list[dict]
     widths: dict[str, int]
@@ -50,18 +52,26 @@ class Arrangement:
         """Size of a dimension of every run."""
         return _sizes(self.entries, dim)
 
+    @property
+    def slope_dims(self) -> tuple[str, ...]:
+        """Dimensions of the rms slopes."""
+        return slope_dims(self.axes["rms_slope"])
+
     def dims_of(self, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """The labels that a variable of the runs varies with, and its own dimensions; no labels of what is ragged."""
         own = self.sample[name].dims
         if name in self.sizes or set(RAGGED) & set(own):
             return (), own
-        return VARIES_WITH.get(name, LABELS), own
+        along = VARIES_WITH.get(name, LABELS)
+        if "rms_slope" in along and not set(self.slope_dims) <= set(along):
+            along = tuple(label for label in LABELS if label in {*along, *self.slope_dims})
+        return along, own
 
     def lacks(self, name: str) -> bool:
         """Whether a variable of the runs has no value somewhere."""
         along, own = self.dims_of(name)
         having = np.array([name in entry.names for entry in self.entries])
-        there = np.zeros([len(self.axes[label]) for label in along], bool)
+        there = np.zeros([self.status.shape[LABELS.index(label)] for label in along], bool)
         there[tuple(self.positions[having][:, LABELS.index(label)] for label in along)] = True
         if along != LABELS:
             return not there.all()
@@ -92,9 +102,17 @@ def arranged(studies: dict[str, Members], design: Iterable[RunLabels | tuple] | 
 
 def _arranged_study(name, members, design):
     axes = {label: list(dict.fromkeys(getattr(labels, label) for labels in design)) for label in LABELS}
-    axes |= {label: sorted(axes[label]) for label in ("seed", "rms_slope")}
-    at = [{value: k for k, value in enumerate(axes[label])} for label in LABELS]
-    position = {labels: tuple(k[value] for k, value in zip(at, labels[1:], strict=True)) for labels in design}
+    axes |= {"seed": sorted(axes["seed"])}
+    slopes = axes["rms_slope"] = arrange_slopes((labels.surface, labels.rms_slope) for labels in design)
+    at = {label: {value: k for k, value in enumerate(axes[label])} for label in LABELS if label != "rms_slope"}
+    rows = slopes if slopes.ndim == 2 else [slopes] * len(axes["surface"])
+    slope_at = [{value: k for k, value in enumerate(row.tolist())} for row in rows]
+
+    def place(labels):
+        own = at | {"rms_slope": slope_at[at["surface"][labels.surface]]}
+        return tuple(own[label][getattr(labels, label)] for label in LABELS)
+
+    position = {labels: place(labels) for labels in design}
     samples = {model: _sample(members.samples[model]) for model in axes["model"] if model in members.samples}
     sample = _combined(list(samples.values()))
     # In the order of the design, whatever that in which they came.
@@ -110,7 +128,7 @@ def _arranged_study(name, members, design):
     entries = sorted(entries, key=lambda entry: position[entry.labels])
     positions = np.array([position[entry.labels] for entry in entries])
     failures = [_why_incomplete(entry, len(snapshots)) for entry in entries]
-    shape = tuple(len(axes[label]) for label in LABELS)
+    shape = tuple(len(axes[label]) if label != "rms_slope" else slopes.shape[-1] for label in LABELS)
     status = np.full(shape, NOT_IN_DESIGN, np.int8)
     status[tuple(np.transpose(list(position.values())))] = MISSING
     status[tuple(positions.T)] = [

@@ -35,6 +35,7 @@ _LAYOUT = (
     "order of the runs, are ragged arrays along spot and event: the variables with an instance_dimension say where "
     "along that dimension each belongs, from 0; those that agree in all of them are of one snapshot of one run."
 )
+_OWN_SLOPES = {"comment": "each surface has slopes of its own, along the dimension rms_slope in ascending order"}
 
 
 class Column(NamedTuple):
@@ -91,6 +92,8 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
 
     names = [name for name in sample.variables if name not in LABELS]
     dims = {name: sum(study.dims_of(name), ()) for name in names} | {label: (label,) for label in LABELS}
+    dims |= {name: CAMPAIGN[name].dims for name in ("status", "step_count", "failure", "applicability")}
+    dims |= {"rms_slope": study.slope_dims}
     coordinates = coordinates_of(sample.variables, {*sample.coords, *LABELS}, dims)
     storage = _Storage.of(study, sizes, names)
     columns = {}
@@ -102,9 +105,13 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
                 | ({"coordinates": coordinates[name]} if name in coordinates else {})
             )
             columns[name] = _define_column(group, study, storage, name, attributes)
-    known = [*_define_numbers_along(group, study), *_define_of_campaign(group, study, storage)]
+    described = {
+        name: CAMPAIGN[name].attributes | ({"coordinates": coordinates[name]} if name in coordinates else {})
+        for name in CAMPAIGN
+    }
+    known = [*_define_numbers_along(group, study), *_define_of_campaign(group, study, storage, described)]
     texts = [
-        (_define_reasons(group, storage, name, own), own)
+        (_define_reasons(group, storage, name, own, described[name]), own)
         for name, own in (
             ("failure", study.failures),
             ("applicability", [entry.applicability for entry in study.entries]),
@@ -179,10 +186,10 @@ def _define_column(group, study, storage, name, attributes):
     return Column(define_numbers(group, name, along + own, dtype, attributes, **options), along, own, fill)
 
 
-def _define_reasons(group, storage, name, own):
+def _define_reasons(group, storage, name, own, attributes):
     """Make a variable of texts, one for each run, as wide as the longest of its `own` texts."""
     width = max(1, *(len(text.encode()) for text in own))
-    return define_text(group, name, LABELS, width, CAMPAIGN[name].attributes, **storage.options(LABELS, (), width))
+    return define_text(group, name, LABELS, width, attributes, **storage.options(LABELS, (), width))
 
 
 def _define_numbers_along(group, study):
@@ -193,17 +200,23 @@ def _define_numbers_along(group, study):
             yield variable, np.arange(size, dtype=np.int32)
 
 
-def _define_of_campaign(group, study, storage):
+def _define_of_campaign(group, study, storage, described):
     """Make the variables that say what runs there are, and give them with their values."""
     values = {"status": study.status, "step_count": study.step_count, **study.axes}
     for name, (dims, _, _, dtype, *_) in CAMPAIGN.items():
         if name in ("failure", "applicability"):
             continue
-        attributes = CAMPAIGN[name].attributes
+        attributes = described[name]
         if dtype is str:
             texts = characters(np.array(values[name]))
             yield define_text(group, name, dims, texts.shape[-1], attributes), texts
             continue
         numbers = np.asarray(values[name], dtype)
         options = storage.options(dims, ()) if dims == LABELS else {}
+        if name == "rms_slope":
+            dims = study.slope_dims
+            attributes = attributes | (_OWN_SLOPES if len(dims) > 1 else {})
+            if np.isnan(numbers).any():
+                options |= {"fill_value": FLOAT_FILL}
+                numbers = np.nan_to_num(numbers, nan=FLOAT_FILL)
         yield define_numbers(group, name, dims, numbers.dtype, attributes, **options), numbers
