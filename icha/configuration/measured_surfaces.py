@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from icha.support import in_words
-from icha.support.rules import GRID, LENGTH, Real
+from icha.support.rules import GRID, LENGTH, Integer, Real
 from icha.support.units import PATTERN, conversion_factor, to_si
 from icha.support.values import File, Length, Section, Text, integer, number, quantity
 
@@ -86,6 +86,11 @@ class MeasuredSurface(Section):
         "z per line in any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a format "
         "of a microscope that SurfaceTopography can read). `auto` decides by the ending of the file's name "
         "and, for text, by the number of columns.",
+    )
+    columns: Annotated[list[integer(Integer(1))], Field(min_length=3, max_length=3)] | None = Field(
+        default=None,
+        description="Which columns of a text are x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has "
+        "more than three numbers.",
     )
     data: Text | None = Field(
         default=None,
@@ -178,4 +183,6 @@ class MeasuredSurface(Section):
         if self.cutoff is None:
             # Known by its absence, so that results without it stay valid.
             del settings["cutoff"]
+        if self.columns is None:
+            del settings["columns"]
         return settings

@@ -10,7 +10,7 @@ from icha.support.input_files import require_room
 from icha.support.rules import GRID
 from icha.surfaces.measured.found import Found
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.text_files import read_table
+from icha.surfaces.measured.text_tables import read_table
 
 # The spectrum, its conjugate, their difference, the heights, and what is where.
 _BYTES_OF_NODE = 64
@@ -18,7 +18,7 @@ _BYTES_OF_NODE = 64
 
 def read_fourier(path: Path, how: Preparation) -> Found:
     """qx qy Re Im in every line: h = sum h_q exp(i q.r) over all q; opposite ones, if left out, are the conjugates."""
-    table = read_table(path)
+    table = read_table(path).values
     if table.shape[1] != 4:
         raise ValueError(f"{table.shape[1]} numbers in a line, not qx qy Re Im")
     k = _wave_numbers(table[:, :2], how)

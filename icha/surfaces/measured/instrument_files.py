@@ -11,6 +11,23 @@ from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopogra
 _WITHOUT_SIGNATURE = ("hgt", "nms")
 
 
+# Formats that are no evidence of an instrument: of any text with numbers, of which other fields are dropped, and
+# of any file of a certain length.
+_OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
+
+
+def is_instrument_text(path: Path) -> bool:
+    """Whether SurfaceTopography knows the format of a text file, as one of a certain instrument."""
+    from SurfaceTopography import open_topography
+    from SurfaceTopography.Exceptions import CannotDetectFileFormat
+
+    try:
+        with open_topography(str(path)) as file:
+            return file.format() not in _OF_ANY_TEXT
+    except CannotDetectFileFormat:
+        return False
+
+
 def read_instrument(path: Path, how: Preparation) -> Found:
     """Whatever SurfaceTopography reads. Its arrays have x as first axis."""
     from SurfaceTopography import open_topography

@@ -14,7 +14,7 @@ from icha.surfaces.measured.array_files import read_hdf5, read_netcdf, read_npy
 from icha.surfaces.measured.fourier_files import read_fourier
 from icha.surfaces.measured.instrument_files import read_instrument
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
-from icha.surfaces.measured.text_files import columns_of_text, has_gwyddion_heading, read_matrix, read_xyz
+from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
 
 # Letters of what a library says about a file that it cannot read.
 _LONGEST_REASON = 160
@@ -65,7 +65,9 @@ def read_scan(path: Path, how: Preparation) -> Scan:
     """Read a file of any of the formats; errors as `icha.surfaces.measured.topography.prepared_topography`."""
     if not path.stat().st_size:
         raise UnfitTopography("path", "is empty; allowed: a file of heights")
-    name = format_of(path) if how.format == "auto" else how.format
+    name = how.format
+    if name == "auto":
+        name = "xyz" if how.columns else format_of(path)
     found = _read(path, name, how)
     unit = how.height_unit or found.unit
     if unit is None:
@@ -78,6 +80,8 @@ def read_scan(path: Path, how: Preparation) -> Scan:
         raise UnfitTopography("size", "is missing, and the file does not say it; allowed: a length, such as '90 um'")
     rows, columns = found.heights.shape
     said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
+    if found.remark:
+        said += f"; {found.remark}"
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit, format_)
     if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
@@ -123,11 +127,9 @@ def _read(path, name, how):
 
 def format_of(path: Path) -> str:
     """The format that a file has by the ending of its name and, if it is text, by its columns."""
-    suffix = path.suffix.lower()
+    suffix = path.with_suffix("").suffix if path.suffix.lower() == ".gz" else path.suffix
+    suffix = suffix.lower()
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:
         return known[suffix]
-    columns = columns_of_text(path)
-    if columns is not None and has_gwyddion_heading(path):
-        return "matrix"
-    return {None: "instrument", 3: "xyz", 4: "fourier"}.get(columns, "matrix")
+    return format_of_text(path) or "instrument"

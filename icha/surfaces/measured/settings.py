@@ -28,6 +28,7 @@ class Preparation:
     ----------
     format : a name of `READERS`, or "auto".
     boundary : "periodic", "window", "mirror" or "free".
+    columns : numbers, from 1, of the columns x, y and z of a text; None: it has just these.
     data : name of variable, dataset or channel; None: the only one, or the file's own default.
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
     height_unit, lateral_unit : metres; None: as the file says, and the lateral one else that of height.
@@ -43,6 +44,7 @@ class Preparation:
 
     format: str
     boundary: str
+    columns: tuple[int, int, int] | None = None
     data: str | None = None
     first_axis: str = "y"
     height_unit: float | None = None

@@ -1,105 +1,126 @@
 """Readers of text: a row of heights per line, or x y z."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 
 from icha.support.input_files import require_room
-from icha.surfaces.measured.found import Found, metres_of, regular_ticks, with_y_first
-from icha.surfaces.measured.instrument_files import read_instrument
+from icha.surfaces.measured.found import Found, regular_ticks, with_y_first
+from icha.surfaces.measured.instrument_files import is_instrument_text, read_instrument
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
-
-_SEPARATORS = str.maketrans(",;\t", "   ")
-# Bytes in which a heading is looked for.
-_HEADING = 2**12
-# How Gwyddion begins the line with the width of an image that it exports, in the languages of its menus.
-_WIDTH = re.compile(r"^#\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]", re.MULTILINE)
-# The lines with the units of points that it exports.
-_UNITS = {
-    "lateral": re.compile(r"^#\s*Lateral units\s*:\s*(\S+)", re.MULTILINE),
-    "heights": re.compile(r"^#\s*Value units\s*:\s*(\S+)", re.MULTILINE),
-}
+from icha.surfaces.measured.text_headings import WIDTH, read_heading
+from icha.surfaces.measured.text_tables import layout_of, read_table, without_scales
 
 
 def read_matrix(path: Path, how: Preparation) -> Found:
-    """A row of heights in every line; with Gwyddion's heading, its size and units, too."""
-    if has_gwyddion_heading(path):
-        return read_instrument(path, how)
-    return Found(with_y_first(read_table(path), how))
+    """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
+    table = read_table(path)
+    if table.heading and (known := _as_instrument_file(path, how, table)):
+        return known
+    heights, steps, remark = without_scales(table.values)
+    rows, columns = heights.shape
+    heading = read_heading(table.heading, heights.shape)
+    coordinates = heading.coordinates or (steps and (columns * steps[0], rows * steps[1]))
+    return Found(
+        with_y_first(_without_missing(heights, heading), how),
+        heading.height_unit,
+        heading.size,
+        coordinates,
+        remark=remark,
+    )
 
 
-def has_gwyddion_heading(path: Path) -> bool:
-    """Whether a text begins as Gwyddion exports an image, which SurfaceTopography reads in all languages."""
-    return _WIDTH.search(_heading(path)) is not None
-
-
-def _heading(path):
-    with path.open("rb") as file:
-        start = file.read(_HEADING)
-    return start.decode(_encoding(start), "replace")
-
-
-def _encoding(start):
-    """UTF-8, which a multibyte character at the end may break off, or else what Windows writes in the West."""
+def _as_instrument_file(path, how, table):
+    """What SurfaceTopography, which knows many headings, finds; None if its heights are not all of the numbers."""
     try:
-        start[: start.rfind(b"\n") + 1].decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return "cp1252"
-    return "utf-8-sig"
+        found = read_instrument(path, how)
+    except Exception:  # whatever it raises at texts of other kinds
+        return None
+    if found.unit is None or found.heights.shape != table.values.shape:
+        return None
+    scale = np.max(np.abs(found.heights)) / np.max(np.abs(table.values))
+    same = np.allclose(found.heights, scale * table.values, rtol=1e-9, atol=1e-9 * np.max(np.abs(found.heights)))
+    return found if same else None
 
 
 def read_xyz(path: Path, how: Preparation) -> Found:
-    """x y z in every line; the lines in any order, and points may be missing. Gwyddion's heading tells the units."""
+    """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
     table = read_table(path)
-    if table.shape[1] != 3:
-        raise ValueError(f"{table.shape[1]} numbers in a line, not x y z")
-    if len(table) > 1 and any(np.ptp(table[:, axis]) == 0 for axis in (0, 1)):
-        raise UnfitTopography("path", LINE_SCAN.format(len(table)))
-    (column, nx, dx), (row, ny, dy) = (regular_ticks(table[:, axis], "xy"[axis]) for axis in (0, 1))
+    points = _columns_of_points(table.values, how)
+    heading = read_heading(table.heading, points.shape)
+    if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
+        raise UnfitTopography("path", LINE_SCAN.format(len(points)))
+    (column, nx, dx), (row, ny, dy) = (_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
     place = row * nx + column
     order = np.argsort(place, kind="stable")
     if np.any(np.diff(place[order]) == 0):
-        x, y = table[order[np.flatnonzero(np.diff(place[order]) == 0)[0]], :2]
+        x, y = points[order[np.flatnonzero(np.diff(place[order]) == 0)[0]], :2]
         raise ValueError(f"the point x = {x:g}, y = {y:g} is given twice")
     require_room(2 * 8 * nx * ny)
     heights = np.full(nx * ny, np.nan)
-    heights[place] = table[:, 2]
-    heading = _heading(path)
-    units = {name: metres_of(found[1]) for name, each in _UNITS.items() if (found := each.search(heading))}
-    sides, lateral = (nx * dx, ny * dy), units.get("lateral")
+    heights[place] = _without_missing(points[:, 2], heading)
+    sides, lateral = (nx * dx, ny * dy), heading.lateral_unit
     size = (sides[0] * lateral, sides[1] * lateral) if lateral and how.lateral_unit is None else None
-    return Found(heights.reshape(ny, nx), units.get("heights"), size, coordinates=sides)
+    return Found(heights.reshape(ny, nx), heading.height_unit, size, coordinates=sides)
 
 
-def read_table(path: Path) -> np.ndarray:
-    """The numbers of a text file (rows, columns); blanks, tabs, commas or semicolons between them, # before remarks."""
-    with path.open("rb") as file:
-        encoding = _encoding(file.read(_HEADING))
-    # Beyond the heading there are digits.
-    with path.open(encoding=encoding, errors="replace") as file:
-        first = next((text for line in file if (text := line.split("#")[0].strip())), None)
-        if first is None:
-            raise UnfitTopography("path", "holds no numbers, only remarks and blanks; allowed: a file of heights")
-        fields = [field.strip() for field in re.split(r"[;\s]+", first)]
-        if len(fields) > 1 and any("," in field.strip(",") for field in fields):
-            raise ValueError(f"it is not clear whether the commas of {first[:40]!r} are decimal; write points")
-        file.seek(0)
-        return np.loadtxt((line.translate(_SEPARATORS) for line in file), ndmin=2, comments="#")
+def _columns_of_points(values, how):
+    """The columns x, y and z (k, 3) of a table."""
+    count = values.shape[1]
+    columns = how.columns or (1, 2, 3)
+    if max(columns) > count:
+        raise UnfitTopography("columns", f"is {list(columns)}, and a line has {count} numbers; expected 1 to {count}")
+    if how.columns is None and count != 3:
+        if count < 3:
+            raise ValueError(f"{count} numbers in a line, not x y z")
+        other = ", and no Fourier series, whose opposite waves have conjugate amplitudes" if count == 4 else ""
+        raise UnfitTopography(
+            "columns",
+            f"is missing, and a line has {count} numbers{other}; expected which are x, y and z, such as [1, 2, 3]",
+        )
+    return values[:, [column - 1 for column in columns]]
 
 
-def columns_of_text(path: Path) -> int | None:
-    """Numbers in the first line that is no comment, 0 if there is no such line; None if it holds anything else."""
-    with path.open("rb") as file:
-        start = file.read(2**24)
+def _ticks(values, axis):
+    """Index of every coordinate on a regular scale, number and distance of the ticks."""
     try:
-        for line in start.decode("utf-8-sig", "replace").splitlines():
-            if text := line.split("#")[0].strip():
-                return len([float(word) for word in _words(text)])
-    except ValueError:
+        return regular_ticks(values, axis)
+    except ValueError as error:
+        raise UnfitTopography(
+            "path",
+            f"holds points that are not on a regular grid ({error}); expected rows and columns of points. Interpolate "
+            "them onto a grid in the program of the instrument, such as Gwyddion",
+        ) from None
+
+
+def _without_missing(heights, heading):
+    """Heights with nan in the place of the numbers that, by the heading, stand for missing ones."""
+    return np.where(np.isin(heights, heading.missing), np.nan, heights) if heading.missing else heights
+
+
+def format_of_text(path: Path) -> str | None:
+    """Format of a text file, by its columns; None if it is no table of numbers, or a format of an instrument."""
+    layout = layout_of(path)
+    if layout is None or (layout.words and is_instrument_text(path)):
         return None
-    return 0
+    if any(map(WIDTH.match, layout.heading)):
+        return "matrix"
+    if layout.columns == 4 and looks_like_fourier(read_table(path).values):
+        return "fourier"
+    # A surface has at least eight columns of heights.
+    return "xyz" if 3 <= layout.columns < 8 else "matrix"
 
 
-def _words(text):
-    return text.translate(_SEPARATORS).split()
+def looks_like_fourier(values: np.ndarray) -> bool:
+    """Whether lines of four numbers can be wave vectors and amplitudes: some wave numbers are negative.
+
+    Where two wave vectors are opposite, their amplitudes must be conjugate. Points have coordinates of one sign, or
+    heights that are not those of the opposite points.
+    """
+    waves, modes = values[:, :2], values[:, 2] + 1j * values[:, 3]
+    if not np.all(np.isfinite(values)) or np.all(waves >= 0):
+        return False
+    at = {tuple(wave): mode for wave, mode in zip(waves.tolist(), modes.tolist(), strict=True)}
+    pairs = [(mode, at[-x, -y]) for (x, y), mode in at.items() if (-x, -y) in at]
+    differences = [abs(mode - opposite.conjugate()) for mode, opposite in pairs]
+    return max(differences, default=0.0) <= 1e-4 * np.max(np.abs(modes), initial=1e-300)

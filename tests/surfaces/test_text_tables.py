@@ -1,0 +1,229 @@
+"""Texts as people and instruments write them: the heights that they hold, or the line and what to do."""
+
+import gzip
+
+import numpy as np
+import pytest
+
+from icha.surfaces.measured.settings import Preparation, UnfitTopography
+from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.spectrum import SelfAffineSpectrum
+
+NM, UM = 1e-9, 1e-6
+GRID, SIDE = 24, 12 * UM
+# As written, in nm.
+HEIGHTS = np.round(SelfAffineSpectrum(SIDE, 0.5 * SIDE, 0.4 * SIDE, 0.8, 0.05).realise(GRID, 3).heights / NM, 3)
+
+
+def rows(heights=HEIGHTS, write="{:.3f}".format):
+    """The fields of a table, row by row."""
+    return [[write(height) for height in row] for row in heights]
+
+
+def text(fields, delimiter=",", heading=()):
+    return "\n".join([*heading, *(delimiter.join(row) for row in fields)]) + "\n"
+
+
+def read(path, **keys):
+    """Surface and description of a text, of which nothing is removed but the mean."""
+    given = {"height_unit": NM, "size": (SIDE, SIDE)} | keys
+    how = Preparation(format="auto", boundary="periodic", missing="fill", **given)
+    prepared = prepared_topography(path, vars(how))
+    return prepared
+
+
+def written(tmp_path, content, name="scan.csv", encoding="utf-8"):
+    path = tmp_path / name
+    path.write_bytes(content.encode(encoding))
+    return path
+
+
+def assert_heights(prepared, missing=0):
+    """The heights are those that were written, but for the mean and for what is missing."""
+    assert prepared.filled == missing
+    difference = prepared.surface.heights / NM - HEIGHTS
+    # Filled points shift the mean.
+    assert np.median(np.abs(difference - np.median(difference))) < 1e-6
+    np.testing.assert_allclose(prepared.surface.period, SIDE, rtol=1e-9)
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_an_empty_field_is_a_missing_point_and_keeps_its_place(tmp_path, delimiter):
+    fields = rows()
+    for row, column in enumerate(np.random.default_rng(1).integers(0, GRID, GRID)):
+        fields[row][column] = ""
+    assert_heights(read(written(tmp_path, text(fields, delimiter))), missing=GRID)
+
+
+@pytest.mark.parametrize("word", ["BAD", "None", "nan", "-", "*", "#N/A", "no data", "NULL", "***", '""'])
+@pytest.mark.parametrize("delimiter", [",", "\t", " "])
+def test_words_for_missing_points(tmp_path, word, delimiter):
+    fields = rows()
+    fields[5][7] = word
+    assert_heights(read(written(tmp_path, text(fields, delimiter))), missing=1)
+
+
+@pytest.mark.parametrize("step", [1, 0.5])
+@pytest.mark.parametrize("corner", [None, "", "0", "y/x"])
+def test_numbers_and_coordinates_of_rows_and_columns_are_no_heights(tmp_path, step, corner):
+    fields = rows()
+    first = [f"{step * k:g}" for k in range(GRID)]
+    if corner is not None:
+        fields = [[f"{step * k:g}", *row] for k, row in enumerate(fields)]
+        first = [corner, *first]
+    prepared = read(written(tmp_path, text([first, *fields])))
+    assert_heights(prepared)
+    assert "left out" in prepared.description or corner == "y/x"
+
+
+def test_a_plane_is_no_table_with_numbered_rows(tmp_path):
+    plane = np.add.outer(np.arange(GRID), 2.0 * np.arange(GRID))
+    with pytest.raises(UnfitTopography, match="all the same but for the trend"):
+        path = written(tmp_path, text(rows(plane)))
+        prepared_topography(
+            path, vars(Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt"))
+        )
+
+
+HEADINGS = {
+    "words": (("Surface: sample A", "Unit: nm", "Pixel: 0.5 um"), True),
+    "size": (("Sample B", "Scan size: 12 µm x 12 µm", "Z unit = nm"), True),
+    "esri": (("ncols 24", "nrows 24", "xllcorner 0.0", "yllcorner 0", "cellsize 500", "NODATA_value -9999"), False),
+    "gwyddion": (("# Channel: Z", "# Width: 12,00 µm", "# Height: 12,00 µm", "# Value units: nm"), True),
+}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
+@pytest.mark.parametrize("kind", HEADINGS)
+def test_headings_give_size_unit_and_missing_value(tmp_path, kind, encoding):
+    heading, whole = HEADINGS[kind]
+    fields = rows()
+    if kind == "esri":
+        fields[3][4] = "-9999"
+    decimal = kind == "gwyddion"
+    if decimal:
+        fields = [[field.replace(".", ",") for field in row] for row in fields]
+    path = written(tmp_path, text(fields, "\t" if decimal else " ", heading), "scan.txt", encoding)
+    given = {} if whole else {"height_unit": NM}
+    assert_heights(read(path, **({"height_unit": None, "size": None} | given)), missing=kind == "esri")
+
+
+@pytest.mark.parametrize(
+    ("write", "delimiter", "encoding"),
+    [
+        ('"{:.3f}"'.format, ",", "utf-8"),
+        (lambda height: f"{height:.10E}".replace("E", "D"), " ", "utf-8"),
+        (lambda height: f"{height:.3f}".replace(".", ","), "\t", "utf-8"),
+        ("{:.3f}".format, ",", "utf-16"),
+        ("{:.3f}".format, ", ", "utf-8-sig"),
+    ],
+    ids=["quotes", "Fortran", "decimal commas", "UTF-16", "byte order mark"],
+)
+def test_ways_to_write_numbers(tmp_path, write, delimiter, encoding):
+    assert_heights(read(written(tmp_path, text(rows(write=write), delimiter), "scan.txt", encoding)))
+
+
+def test_a_compressed_text(tmp_path):
+    path = tmp_path / "scan.csv.gz"
+    path.write_bytes(gzip.compress(text(rows()).encode()))
+    assert_heights(read(path))
+
+
+def points(*further):
+    y, x = np.mgrid[:GRID, :GRID] * SIDE / GRID / UM
+    return [
+        [f"{value:.6g}" for value in line] for line in zip(x.ravel(), y.ravel(), HEIGHTS.ravel(), *further, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("further", [np.zeros(GRID**2), np.random.default_rng(4).integers(0, 255, GRID**2)])
+def test_points_with_a_column_too_many(tmp_path, further):
+    """Zeros or intensities: four columns are a Fourier series only if they look like one."""
+    path = written(tmp_path, text(points(further), " "), "scan.txt")
+    with pytest.raises(UnfitTopography, match=r"a line has 4 numbers.*\[1, 2, 3\]") as raised:
+        read(path)
+    assert raised.value.key == "columns"
+    assert_heights(read(path, columns=(1, 2, 3), size=None, lateral_unit=UM))
+
+
+def test_points_without_data_and_off_the_grid(tmp_path):
+    lines = points()
+    lines[50][2] = "no data"
+    assert_heights(read(written(tmp_path, text(lines, " "), "scan.xyz"), lateral_unit=UM), missing=1)
+    lines[51][0] = f"{float(lines[51][0]) + 0.2:g}"
+    with pytest.raises(UnfitTopography, match=r"not on a regular grid.* Interpolate"):
+        read(written(tmp_path, text(lines, " "), "scan.xyz"))
+
+
+@pytest.mark.parametrize("damage", ["short", "long", "word"])
+def test_a_damaged_row_is_named_by_its_line(tmp_path, damage):
+    fields = rows()
+    fields[9] = {"short": fields[9][:-3], "long": [*fields[9], "1.0"], "word": [*fields[9][:-1], "1.2.3"]}[damage]
+    with pytest.raises(UnfitTopography, match=r"line 11") as raised:
+        read(written(tmp_path, text(fields, heading=["# a remark"])))
+    assert raised.value.key == "path" and "remove the line" in str(raised.value)
+
+
+# --- two hundred tables, damaged at random -------------------------------------------------------------------------
+
+WORDS = ("", "BAD", "none", "NaN", "-", "*", "#N/A", "null")
+
+
+def damaged_table(number):
+    """A table with several damages: its bytes, the number of missing points, and whether a row is broken."""
+    random = np.random.default_rng(number)
+    delimiter = random.choice([",", ";", "\t", " "])
+    write = [
+        "{:.3f}".format,
+        "{:.6e}".format,
+        '"{:.3f}"'.format,
+        lambda height: f"{height:.9E}".replace("E", "D"),
+    ][random.integers(4)]
+    fields = rows(write=write)
+    holes = random.choice(GRID**2, random.choice([0, 1, 20]), replace=False)
+    for hole in holes:
+        # With blanks between the numbers nothing is no field.
+        fields[hole // GRID][hole % GRID] = str(random.choice(WORDS[1:] if delimiter == " " else WORDS))
+    broken = random.random() < 0.2
+    if broken:
+        row = fields[random.integers(GRID)]
+        match random.integers(3):
+            case 0:
+                row[random.integers(GRID)] = "1.2.3"
+            case 1:
+                del row[-1]
+            case 2:
+                row.append("3.1")
+    heading = random.choice(["", "# remark\n", "Sample: A1\nUnit: nm\n", "x;y;z\n\n"])
+    if random.random() < 0.3:
+        fields = [[str(k), *row] for k, row in enumerate(fields)]
+    if random.random() < 0.3:
+        first = [f"{0.25 * k:g}" for k in range(GRID)]
+        fields.insert(0, ["0"] * (len(fields[-1]) > len(first) and not broken) + first)
+        if len(fields[0]) != max(map(len, fields)):
+            del fields[0]
+    ending = random.choice(["\n", "\r\n"])
+    content = heading + text(fields, delimiter)
+    content = content.replace("\n", ending).encode(random.choice(["utf-8", "utf-8-sig", "utf-16", "latin-1"]))
+    if random.random() < 0.1:
+        content = gzip.compress(content)
+    return content, len(holes), broken
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_damaged_tables_give_the_right_heights_or_the_line(tmp_path, part):
+    path = tmp_path / "scan.txt"
+    refused = 0
+    for number in range(50 * part, 50 * (part + 1)):
+        content, missing, broken = damaged_table(number)
+        path.write_bytes(content)
+        try:
+            prepared = read(path)
+        except UnfitTopography as error:
+            assert broken, f"table {number}: {error}"
+            assert "line " in str(error) and "remove" in str(error)
+            refused += 1
+            continue
+        assert not broken, f"table {number} is broken, and was read"
+        assert_heights(prepared, missing)
+    assert refused
