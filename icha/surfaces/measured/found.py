@@ -15,6 +15,7 @@ class Found:
     """What a reader finds: heights (ny, nx) in its own unit, nan where missing; unit and size in m, if it knows them.
 
     coordinates: size (x, y) in units of length that the file does not tell. format: name of the instrument's format.
+    data: name of the array or channel that was taken, empty if the file has only one.
     """
 
     heights: np.ndarray
@@ -22,6 +23,7 @@ class Found:
     size: tuple[float, float] | None = None
     coordinates: tuple[float, float] | None = None
     format: str = ""
+    data: str = ""
 
 
 def with_y_first(heights: np.ndarray, how: Preparation) -> np.ndarray:
