@@ -8,13 +8,24 @@ _HOME = {
     "Surface": "surfaces.surface",
     "Material": "asperity.material",
     "Path": "path.targets",
+    "read_scan": "configuration.read_scan",
     "simulate": "simulation",
     "ConvergenceError": "simulation",
 }
-__all__ = ["ConvergenceError", "Material", "Path", "SelfAffineSpectrum", "Surface", "__version__", "simulate"]
+__all__ = [
+    "ConvergenceError",
+    "Material",
+    "Path",
+    "SelfAffineSpectrum",
+    "Surface",
+    "__version__",
+    "read_scan",
+    "simulate",
+]
 
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported
     from icha.asperity.material import Material
+    from icha.configuration.read_scan import read_scan
     from icha.path.targets import Path
     from icha.simulation import ConvergenceError, simulate
     from icha.surfaces.spectrum import SelfAffineSpectrum

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from icha.surfaces.measured.scan import read_scan
+from icha.surfaces.measured.scan import load_scan
 from icha.surfaces.measured.settings import Preparation
 
 NM, UM = 1e-9, 1e-6
@@ -17,7 +17,7 @@ def preparation(**keys):
 
 
 def scan(path, **keys):
-    return read_scan(path, Preparation(**preparation(**keys)))
+    return load_scan(path, Preparation(**preparation(**keys)))
 
 
 def assert_read(read, unit=NM):

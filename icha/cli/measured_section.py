@@ -69,7 +69,8 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     except UnfitTopography as error:
         raise Mistake(f"--measured {path}: {error.key} {error}") from None
 
-    lines = [f"data: {json.dumps(data)}"] if data is not None else []
+    taken = data if data is not None else scan.data
+    lines = [f"data: {json.dumps(taken)}"] if taken else []
     lines.append(f"# {columns} x {rows} points{_what_is_known(scan, missing, sides)}")
     for key in missing:
         empty = " (empty: that of the heights)" if key == "lateral_unit" else ""
@@ -104,13 +105,13 @@ def _check_file(path):
 
 def _read(path, data):
     """The scan, what was assumed to read it and what is missing of it, by key; its sides, if their unit is missing."""
-    from icha.surfaces.measured.scan import read_scan
+    from icha.surfaces.measured.scan import load_scan
     from icha.surfaces.measured.settings import Preparation, UnfitTopography
 
     assumed, missing = {}, {}
     while True:
         try:
-            scan = read_scan(path, Preparation("auto", "free", data, **assumed))
+            scan = load_scan(path, Preparation("auto", "free", data, **assumed))
             break
         except UnfitTopography as error:
             if error.key not in _GUESSES or error.key in assumed:
@@ -124,7 +125,7 @@ def _read(path, data):
         assumed["size"] = columns * 1e-6, rows * 1e-6
     elif "height_unit" in missing:
         # Coordinates without a unit would count in that of the heights, which is not known either.
-        bare = read_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
+        bare = load_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
         if bare.size != scan.size:
             missing["lateral_unit"] = "is missing, and the file does not say it; left out, it is that of the heights"
             return scan, assumed, missing, bare.size

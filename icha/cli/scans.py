@@ -5,9 +5,12 @@ from pathlib import Path
 
 from icha.cli.project import Mistake
 from icha.support import in_words
+from icha.support.printable import printable
 
 # Endings of the pictures that can be drawn.
 PICTURES = (".png", ".pdf", ".svg")
+# A few per cent of filled points do no harm; the documentation says "measure again" for more.
+MANY_FILLED = 0.05
 
 
 def check_picture(path: Path | None) -> None:
@@ -27,7 +30,20 @@ def about_scan(name: str, scan, *, to_scale: bool = True, by_patches: bool = Fal
     used = scan.used
     points = in_words.counted(scan.filled, "point")
     filled = f"{points} had no height and {'was' if scan.filled == 1 else 'were'} filled" if scan.filled else ""
-    yield f"{name}: read as {scan.format}, {filled or 'no point is missing'}"
+    taken = f", `data: {printable(scan.data)}` of several" if scan.data else ""
+    yield f"{name}: read as {scan.format}{taken}, {filled or 'no point is missing'}"
+    if scan.filled:
+        yield f"{name}: {in_words.share(scan.filled, scan.points)} of the points are filled"
+    if scan.filled > MANY_FILLED * scan.points:
+        yield (
+            f"{name}: warning: more than {100 * MANY_FILLED:.0f} % of the points are filled, so much of it is "
+            "made up and smooth; measure again, or `crop` a part with fewer missing points"
+        )
+    if not scan.edges_fit:
+        yield (
+            f"{name}: warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes, "
+            "so there is a step at the edges; use `boundary: window`, `mirror` or `free`"
+        )
     nodes = f"{used.grid} x {used.grid} nodes"
     scale = f" {in_words.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}," if to_scale else ","
     few = "; fewer than " if scan.cells_per_summit < LEAST_CELLS_OF_SUMMIT else "; at least "

@@ -1,6 +1,7 @@
 """YAML files of configurations, read and written: every key once, in the order in which they stand."""
 
 import codecs
+import re
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -108,8 +109,12 @@ class _Loader(yaml.SafeLoader):
         `0b_` and a 30th of February only look like a number and a date; of thousands of digits Python reads none.
         """
         text = self.construct_scalar(node)
-        if len(text) > _LONGEST_NUMBER:
+        # YAML 1.1 would read a time such as 1:30 as a number of base 60.
+        if len(text) > _LONGEST_NUMBER or (":" in text and not node.tag.endswith("timestamp")):
             return text
+        # YAML 1.1 would read 064 as an octal number; nobody who writes a configuration means that.
+        if node.tag.endswith(":int") and re.fullmatch(r"[-+]?0[0-9_]+", text):
+            return int(text.replace("_", ""))
         try:
             return construct(self, node)
         except (ValueError, OverflowError):

@@ -30,7 +30,7 @@ def refuse_traps(path: str | os.PathLike) -> None:
     OSError
         If the file is damaged.
     """
-    if not _is_hdf5(path):
+    if not is_hdf5(path):
         return
     # Not for every text.
     import h5py
@@ -62,8 +62,11 @@ def refuse_traps(path: str | os.PathLike) -> None:
             raise ValueError(found)
 
 
-def _is_hdf5(path):
-    """Whether the signature is at the beginning, or after a block of the user's own of 512, 1024, 2048, … bytes."""
+def is_hdf5(path):
+    """Tell whether a file is HDF5.
+
+    Its signature is at the beginning, or after a block of the user's own of 512, 1024, 2048, … bytes.
+    """
     with open(path, "rb") as file:
         size, place = os.fstat(file.fileno()).st_size, 0
         while place < size:

@@ -10,6 +10,11 @@ def counted(number: int, thing: str) -> str:
     return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
+def share(count: int, total: int) -> str:
+    """A part of a whole as a percentage to two digits: `31 %`, `0.024 %`."""
+    return f"{_digits(100 * count / total, 2)} %"
+
+
 def size(count: float) -> str:
     """Bytes to three digits: `15 B`, `70.2 kB`, `1.5 GB`."""
     for factor, unit in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")):

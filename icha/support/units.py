@@ -2,6 +2,7 @@
 
 import math
 import re
+import unicodedata
 from decimal import Decimal
 from functools import cache, lru_cache
 
@@ -32,6 +33,25 @@ USUAL = {
     ("mJ/m^2", "J/m^2"): "1e-3",
 }
 
+# Lengths that people use for scans; pint knows others as well (px, pt, au, hand), which no file means by them.
+_PREFIXES = {"deci": "1e-1", "centi": "1e-2", "milli": "1e-3", "micro": "1e-6", "nano": "1e-9", "pico": "1e-12"}
+_SYMBOLS = {"km": "1e3", "m": "1", "dm": "1e-1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "\u03bcm": "1e-6"}
+_SYMBOLS |= {"nm": "1e-9", "pm": "1e-12", "\u00c5": "1e-10", "in": "0.0254", "mil": "2.54e-5", "thou": "2.54e-5"}
+_LONG_NAMES = {"micron": "1e-6", "angstrom": "1e-10", "\u00e5ngstr\u00f6m": "1e-10", "inch": "0.0254", "mil": "2.54e-5"}
+_LONG_NAMES |= {
+    f"{prefix}{metre}": factor
+    for prefix, factor in {"": "1", "kilo": "1e3", **_PREFIXES}.items()
+    for metre in ("meter", "metre")
+}
+_LONG_NAMES |= {f"{name}s": factor for name, factor in _LONG_NAMES.items()} | {"inches": "0.0254"}
+
+# Units that are suggested for a slip of case or a missing ^.
+_SUGGESTED = {
+    "Pa": ("Pa", "hPa", "kPa", "MPa", "GPa", "N/m^2", "kN/m^2", "MN/m^2", "N/mm^2"),
+    "J/m^2": ("J/m^2", "mJ/m^2", "uJ/m^2", "N/m", "mN/m", "uN/m"),
+    "m": ("m", "dm", "cm", "mm", "um", "nm", "pm", "in", "mil"),
+}
+
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
 
 
@@ -50,7 +70,7 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
     Raises
     ------
     ValueError
-        If `unit` is no unit that pint knows, or one of another dimension.
+        If `unit` is unknown or of another dimension; of a length, if it is none in which scans are measured.
     """
     if len(unit) > _LONGEST:
         raise ValueError(f"a text of {len(unit)} letters is not a unit")
@@ -58,7 +78,25 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
         return Decimal(1)
     if (unit, si_unit) in USUAL:
         return Decimal(USUAL[unit, si_unit])
-    return _by_pint(unit, si_unit)
+    try:
+        return _length(unit) if si_unit == "m" else _by_pint(unit, si_unit)
+    except ValueError as error:
+        near = [known for known in _SUGGESTED.get(si_unit, ()) if _letters(known) == _letters(unit)]
+        raise ValueError(f"{error} (did you mean {near[0]!r}?)" if near else str(error)) from None
+
+
+def _letters(unit):
+    """A unit without what slips: its case, blanks, and the signs of a power."""
+    return re.sub(r"[\s^*]", "", unicodedata.normalize("NFKC", unit)).replace("\u03bc", "u").lower()
+
+
+def _length(unit):
+    """Exact factor from a unit of length to metres; both signs for micro and both for angstrom are known."""
+    name = unicodedata.normalize("NFKC", unit.strip())
+    factor = _SYMBOLS.get(name) or _LONG_NAMES.get(name.lower())
+    if factor is None:
+        raise ValueError(f"{unit!r} is not a unit of length")
+    return Decimal(factor)
 
 
 def _by_pint(unit, si_unit):

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import h5py
+import netCDF4
 import numpy as np
 import pytest
 import small_campaign as small
@@ -184,6 +185,34 @@ def write_scan(file, heights, size):
 def rough_heights(noise=0.0, grid=64, side=10e-6):
     heights = SelfAffineSpectrum(side, side, side / 8, 0.8, rms_slope=0.1).realise(grid, 1).heights
     return heights + noise * np.random.default_rng(1).normal(size=heights.shape)
+
+
+def test_the_array_that_is_taken_is_written_into_the_configuration(project):
+    with netCDF4.Dataset("my.nc", "w") as file:
+        file.createDimension("row", 64)
+        file.createDimension("column", 64)
+        for name in ("intensity", "z"):
+            file.createVariable(name, "f8", ("row", "column"))[:] = rough_heights() * 1e9
+            file[name].units = "nm"
+    written = icha("new", "mine", "--measured", "my.nc")
+    assert written.exit_code == 0 and "read as netcdf, `data: z` of several" in " ".join(written.output.split())
+    assert yaml.safe_load(Path("config/campaigns/mine.yaml").read_text())["surfaces"]["my"]["data"] == "z"
+
+
+def test_many_filled_points_and_edges_that_do_not_fit_are_told(project):
+    heights = rough_heights()
+    heights[20:45, 10:40] = np.nan
+    write_scan("scan.txt", heights[:48, :48], ("10 um", "10 um"))
+    written = icha("new", "mine", "--measured", "scan.txt")
+    told = " ".join(written.output.split())
+    assert written.exit_code == 0 and "scan: 33 % of the points are filled" in told
+    assert "scan: warning: more than 5 % of the points are filled" in told and "opposite edges" not in told
+    file = Path("config/campaigns/mine.yaml")
+    for boundary, warned in (("periodic", True), ("window", False)):
+        file.write_text(re.sub("boundary: .*", f"boundary: {boundary}  # to fill in", file.read_text()))
+        told = " ".join(icha("describe", "mine").output.split())
+        assert "33 % of the points are filled" in told
+        assert ("warning: `boundary: periodic`, but opposite edges differ" in told) == warned
 
 
 @pytest.mark.parametrize("boundary", ["free", "window", "mirror", "periodic"])

@@ -112,7 +112,7 @@ WRONG = {
     "spaces": ("surfaces.rough.period", "1" + " " * 100_000 + "um", "is not a number with a unit; allowed: "),
     "beyond decimals": ("materials.soft.contact_modulus", "1e999999 MPa", "is not finite; allowed: "),
     "far beyond decimals": ("materials.soft.contact_modulus", f"1e{'9' * 50} MPa", "is not finite; allowed: "),
-    "powers": ("surfaces.rough.period", "1 m**9**9**9", "is not a unit; allowed: "),
+    "powers": ("materials.soft.contact_modulus", "1 Pa**9**9**9", "is not a unit; allowed: "),
     "name": ("name", "-n", "name: '-n' is not a name; allowed: "),
     "name of a study": ("studies", {"-s": yaml.safe_load(GOOD)["studies"]["one"]}, "is not a name; allowed: "),
     "step": ("studies.one.max_step", 1e-300, "out of range; allowed: a number in [1e-4, 0.5]"),

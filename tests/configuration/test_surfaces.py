@@ -20,7 +20,7 @@ BAD = {
     # key, value, what the message must say of it
     "unknown key of a surface": ("surfaces.rough.hrust", 0.8, "surfaces.rough.hrust: unknown key"),
     "missing unit in text": ("surfaces.rough.period", "100", "surfaces.rough.period: '100' the unit is missing"),
-    "unknown unit": ("surfaces.rough.period", "100 umm", "'umm' is not a known unit"),
+    "unknown unit": ("surfaces.rough.period", "100 umm", "'umm' is not a unit of length"),
     "unit on a number": ("surfaces.rough.hurst", "0.8 m", "is a pure number and takes no unit"),
     "infinite length": ("surfaces.rough.period", "1e999 m", "is not finite"),
     "not a number of metres": ("surfaces.rough.period", "nan m", "is not a number with a unit"),

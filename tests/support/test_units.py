@@ -1,8 +1,10 @@
 """Quantities with their units."""
 
+import re
 from decimal import Decimal
 
 import pint
+import pytest
 import yaml
 
 from icha.support.units import USUAL, to_number, to_si
@@ -29,3 +31,49 @@ def test_factors_that_are_known_without_pint_are_those_of_pint():
     registry = pint.UnitRegistry(non_int_type=Decimal)
     for (unit, si_unit), factor in USUAL.items():
         assert registry.Quantity(Decimal(1), unit).to(si_unit).magnitude == Decimal(factor)
+
+
+@pytest.mark.parametrize(
+    ("text", "metres"),
+    [
+        ("3 Angstrom", 3e-10),
+        ("3 angstroms", 3e-10),
+        ("3 \u00c5", 3e-10),
+        ("3 \u212b", 3e-10),
+        ("3 \u00b5m", 3e-6),
+        ("3 \u03bcm", 3e-6),
+        ("3 micrometers", 3e-6),
+        ("3 Microns", 3e-6),
+        ("3 nanometre", 3e-9),
+        ("3 pm", 3e-12),
+        ("3 in", 0.0762),
+        ("3 inches", 0.0762),
+        ("3 mil", 7.62e-5),
+        ("3 thou", 7.62e-5),
+    ],
+)
+def test_lengths_of_scans(text, metres):
+    assert to_si(text, "m") == metres
+
+
+@pytest.mark.parametrize("unit", ["px", "pixel", "pica", "point", "hand", "au", "pc", "li", "pt", "ly", "furlong"])
+def test_other_lengths_are_none(unit):
+    with pytest.raises(ValueError, match="is not a unit of length"):
+        to_si(f"3 {unit}", "m")
+
+
+@pytest.mark.parametrize(
+    ("text", "si_unit", "suggestion"),
+    [
+        ("2 Mpa", "Pa", "MPa"),
+        ("2 kpa", "Pa", "kPa"),
+        ("50 J/m2", "J/m^2", "J/m^2"),
+        ("50 mj/m^2", "J/m^2", "mJ/m^2"),
+        ("50 MJ/M2", "J/m^2", "mJ/m^2"),
+        ("3 UM", "m", "um"),
+        ("3 Nm", "m", "nm"),
+    ],
+)
+def test_slips_of_case_and_powers_get_a_suggestion(text, si_unit, suggestion):
+    with pytest.raises(ValueError, match=re.escape(f"(did you mean {suggestion!r}?)")):
+        to_si(text, si_unit)

@@ -281,7 +281,7 @@ def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
 
 def test_messages_are_short_and_in_units_of_people(tmp_path, prepared):
     (tmp_path / "words.txt").write_text("no heights in here\n")
-    with pytest.raises(UnfitTopography, match="none of the formats that SurfaceTopography knows") as raised:
+    with pytest.raises(UnfitTopography, match="none of the formats of instruments") as raised:
         scan(tmp_path / "words.txt", height_unit=NM, size=SIZE)
     assert len(str(raised.value)) < 200
     crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}

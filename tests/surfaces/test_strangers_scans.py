@@ -138,10 +138,10 @@ def test_files_that_unpack_to_more_than_they_declare_are_refused(name, tmp_path)
     script = (
         "import sys, resource; from pathlib import Path\n"
         "import h5py, netCDF4, SurfaceTopography\n"
-        "from icha.surfaces.measured.scan import read_scan\n"
+        "from icha.surfaces.measured.scan import load_scan\n"
         "from icha.surfaces.measured.settings import Preparation\n"
         "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
-        "try: read_scan(Path(sys.argv[1]), Preparation('auto', 'free', height_unit=1.0, size=(1.0, 1.0)))\n"
+        "try: load_scan(Path(sys.argv[1]), Preparation('auto', 'free', height_unit=1.0, size=(1.0, 1.0)))\n"
         "except ValueError as error: print(type(error).__name__, error)\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)\n"
     )

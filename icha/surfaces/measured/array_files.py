@@ -1,6 +1,7 @@
 """Readers of arrays with or without their units: npy, netCDF and HDF5."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -43,17 +44,21 @@ def read_netcdf(path: Path, how: Preparation) -> Found:
     import netCDF4
 
     with netCDF4.Dataset(path) as file:
-        plane = [name for name, variable in file.variables.items() if variable.ndim == 2]
-        chosen = file[chosen_name(how.data, plane, ("height", "heights", "z"), "variable")]
-        if chosen.ndim != 2:
+        shapes = {name: variable.shape for name, variable in file.variables.items()}
+        plane = maps_among(shapes)
+        asked = how.data if how.data in shapes else chosen_name(how.data, plane, ("height", "heights", "z"), "variable")
+        chosen = file[asked]
+        if not _is_map(chosen.shape):
             raise UnfitTopography(
                 "data", f"has {chosen.ndim} dimensions; allowed: {', '.join(plane) or 'none is there'}"
             )
         heights = whole_variable(chosen)
-        names = [name.lower() for name in chosen.dimensions]
+        heights = heights.reshape(heights.shape[-2:])
+        dimensions = chosen.dimensions[-2:]
+        names = [name.lower() for name in dimensions]
         turned = names[0] == "x" if set(names) == {"x", "y"} else how.first_axis == "x"
         sides = []
-        for axis, name in enumerate(chosen.dimensions):
+        for axis, name in enumerate(dimensions):
             side, backwards = _side(file.variables.get(name), heights.shape[axis])
             sides.append(side)
             if backwards:
@@ -61,7 +66,7 @@ def read_netcdf(path: Path, how: Preparation) -> Found:
         unit = _unit_of(chosen.__dict__)
     along_y, along_x = sides[::-1] if turned else sides
     size = (along_x, along_y) if along_x and along_y else None
-    return Found(heights.T if turned else heights, unit, size)
+    return Found(heights.T if turned else heights, unit, size, data=asked if len(plane) > 1 else "")
 
 
 def _side(coordinate, count):
@@ -76,27 +81,67 @@ def _side(coordinate, count):
         return None, False
     _, ticks, step = regular_ticks(values, coordinate.name)
     if ticks != count:
-        raise ValueError(f"{coordinate.name} is not on a regular grid")
+        raise UnfitTopography("path", f"has {coordinate.name} on no regular grid; allowed: equal distances")
     return (count * step * unit if unit is not None else None), values[0] > values[-1]
 
 
 def read_hdf5(path: Path, how: Preparation) -> Found:
-    """The dataset `data`, or the only one of two dimensions; its attribute `units` or `unit`, if there is one."""
+    """The dataset `data`, or the only one of two dimensions; its attribute `units` or `unit`, if there is one.
+
+    MATLAB (from version 7.3) stores columns, so that HDF5 has the transpose of what MATLAB shows.
+    """
     import h5py
 
     with h5py.File(path) as file:
-        plane = []
-        file.visititems(
-            lambda name, node: (
-                plane.append(name)
-                if isinstance(node, h5py.Dataset) and node.ndim == 2 and node.dtype.kind in "iuf"
-                else None
-            )
-        )
+        shapes = {}
+
+        def note(name, node):
+            if (
+                isinstance(node, h5py.Dataset)
+                and node.dtype.kind in "iuf"
+                and _is_map(node.shape)
+                and node.attrs.get("MATLAB_class") != b"char"
+            ):
+                shapes[name] = node.shape
+
+        file.visititems(note)
+        plane = sorted(maps_among(shapes))
         asked = how.data.strip("/") if how.data else None
-        chosen = file[chosen_name(asked, sorted(plane), (), "dataset")]
+        name = asked if asked in shapes else chosen_name(asked, plane, (), "dataset")
+        chosen = file[name]
         _require_room(chosen)
-        return Found(with_y_first(chosen[...], how), _unit_of(dict(chosen.attrs)))
+        heights = chosen[...].reshape(chosen.shape[-2:])
+        if path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
+            heights = heights.T
+        unit = _unit_of(dict(chosen.attrs))
+        return Found(with_y_first(heights, how), unit, data=name if len(plane) > 1 else "")
+
+
+def format_of_hdf5(path: Path) -> str:
+    """The format of an HDF5 file whose name does not tell it; netCDF-4 and Zygo's files are HDF5, too."""
+    import h5py
+
+    try:
+        with h5py.File(path) as file:
+            if "_NCProperties" in file.attrs:
+                return "netcdf"
+            return "instrument" if "MetaData" in file else "hdf5"
+    except OSError:  # damaged, which its reader reports
+        return "hdf5"
+
+
+def _is_map(shape):
+    """Whether an array has two dimensions, besides leading ones of length 1."""
+    return len(shape) >= 2 and all(count == 1 for count in shape[:-2])
+
+
+def maps_among(shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
+    """Names of the arrays that can be maps of heights; lines and single numbers of two dimensions only if no other is.
+
+    MATLAB keeps every number and every line as an array of two dimensions.
+    """
+    maps = [name for name, shape in shapes.items() if _is_map(shape)]
+    return [name for name in maps if min(shapes[name][-2:]) > 2] or maps
 
 
 def _unit_of(attributes):

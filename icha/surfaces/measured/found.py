@@ -16,6 +16,7 @@ class Found:
 
     coordinates: size (x, y) in units of length that the file does not tell. format: name of the instrument's format.
     remark: what was left out of the file, in words.
+    data: name of the array or channel that was taken, empty if the file has only one.
     """
 
     heights: np.ndarray
@@ -24,6 +25,7 @@ class Found:
     coordinates: tuple[float, float] | None = None
     format: str = ""
     remark: str = ""
+    data: str = ""
 
 
 def with_y_first(heights: np.ndarray, how: Preparation) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
+from icha.support import in_words
 from icha.surfaces.measured.scan import Scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
 from icha.surfaces.surface import PERIODIC
@@ -27,7 +28,8 @@ def filled(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
         raise UnfitTopography("missing", f"would make up {count} of {missing.size} points; allowed: up to half of them")
     heights = scan.heights.copy()
     heights[missing] = _harmonic(heights, missing, periodic=how.boundary == PERIODIC)
-    return replace(scan, heights=heights), [f"{count} missing points filled"]
+    said = f"{count} missing points filled, {in_words.share(count, missing.size)} of the points"
+    return replace(scan, heights=heights), [said]
 
 
 def _harmonic(heights, missing, *, periodic):

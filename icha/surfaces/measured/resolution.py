@@ -19,7 +19,7 @@ from icha.surfaces.moments import (
     ring_edges,
 )
 from icha.surfaces.summits import count_summits
-from icha.surfaces.surface import FREE, PERIODIC, Surface
+from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
 # The spectrum of a self-affine surface falls at least as q^-2 (its Hurst exponent is not negative), that of
 # uncorrelated noise does not fall. A floor falls less than halfway between the two, over this factor of wave numbers.
@@ -49,15 +49,23 @@ class ScanResolution:
     """A scan before its short waves are cut off, and the surface that is made of it.
 
     measured : the scan as a square, without filter, edges and changes of its grid. used : the prepared surface.
-    cutoff : nesting index of its filter, m; None: it has none. format : as which the file was read. filled : number of
-    points that had no height.
+    cutoff : nesting index of its filter, m; None: it has none. format : as which the file was read. data : the array or
+    channel that was taken, empty if the file has only one. filled : number of points that had no height. points :
+    number of points that were used.
     """
 
     measured: Surface
     used: Surface
     cutoff: float | None
     format: str = ""
+    data: str = ""
     filled: int = 0
+    points: int = 1
+
+    @property
+    def edges_fit(self) -> bool:
+        """Whether the prepared surface is free, or periodic without a step from one cell to the next."""
+        return self.used.free or edges_fit(self.used.heights)
 
     @cached_property
     def summits(self) -> int:
@@ -111,7 +119,15 @@ def scan_resolution(path: str | os.PathLike, preparation: Mapping) -> ScanResolu
         raw |= {"boundary": FREE, "grid": None}
     measured = prepared_topography(path, raw).surface
     used = prepared_topography(path, preparation)
-    return ScanResolution(measured, used.surface, preparation.get("cutoff"), used.format, used.filled)
+    return ScanResolution(
+        measured=measured,
+        used=used.surface,
+        cutoff=preparation.get("cutoff"),
+        format=used.format,
+        data=used.data,
+        filled=used.filled,
+        points=used.points,
+    )
 
 
 def noise_floor(surface: Surface) -> NoiseFloor | None:

@@ -7,17 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from icha.support import in_words
-from icha.support.hdf5 import refuse_traps
+from icha.support.hdf5 import is_hdf5, refuse_traps
 from icha.support.input_files import TooLarge, bounded_memory
+from icha.support.printable import printable
 from icha.support.rules import LENGTH
-from icha.surfaces.measured.array_files import read_hdf5, read_netcdf, read_npy
+from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_netcdf, read_npy
 from icha.surfaces.measured.fourier_files import read_fourier
 from icha.surfaces.measured.instrument_files import read_instrument
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
 from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
-
-# Letters of what a library says about a file that it cannot read.
-_LONGEST_REASON = 160
 
 READERS = {
     "npy": read_npy,
@@ -37,7 +35,7 @@ class Scan:
     """What a file says in metres: heights (ny, nx), nan where missing, first axis y, and the size (x, y) of it all.
 
     coordinate_unit: metres, where the size follows from coordinates whose unit the file does not tell. format: as
-    which the file was read.
+    which the file was read. data: name of the array or channel that was taken, empty if the file has only one.
     """
 
     heights: np.ndarray
@@ -45,6 +43,7 @@ class Scan:
     description: str = ""
     coordinate_unit: float | None = None
     format: str = ""
+    data: str = ""
 
     @property
     def pixel(self) -> tuple[float, float]:
@@ -61,7 +60,7 @@ class Scan:
         return f"; the coordinates are taken to be in units of {unit}, see `lateral_unit`"
 
 
-def read_scan(path: Path, how: Preparation) -> Scan:
+def load_scan(path: Path, how: Preparation) -> Scan:
     """Read a file of any of the formats; errors as `icha.surfaces.measured.topography.prepared_topography`."""
     if not path.stat().st_size:
         raise UnfitTopography("path", "is empty; allowed: a file of heights")
@@ -82,8 +81,10 @@ def read_scan(path: Path, how: Preparation) -> Scan:
     said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
     if found.remark:
         said += f"; {found.remark}"
+    if found.data:
+        said += f", data {printable(found.data)} of several"
     format_ = f"{name} ({found.format})" if name == "instrument" else name
-    scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit, format_)
+    scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
         raise UnfitTopography(
             "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; allowed: give it here"
@@ -97,18 +98,17 @@ def _read(path, name, how):
         if name in _LIBRARIES:
             importlib.import_module(_LIBRARIES[name])
         with bounded_memory():
-            refuse_traps(path)
+            _refuse_traps(path)
             found = READERS[name](path, how)
     except UnfitTopography:
         raise
     except TooLarge as error:
         raise UnfitTopography("path", str(error)) from None
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
-        reason = " ".join(str(error).replace(str(path), path.name).split()) or type(error).__name__
-        if len(reason) > _LONGEST_REASON:
-            reason = f"{reason[: _LONGEST_REASON - 1]}…"
         raise UnfitTopography(
-            "path", f"cannot be read as {name} ({reason}); allowed: a file that is, or another `format`"
+            "path",
+            f"cannot be read as {name}{_own_reason(error)}: the file is damaged or of another format; allowed: a file "
+            "that is, or another `format`",
         ) from None
     heights = found.heights
     if heights.dtype.kind not in "iuf":
@@ -125,11 +125,30 @@ def _read(path, name, how):
     return found
 
 
+def _refuse_traps(path):
+    try:
+        refuse_traps(path)
+    except ValueError as error:
+        raise UnfitTopography("path", str(error)) from None
+
+
+def _own_reason(error):
+    """The reason in brackets if this package raised the error itself; libraries speak to programmers."""
+    trace = error.__traceback__
+    while trace.tb_next is not None:
+        trace = trace.tb_next
+    own = type(error) is ValueError and trace.tb_frame.f_globals.get("__name__", "").startswith("icha.")
+    return f" ({error})" if own else ""
+
+
 def format_of(path: Path) -> str:
     """The format that a file has by the ending of its name and, if it is text, by its columns."""
-    suffix = path.with_suffix("").suffix if path.suffix.lower() == ".gz" else path.suffix
-    suffix = suffix.lower()
+    suffix = path.suffix.lower()
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:
         return known[suffix]
+    if is_hdf5(path):
+        return format_of_hdf5(path)
+    if path.name.lower().endswith(".xyz.gz"):
+        return "xyz"
     return format_of_text(path) or "instrument"

@@ -12,6 +12,10 @@ from icha.surfaces.measured.text_headings import WIDTH, read_heading
 from icha.surfaces.measured.text_tables import layout_of, read_table, without_scales
 
 
+# A surface has at least so many columns of heights.
+_FEWEST_COLUMNS = 8
+
+
 def read_matrix(path: Path, how: Preparation) -> Found:
     """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
     table = read_table(path)
@@ -71,7 +75,7 @@ def _columns_of_points(values, how):
     if max(columns) > count:
         raise UnfitTopography("columns", f"is {list(columns)}, and a line has {count} numbers; expected 1 to {count}")
     if how.columns is None and count != 3:
-        if count < 3:
+        if not 3 < count < _FEWEST_COLUMNS:
             raise ValueError(f"{count} numbers in a line, not x y z")
         other = ", and no Fourier series, whose opposite waves have conjugate amplitudes" if count == 4 else ""
         raise UnfitTopography(
@@ -107,19 +111,20 @@ def format_of_text(path: Path) -> str | None:
         return "matrix"
     if layout.columns == 4 and looks_like_fourier(read_table(path).values):
         return "fourier"
-    # A surface has at least eight columns of heights.
-    return "xyz" if 3 <= layout.columns < 8 else "matrix"
+    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS else "matrix"
 
 
 def looks_like_fourier(values: np.ndarray) -> bool:
-    """Whether lines of four numbers can be wave vectors and amplitudes: some wave numbers are negative.
+    """Whether lines of four numbers can be wave vectors and amplitudes.
 
-    Where two wave vectors are opposite, their amplitudes must be conjugate. Points have coordinates of one sign, or
-    heights that are not those of the opposite points.
+    Some wave numbers are negative, unless there are few waves, which fill no grid of coordinates. Where two wave vectors
+    are opposite, their amplitudes must be conjugate; heights of opposite points are not.
     """
     waves, modes = values[:, :2], values[:, 2] + 1j * values[:, 3]
-    if not np.all(np.isfinite(values)) or np.all(waves >= 0):
+    if not np.all(np.isfinite(values)):
         return False
+    if np.all(waves >= 0):
+        return 2 * len(waves) < len(np.unique(waves[:, 0])) * len(np.unique(waves[:, 1])) or len(waves) < 16
     at = {tuple(wave): mode for wave, mode in zip(waves.tolist(), modes.tolist(), strict=True)}
     pairs = [(mode, at[-x, -y]) for (x, y), mode in at.items() if (-x, -y) in at]
     differences = [abs(mode - opposite.conjugate()) for mode, opposite in pairs]

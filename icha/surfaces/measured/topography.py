@@ -26,7 +26,7 @@ from icha.surfaces.measured.cutoff import without_short_waves
 from icha.surfaces.measured.edges import bounded
 from icha.surfaces.measured.holes import filled
 from icha.surfaces.measured.pixels import squared
-from icha.surfaces.measured.scan import read_scan
+from icha.surfaces.measured.scan import load_scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
 from icha.surfaces.measured.trend import detrended, refuse_flat
 from icha.surfaces.surface import Surface
@@ -36,7 +36,8 @@ from icha.surfaces.surface import Surface
 class PreparedTopography:
     """A surface at its own heights, and what was done to the file to get it.
 
-    format : as which the file was read. filled : number of points that had no height.
+    format : as which the file was read. data : the array or channel that was taken, empty if the file has only one.
+    filled : number of points that had no height. points : number of points that were used.
     """
 
     surface: Surface
@@ -44,7 +45,9 @@ class PreparedTopography:
     source_sha256: str
     description: str
     format: str
+    data: str
     filled: int
+    points: int
 
     @property
     def rms_slope(self) -> float:
@@ -66,7 +69,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         A ValueError that says which setting (`key`) does not fit the file, why, and what is allowed.
     """
     path, how = _existing(path), Preparation(**preparation)
-    scan = read_scan(path, how)
+    scan = load_scan(path, how)
     steps = [scan.description]
     if how.touches_first == "low":
         scan = replace(scan, heights=-scan.heights)
@@ -80,7 +83,16 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         steps += said
     refuse_flat(left, part, how)
     surface, said = bounded(left, how)
-    return PreparedTopography(surface, path.name, sha256_of(path), "; ".join([*steps, *said]), scan.format, missing)
+    return PreparedTopography(
+        surface=surface,
+        source_file=path.name,
+        source_sha256=sha256_of(path),
+        description="; ".join([*steps, *said]),
+        format=scan.format,
+        data=scan.data,
+        filled=missing,
+        points=part.heights.size,
+    )
 
 
 @dataclass(frozen=True)

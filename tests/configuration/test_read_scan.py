@@ -1,0 +1,105 @@
+"""A measured surface in a script is that of a campaign."""
+
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+
+import icha
+from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.surface import EdgeWarning
+
+PERIOD = 1e-5
+KEYS = {"size": "10 um", "height_unit": "nm"}
+
+
+def rough(grid=64, roll_off=PERIOD, cells=8, hurst=0.8, seed=1):
+    spectrum = icha.SelfAffineSpectrum(PERIOD, roll_off, PERIOD * cells / grid, hurst, rms_slope=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of few nodes for each wave
+        return spectrum.realise(grid, seed).heights
+
+
+@pytest.fixture
+def file(tmp_path):
+    slope = 0.3 * PERIOD * np.arange(64) / 64
+    np.savetxt(tmp_path / "scan.csv", (rough() + slope) * 1e9, delimiter=",")
+    return tmp_path / "scan.csv"
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("boundary", ["window", "mirror", "free"])
+def test_prepared_as_in_a_campaign(file, boundary):
+    keys = {**KEYS, "boundary": boundary, "cutoff": "1 um"}
+    section = MeasuredSurface.model_validate({"kind": "measured", "path": str(file), **keys})
+    expected = prepared_topography(file, section.preparation).surface
+    surface = icha.read_scan(file, **keys)
+    np.testing.assert_array_equal(surface.heights, expected.heights)
+    assert (surface.period, surface.boundary) == (expected.period, expected.boundary)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({}, "boundary: the key is missing"),
+        ({"boundary": "free"}, "height_unit: is missing"),
+        ({"boundary": "free", "height_unit": "nm"}, "size: is missing"),
+        ({"boundary": "free", "hight_unit": "nm"}, r"hight_unit: unknown key \(did you mean 'height_unit'\?\)"),
+        ({"boundary": "free", "size": "10 UM"}, r"size: '10 UM' .*did you mean 'um'\?"),
+        ({"boundary": "periodic", "detrend": "tilt"}, "would break the periodicity"),
+    ],
+)
+def test_wrong_keys_are_named(file, keys, words):
+    with pytest.raises(ValueError, match=words):
+        icha.read_scan(file, **keys)
+
+
+def test_importing_the_package_loads_no_reader():
+    script = (
+        "import icha, sys; print([m for m in ('numpy', 'pydantic', 'h5py', 'SurfaceTopography') if m in sys.modules])"
+    )
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("hurst", [0.2, 0.8])
+@pytest.mark.parametrize(("grid", "cells", "roll_off"), [(16, 2, 1), (64, 2, 4), (64, 8, 1), (64, 32, 1), (256, 4, 8)])
+def test_periodic_surfaces_give_no_warning(grid, cells, roll_off, hurst):
+    for seed in range(4):
+        icha.Surface(rough(grid, PERIOD / roll_off, cells, hurst, seed), PERIOD)
+
+
+@pytest.mark.filterwarnings("error")
+def test_white_noise_single_waves_and_domes_give_no_warning():
+    for seed in range(300):
+        icha.Surface(np.random.default_rng(seed).normal(size=(8, 8)), 1.0)
+    x = np.arange(64)
+    for k in (1, 2, 7, 31):
+        for shift in (0.0, 0.2, 0.7):
+            icha.Surface(np.sin(2 * np.pi * (k * x / 64 + shift))[:, None] + np.zeros(64), 64.0)
+    dome = -((x[:, None] - 32) ** 2 + (x - 32.0) ** 2) / 1000
+    icha.Surface(dome, 64.0)
+    icha.Surface(np.roll(dome, (13, 40), (0, 1)), 64.0)
+
+
+@pytest.mark.parametrize("cells", [4, 8])
+def test_tilted_and_cropped_scans_give_a_warning(cells):
+    tilt = 0.05 * PERIOD * np.arange(64) / 64
+    with pytest.warns(EdgeWarning, match=r"boundary: 'periodic'.*icha\.read_scan") as raised:
+        icha.Surface(rough(cells=cells) + tilt, PERIOD)
+    assert raised[0].filename == __file__
+    for seed in range(4):
+        part = rough(256, cells=cells, seed=seed)[:128, :128]
+        with pytest.warns(EdgeWarning):
+            icha.Surface(part, PERIOD)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            icha.Surface(part, PERIOD, "free")
+
+
+def test_a_scan_that_is_not_periodic_gives_a_warning(file):
+    with pytest.warns(EdgeWarning):
+        icha.read_scan(file, **KEYS, boundary="periodic")
