@@ -83,7 +83,10 @@ def new(
         if own is None
         else "",
         slopes=slopes,
-        vary="hurst: [0.6, 0.8]" if own is None else "contact_modulus: [1 MPa, 2 MPa]",
+        vary="hurst: [0.6, 0.8]" if own is None else "contact_modulus: [1 GPa, 2 GPa]",
+        # Scans are as a rule so smooth that a soft material would stick to them without load.
+        modulus="2 MPa" if own is None else "2 GPa",
+        energy="5 mJ/m^2" if own is None else "0.5 mJ/m^2",
         pull_off=_part("pull_off", surface=surface, slopes=slopes) if pull_off else "",
         models=_MODELS[boundary_elements],
         figures="".join(
@@ -160,9 +163,13 @@ def _against(file: Path, section: MeasuredSection) -> list[str]:
         load_configuration(file, {"surfaces": {section.name: section.filled_in}})
     except ConfigurationError as error:
         lines = [line.partition(": ")[2] for line in str(error).splitlines()]
-        # Without their units, sizes and slopes are guesses.
-        guessed = {"size", "height_unit"} if section.to_fill_in.keys() - {"boundary"} else set()
-        return [
-            line for line in lines if not any(line.startswith(f"surfaces.{section.name}.{key}:") for key in guessed)
-        ]
+        # Without their units, sizes, slopes and whether a surface sticks are guesses.
+        guessed = ()
+        if section.to_fill_in.keys() - {"boundary"}:
+            guessed = (
+                f"surfaces.{section.name}.size:",
+                f"surfaces.{section.name}.height_unit:",
+                "studies.load.models:",
+            )
+        return [line for line in lines if not line.startswith(guessed)]
     return []

@@ -97,8 +97,10 @@ def load_configuration(
     for name, each in topographies.items():
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
-    unusual += sticky_runs(campaign)
-    slips = list(plausibility_problems(unusual, meant))
+    sticky = list(sticky_runs(campaign))
+    # A slip may be why a contact is sticky.
+    slips = list(plausibility_problems(unusual, meant)) or list(plausibility_problems(sticky, meant))
+    unusual += sticky
     fail(itertools.chain(campaign.problems(), slips, needless_confirmations(unusual, meant)))
     confirmed = [
         said(each.location, each.value, f"is unusual{each.how}, but confirmed; usual: {each.usual}") for each in unusual

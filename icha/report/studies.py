@@ -137,6 +137,7 @@ def _run(labels: RunLabels, run):
         "grid": int(run["grid"]),
         "nayak_parameter": float(run["nayak_parameter"]),
         "stickiness": float(run["stickiness"]),
+        "energy_ratio": float(run["full_contact_energy_ratio"]) if float(run["surface_energy"]) > 0 else None,
         "residual": float(run["residual"].max()) if run.sizes["step"] else None,
         "events": {name: int(run[name].values[k]) for name in _COUNTS for k in loaded},
         "beyond_wu": float(run["outside_wu_fraction"].values[loaded[0]]) if len(loaded) else None,

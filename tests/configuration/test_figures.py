@@ -113,3 +113,14 @@ def test_the_sources_of_the_error_are_drawn_without_adhesion(load):
         "tolerance": 1e-8,
     }
     assert campaign.snapshots_of("one") == [("area_fraction", 0.02)]  # the runs are none of their concern
+
+
+def test_a_study_of_areas_is_not_said_to_lack_boundary_elements(refused):
+    areas = {
+        "studies.one.models": ["asperities", "boundary_elements"],
+        "studies.one.targets": {"area_fractions": [0.01, 0.02]},
+        "figures": {"fig10_model_error": {"study": "one"}},
+    }
+    refused(
+        "", areas, "'one' has boundary elements, but its targets are area_fractions, and errors are compared at the"
+    )

@@ -1,7 +1,8 @@
 """Values that are almost surely slips: refused unless confirmed, and warned of then."""
 
+import numpy as np
 import pytest
-from demo_configuration import measured_surface
+from demo_configuration import file_surface, measured_surface
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.plausibility import USUAL
@@ -13,6 +14,8 @@ SLIPS = {
     "studies.one.rms_slopes.0": [500, "6", 1e-5],
     "studies.one.rms_slopes.1": [500],
 }
+# Models to which it does not matter how sticky a contact is.
+ANY_STICKINESS = {"studies.one.models": ["boundary_elements"]}
 USUAL_ONES = {
     "materials.soft.contact_modulus": ["1 kPa", "1 TPa"],
     "materials.soft.surface_energy": ["0 J/m^2", "1e-6 J/m^2", "2 J/m^2"],
@@ -30,14 +33,14 @@ def test_slips_are_refused_until_they_are_confirmed(place, value, load, refused,
     key = key_of(place)
     refused(place, value, f": {value!r} is unusual; usual: ")
     refused(place, value, f"if it is meant, this one with `confirmed: [{key}]` at the top level")
-    configuration = load({place: value, "confirmed": [key]})
+    configuration = load({**ANY_STICKINESS, place: value, "confirmed": [key]})
     (warning,) = configuration.warnings
     assert warning.startswith(f"{tmp_path}/campaign.yaml: {key}") and f"{value!r} is unusual, but confirmed" in warning
 
 
 @pytest.mark.parametrize(("place", "value"), [(place, value) for place, all_ in USUAL_ONES.items() for value in all_])
 def test_what_is_usual_needs_no_confirmation(place, value, load):
-    assert load({place: value}).warnings == ()
+    assert load({**ANY_STICKINESS, place: value}).warnings == ()
 
 
 def test_slips_are_found_wherever_values_are_written(load, refused, tmp_path):
@@ -71,3 +74,29 @@ def test_all_slips_and_other_mistakes_of_the_design_are_named_at_once(load):
 def test_the_usual_ranges_are_ranges_with_a_reason():
     for usual in USUAL.values():
         assert usual.holds(usual.least) and usual.holds(usual.most) and usual.why
+
+
+STICKY = {"materials.soft.contact_modulus": "50 kPa"}
+
+
+def test_sticky_runs_of_asperities_are_refused_until_they_are_confirmed(load, refused):
+    said = (
+        "studies.one.models: 'asperities with U_full/dgamma = 0.0275' is unusual, for soft on rough at rms slope 0.2; "
+        "usual: 1 to inf (below, full contact has the lower energy and the asperity model is not applicable: "
+    )
+    refused("", STICKY, said)
+    refused("", STICKY, "if it is meant, this one with `confirmed: [studies.one.models]` at the top level")
+    (warning,) = load({**STICKY, "confirmed": ["studies.one.models"]}).warnings
+    assert said.replace("; usual", ", but confirmed; usual") in warning
+    assert load({**STICKY, **ANY_STICKINESS}).warnings == ()
+    assert load({**STICKY, "materials.soft.surface_energy": "0 J/m^2"}).warnings == ()
+
+
+def test_sticky_runs_on_surfaces_from_files_are_found_too(load, refused, tmp_path):
+    scan = {"surfaces.rough": measured_surface()}
+    load(scan)
+    refused("", scan | STICKY, "is unusual, for soft on rough at rms slope 0.2; usual: 1 to inf")
+    np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
+    periodic = {"surfaces.rough": file_surface(tmp_path / "heights.npy")}
+    load({**periodic, "materials.soft.surface_energy": "0 J/m^2"})
+    refused("", {**periodic, "materials.soft.contact_modulus": "1 kPa"}, "studies.one.models: 'asperities with U_full")

@@ -230,9 +230,11 @@ def test_passed_checks_and_a_model_that_holds_are_told_apart(write):
     text = write()
     top = text[: text.index("</header>")]
     assert "checks of the results: the equations are solved" in top
-    assert re.search(r">inside</b>\s*what the models were verified for", top)
+    # Its surfaces have too few nodes to the shortest wave.
+    assert re.search(r">partly outside</b>\s*what the models were verified for", top)
+    assert "nothing is known of the accuracy here (rough: " in top and "U_full/dgamma is " in top
     assert "asperities in slopes, single" in top and "; all cases inside" in top
-    assert "self-affine surface:" not in top and "in this campaign" not in top
+    assert "in this campaign" not in top
     beside = write(model_error=compared.errors())
     assert 'in this campaign <a href="#error">contact area ' in beside[: beside.index("</header>")]
 
