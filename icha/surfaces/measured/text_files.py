@@ -11,7 +11,6 @@ from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopogra
 from icha.surfaces.measured.text_headings import WIDTH, read_heading
 from icha.surfaces.measured.text_tables import layout_of, read_table, without_scales
 
-
 # A surface has at least so many columns of heights.
 _FEWEST_COLUMNS = 8
 
@@ -117,7 +116,7 @@ def format_of_text(path: Path) -> str | None:
 def looks_like_fourier(values: np.ndarray) -> bool:
     """Whether lines of four numbers can be wave vectors and amplitudes.
 
-    Some wave numbers are negative, unless there are few waves, which fill no grid of coordinates. Where two wave vectors
+    Some wave numbers are negative, unless the waves are few, which fill no grid of coordinates. Where two wave vectors
     are opposite, their amplitudes must be conjugate; heights of opposite points are not.
     """
     waves, modes = values[:, :2], values[:, 2] + 1j * values[:, 3]
