@@ -362,13 +362,15 @@ def _entry_dataset(campaign, entry, states):
         raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")
     study = campaign[studies[0]].to_dataset()
     axes = _axes(study, states)
-    coords = {
-        label: xr.Variable(label, np.array(axes[label], dtype=study[label].dtype), study[label].attrs)
-        for label in _LABELS
-        if label != "rms_slope"
-    }
     slopes = axes["rms_slope"]
-    coords["rms_slope"] = xr.Variable(slope_dims(slopes), slopes, study["rms_slope"].attrs)
+    coords = {
+        label: xr.Variable(
+            slope_dims(slopes) if label == "rms_slope" else label,
+            np.array(axes[label], dtype=study[label].dtype),
+            study[label].attrs,
+        )
+        for label in _LABELS
+    }
     coords["reduced_pressure"] = variable(ASKED, axes["reduced_pressure"])
     shape = tuple(slopes.shape[-1] if label == "rms_slope" else len(values) for label, values in axes.items())
     labelled = xr.Dataset(coords=coords)

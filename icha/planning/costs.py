@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.storage import COMPRESSED_SIZES, LEFT_IN_FILE
 from icha.path.limits import DEFAULT_STEP
 from icha.planning.constants import FITTED, Constants, MiB
@@ -259,6 +258,8 @@ def theories_cost(of: Constants = FITTED) -> Cost:
     return Cost(of.gathering.theories, of.workflow.forked, 35e3)
 
 
+# Edges of the bins of `icha.contact.bins`, whose imports `icha describe` would wait for.
+GAP_EDGES, PRESSURE_EDGES = 112, 501
 # Arrays along the steps and the spots of runs; texts count for several.
 _STEP_ARRAYS, _SPOT_ARRAYS = 30, 11
 
@@ -272,14 +273,13 @@ def dataset_memory(cells: int, runs: Sequence[Recorded]) -> float:
     runs : what is recorded of each run.
     """
     steps, snapshots = cells * max(run.steps for run in runs), cells * max(run.snapshots for run in runs)
-    gaps, pressures = len(GAP_BINS), len(PRESSURE_BINS)
     # Number of arrays, and values of each: densities, edges and bounds of bins, steps and spots.
     arrays = [
-        (2, snapshots * pressures),
-        (1, snapshots * gaps),
-        (2, cells * pressures),
-        (1, 2 * cells * pressures),
-        (4, cells * gaps),
+        (2, snapshots * PRESSURE_EDGES),
+        (1, snapshots * GAP_EDGES),
+        (2, cells * PRESSURE_EDGES),
+        (1, 2 * cells * PRESSURE_EDGES),
+        (4, cells * GAP_EDGES),
         (_STEP_ARRAYS, steps),
         (_SPOT_ARRAYS, sum(run.spots for run in runs)),
     ]

@@ -361,7 +361,7 @@ def test_runs_of_different_lengths_are_taken_out_unchanged(tmp_path, monkeypatch
     tree = cyclic.tree()
     if kept != "in memory":
         write_campaign(cyclic.runs().items(), tmp_path / "c.nc")
-        monkeypatch.setattr(files, "_LEFT_IN_FILE", 0 if kept == "left in its file" else 2**30)
+        monkeypatch.setattr(files, "LEFT_IN_FILE", 0 if kept == "left in its file" else 2**30)
         tree = read_campaign(tmp_path / "c.nc")
         assert tree["loops"].variables["work"]._in_memory == (kept == "from its file")
     lengths = set()

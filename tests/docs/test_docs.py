@@ -13,6 +13,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import numpy as np
+import own_slopes_campaign as crops
 import pytest
 import yaml
 
@@ -206,6 +207,7 @@ def with_results(folder):
     ((_, measured), *_) = campaigns(DOCS / "howto/measured_campaign.md")
     measured["studies"]["ensemble"]["seeds"] = [1, 2]
     write_results(folder, loaded(folder, measured))
+    write_dataset(crops.tree(), folder / "results/crops/dataset/crops.nc")
     return folder
 
 

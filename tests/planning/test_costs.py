@@ -3,8 +3,12 @@
 import math
 
 import numpy as np
+import own_slopes_campaign as crops
 import pytest
 
+from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.places import count_cells
 from icha.planning import costs
 from icha.planning.roughness import measured_roughness
 from icha.surfaces.moments import spectral_moments, summit_density
@@ -63,6 +67,29 @@ def test_costs_grow_with_what_is_asked_for():
     assert costs.figure_cost(10, 0).seconds < costs.figure_cost(100, 0).seconds < costs.figure_cost(100, 10**8).seconds
     assert costs.figure_cost(10, 10**8, models=2).memory > 3 * costs.figure_cost(10, 10**8).memory
     assert costs.report_cost(10, 2).seconds < costs.report_cost(100, 2).seconds < costs.report_cost(100, 9).seconds
+
+
+def test_memory_of_a_dataset_is_that_of_its_arrays():
+    assert (costs.GAP_EDGES, costs.PRESSURE_EDGES) == (len(GAP_BINS), len(PRESSURE_BINS))
+    runs = list(crops.many(20))
+    study = campaign_tree(runs)[crops.STUDY].to_dataset()
+    sizes = runs[0][1].sizes
+    recorded = costs.Recorded(sizes["step"], sizes["snapshot"], sizes["spot"])
+    cells = count_cells([labels for labels, _ in runs])
+    assert cells == study["status"].size == 60
+    expected = costs.dataset_memory(cells, [recorded] * len(runs))
+    assert expected == pytest.approx(study.nbytes, rel=0.25)
+    # Large arrays stay in the file.
+    assert costs.dataset_memory(10**5, [recorded] * 10**5) < 0.5 * 10**5 / cells * expected
+    jobs = (
+        costs.table_cost(1.0, 1.0, expected),
+        costs.figure_cost(60, 0, held=expected),
+        costs.report_cost(60, 2, expected),
+    )
+    without = (costs.table_cost(1.0, 1.0, 0.0), costs.figure_cost(60, 0), costs.report_cost(60, 2))
+    for job, bare in zip(jobs, without, strict=True):
+        assert job.memory > bare.memory + expected
+    assert costs.dataset_cost(1.0, 1.0, 1e9).memory == costs.dataset_cost(1.0, 1.0, 1e12).memory
 
 
 def test_what_jobs_took_corrects_what_is_expected_of_others():
