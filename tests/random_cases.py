@@ -7,7 +7,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 import icha
-from icha.analysis.checks import check_run, told
+from icha.analysis.checks import told
+from icha.checks.run import check_run
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets.format import RUN, flaws
 

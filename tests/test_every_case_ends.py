@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from random_cases import Case, Topography, cases, lacking, refused, wrong
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.analysis.checks import check_run
 from icha.boundary_elements.contact import BoundaryElements
+from icha.checks.run import check_run
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 
 PERIOD = 100e-6

@@ -7,18 +7,16 @@ import small_campaign as small
 
 import icha
 from icha.analysis.checks import (
-    Check,
-    _error_of_work,
-    _met_one_way,
-    _Run,
     check_campaign,
-    check_run,
     check_solution,
     read_checks,
     refuse_unknown_failures,
     worst,
     write_checks,
 )
+from icha.checks.findings import Check, RunArrays
+from icha.checks.loops import _error_of_work, _met_one_way
+from icha.checks.run import check_run
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.references.finite_range import finite_range_solution
@@ -190,7 +188,7 @@ def test_next_to_no_load_is_met_as_well_as_what_it_is_made_up_of():
 def bare_run(separations, legs, stiffness=0.0, model="asperities"):
     """What the errors of the work are made of, with an h_rms of 1 m."""
     values = {"mean_separation": np.array(separations), "leg": np.array(legs), "rms_height": np.array(1.0)}
-    return _Run(values | {"contact_stiffness": np.full(len(legs), stiffness)}, {}, {"contact_model": model})
+    return RunArrays(values | {"contact_stiffness": np.full(len(legs), stiffness)}, {}, {"contact_model": model})
 
 
 def test_separations_that_only_the_way_back_meets_are_counted():
