@@ -22,14 +22,14 @@ from icha.support.atomic_files import whole_file
 
 # The mean gap that carries a load is searched for to 2e-4 of the load.
 LOAD_LIMIT = 1e-3
-# The check of every run of a campaign that it reached its end.
+# The check of every run of a campaign that it reached its end and passed its checks.
 COMPLETED = "completed"
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
     """Check a campaign dataset: every run there and complete, every variable described, and `check_run` for each.
 
-    A run that failed has one check, which fails and has the reason as its description.
+    A run that is incomplete or failed its own checks has one check, which fails and has the reason as its description.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
         none_of("described", bare, "number of variables without units or long name", study)
     for labels in present:
         variables, attrs = variables_of_run(tree, labels)
-        # What a failed run has is not used; of it there is nothing to say but why it failed.
-        if "incomplete" in attrs:
-            checks.append(Check(COMPLETED, 1.0, 0.0, False, attrs["incomplete"], str(labels)))
+        # The values of a failed run are not used, so that the reason is its only finding.
+        if reason := attrs.get("incomplete") or attrs.get("failed_checks"):
+            checks.append(Check(COMPLETED, 1.0, 0.0, False, reason, str(labels)))
             continue
         checks.append(Check(COMPLETED, 0.0, 0.0, True, "the run reached the end of its path", str(labels)))
         checks.extend(checked(variables, attrs, str(labels)))
