@@ -2,6 +2,7 @@
 
 import importlib
 import pathlib
+import warnings
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -12,8 +13,9 @@ from threadpoolctl import threadpool_limits
 from icha.asperity.full_contact import full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
+from icha.checks.run import check_run, reasons_of_failure
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
-from icha.contact.events import Events
+from icha.contact.events import JUMP_IN, Events
 from icha.contact.failures import NotConverged
 from icha.contact.model import ContactModel
 from icha.contact.models import ASPERITIES, MODELS
@@ -89,7 +91,13 @@ def simulate(
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable carries units and
     a long name. A path that goes on after the first loading has all its equilibria as steps, and a dimension event. The
     attribute `contact_model` names the model, and `applicability` says why it is not applicable to this contact, or is
-    empty; boundary elements have dimensions row and column, besides.
+    empty; boundary elements have dimensions row and column, besides. If the run fails checks
+    (`icha.checks.run.check_run`), the attribute `failed_checks` says which, and by how much.
+
+    Warns
+    -----
+    UserWarning
+        If the run fails checks: its numbers are no results.
 
     Raises
     ------
@@ -117,8 +125,16 @@ def simulate(
     if path.unload:
         pull_off = met.snapshots[-1]["snapshot_step"]
         loop = hysteresis(met.steps, pull_off, material, observables.largest_tension, met.unattributed)
-        dataset = dataset.assign(described(LOOP, loop))
+        dataset = dataset.assign(described(LOOP, loop | {"uphill_jump_in_count": _count_uphill_jumps_in(met.events)}))
+    if failed := reasons_of_failure(check_run(dataset)):
+        dataset = dataset.assign_attrs(failed_checks=failed)
+        warnings.warn(f"The run fails checks, do not use its numbers: {failed}", stacklevel=2)
     return dataset
+
+
+def _count_uphill_jumps_in(steps: list[Events]) -> int:
+    """Number of jumps into contact that take energy by the law of the spot itself."""
+    return sum(int(np.count_nonzero((events.kind == JUMP_IN) & (events.energy < 0))) for events in steps)
 
 
 def unfollowed(

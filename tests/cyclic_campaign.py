@@ -99,6 +99,7 @@ def unloaded(run, between=0):
         "hysteresis_loss_over_surface_energy": loss / energy if adhesive else 0.0,
         "loss_by_jump_in": 0.0,
         "loss_by_jump_off": loss,
+        "uphill_jump_in_count": 0,
         "loss_by_coalescence": 0.0,
         "loss_by_load_jump": 0.0,
         "loss_unattributed": 0.0,

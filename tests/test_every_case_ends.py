@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from random_cases import Case, Topography, cases, lacking, refused, wrong
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.analysis.checks import check_run
 from icha.boundary_elements.contact import BoundaryElements
+from icha.checks.run import check_run
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 
 PERIOD = 100e-6
@@ -130,6 +130,7 @@ def test_every_case_ends(series, bounded):
         completed.append(False)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", "The run fails checks")  # `wrong` looks at them
             try:
                 run = case.run()
                 completed[-1] = True
@@ -192,6 +193,56 @@ def test_loops_without_adhesion_pass_their_checks(series):
 
     are_sound()
     assert np.mean(completed) >= LOOPS_COMPLETED
+
+
+@st.composite
+def sticky_loops(draw):
+    """A loop with the asperity model on a very small square, from no adhesion to sticky, for any Tabor parameter."""
+    grid = draw(st.sampled_from([8, 10, 12]))
+    spectrum = SelfAffineSpectrum(
+        PERIOD, PERIOD, PERIOD / draw(st.floats(1.2, grid / 4)), draw(st.floats(0.1, 1.0)), 10 ** draw(st.floats(-2, 0))
+    )
+    surface = spectrum.realise(grid, draw(st.integers(0, 10**6)))
+    modulus, strength, tabor = 1e6, draw(st.one_of(st.just(0.0), st.floats(-3, 0.3))), 10 ** draw(st.floats(-0.5, 1))
+    energy = 10**strength * modulus * surface.rms_height**1.5 * surface.rms_curvature**0.5 if strength else 0.0
+    range_ = np.cbrt((energy / modulus) ** 2 / surface.rms_curvature) / tabor if energy else 1e-9
+    loads = [10 ** draw(st.floats(-4, -2.1)), 10 ** draw(st.floats(-2, -1))]
+    path = Path(reduced_pressures=loads, unload=True, max_step=0.5, snapshots=[])
+    return surface, Material(modulus, float(energy), float(range_)), path
+
+
+def loss_and_rise(run):
+    """Loss of a loop over its largest work, and largest rise of the separation in loading over h_rms.
+
+    From separations, pressures and stiffnesses alone: the integral of the cubic through both ends of every step.
+    """
+    u, p, stiffness = (run[name].values for name in ("mean_separation", "nominal_pressure", "contact_stiffness"))
+    width = np.diff(u)
+    work = -np.cumsum(width * (p[1:] + p[:-1]) / 2 + width**2 * np.diff(stiffness) / 12)
+    rise = np.max(np.diff(u[run["leg"].values == 0]), initial=0.0)
+    return work[-1] / (np.max(np.abs(work)) or 1.0), rise / float(run["rms_height"])
+
+
+@pytest.mark.hypothesis
+def test_loops_that_gain_energy_or_move_apart_in_loading_are_marked(series):
+    @seed(series)
+    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 2), derandomize=False)
+    @given(sticky_loops())
+    def are_marked(case):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", "The run fails checks")
+            try:
+                run = simulate(*case)
+            except (ConvergenceError, ValueError) as error:
+                assert ENDED.search(str(error)) or refused(error) or "summit" in str(error), error
+                return
+        loss, rise = loss_and_rise(run)
+        if loss < -1e-2 or rise > 1e-2:
+            assert run.attrs["failed_checks"]
+        assert not wrong(run)
+
+    are_marked()
 
 
 def test_a_cycle_begins_at_its_highest_stop():

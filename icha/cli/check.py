@@ -92,7 +92,8 @@ def _checked(kind, data):
 
 def _physics(kind, data):
     """Checks of the numbers that failed, as text, and how many there are."""
-    from icha.analysis.checks import check_campaign, check_run, check_solution
+    from icha.analysis.checks import check_campaign, check_solution
+    from icha.checks.run import check_run
     from icha.datasets.format import RUN, SOLUTION
 
     if kind == SOLUTION:

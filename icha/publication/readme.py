@@ -11,7 +11,8 @@ import jinja2
 import numpy as np
 import xarray as xr
 
-from icha.analysis.checks import COMPLETED, Check, worst
+from icha.analysis.checks import COMPLETED, worst
+from icha.checks.findings import Check
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
 from icha.configuration.surfaces import SelfAffineSurface

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import netCDF4
 import numpy as np
 
-from icha.analysis.checks import FRONT_LIMIT, RESIDUAL_LIMIT
+from icha.checks.run import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.publication.deposit_files import COMPUTED
 from icha.support.atomic_files import whole_file
 from icha.support.hdf5 import refuse_traps

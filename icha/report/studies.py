@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup
 
-from icha.analysis.checks import IDENTITY_LIMIT
 from icha.analysis.common_loads import at_round_pressures
+from icha.checks.findings import IDENTITY_LIMIT
 from icha.datasets.campaign import loading_stops, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.places import labels_at, slopes_of

@@ -7,18 +7,16 @@ import small_campaign as small
 
 import icha
 from icha.analysis.checks import (
-    Check,
-    _error_of_work,
-    _met_one_way,
-    _Run,
     check_campaign,
-    check_run,
     check_solution,
     read_checks,
     refuse_unknown_failures,
     worst,
     write_checks,
 )
+from icha.checks.findings import Check, RunArrays
+from icha.checks.loops import _error_of_work, _met_one_way
+from icha.checks.run import check_run, reasons_of_failure
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.references.finite_range import finite_range_solution
@@ -88,29 +86,28 @@ def test_each_kind_of_damage_is_caught_by_its_check(name):
     assert name in failed(run)
 
 
-def test_a_jump_in_may_push_surfaces_apart_that_keep_an_area():
-    run = small.run(material="soft").copy(deep=True)
-    run["mean_separation"].values[4] = 1.1 * run["mean_separation"].values[3]
-    run["step_target"].values[4] = run["mean_separation"].values[4]
-    for name in ("jump_in_count", "coalescence_count"):
-        run[name].values[...] = 0
-    assert "separation falls" in failed(run)
-    run["jump_in_count"].values[4:] = 1
-    assert "separation falls" not in failed(run)
-
-
 @pytest.mark.parametrize(
-    ("model", "area", "fails"),
-    [("boundary_elements", 1.1, False), ("boundary_elements", 0.9, True), ("asperities", 1.1, True)],
+    ("kind", "area", "fails"),
+    [("area_fraction", 1.1, False), ("area_fraction", 0.9, True), ("reduced_pressure", 1.1, True)],
 )
-def test_a_front_of_cells_may_jump_within_its_patch_and_then_the_area_grows(model, area, fails):
+@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
+def test_surfaces_may_move_apart_only_where_an_area_is_asked_for_and_has_jumped_past(model, kind, area, fails):
     run = small.run(material="soft").copy(deep=True)
     run.attrs["contact_model"] = model
-    for name in ("jump_in_count", "coalescence_count"):
-        run[name].values[...] = 0
+    run["coalescence_count"].values[...] = 0
+    run["jump_in_count"].values[4:] = 1
+    run["step_kind"].values[4] = kind
     run["mean_separation"].values[4] = 1.1 * run["mean_separation"].values[3]
     run["contact_area_fraction"].values[4] = area * run["contact_area_fraction"].values[3]
     assert ("separation falls" in failed(run)) == fails
+
+
+def test_a_union_that_pushes_surfaces_apart_fails():
+    run = small.run(material="soft").copy(deep=True)
+    run["coalescence_count"].values[:4], run["coalescence_count"].values[4:] = 0, 1
+    for rise, fails in ((0.5e-2, False), (2e-2, True)):
+        run["mean_separation"].values[4] = run["mean_separation"].values[3] + rise * float(run["rms_height"])
+        assert ("separation falls where spots unite" in failed(run)) == fails
 
 
 @pytest.mark.parametrize("material", ["soft", "hertz"])
@@ -139,6 +136,11 @@ CYCLE_DAMAGES = {
     "finite": written("work", np.nan, 3),
     "events": written("split_count", 1, -1),
     "jumps lose energy": written("dissipated_by_jump_off", -1.0, -1),
+    "jumps in lose energy": written("dissipated_by_jump_in", -0.5, -1),
+    "jumps off lose energy": written("dissipated_by_jump_off", -1.0, -1),
+    "unions lose energy": written("dissipated_by_coalescence", -1.0, -1),
+    "load jumps lose energy": written("dissipated_by_load_jump", -1.0, -1),
+    "loop loses energy": written("hysteresis_loss", -1.0),
     "loss adds up": written("loss_unattributed", 1.0),
     "loss is the work": scaled("work", 1 + 1e-6, -1),
     "separated: spots": written("spot_count", 1, -1),
@@ -149,9 +151,31 @@ CYCLE_DAMAGES = {
 
 @pytest.mark.parametrize("name", CYCLE_DAMAGES)
 def test_each_kind_of_damage_to_a_cycle_is_caught_by_its_check(name):
-    run = cyclic.run(between=2).copy(deep=True)
+    run = cyclic.run(between=2).copy(deep=True).assign(uphill_jump_in_count=0)
     CYCLE_DAMAGES[name](run)
     assert name in failed(run)
+
+
+def test_uphill_jumps_may_gain_what_the_jumps_off_lose():
+    run = cyclic.run(between=2).copy(deep=True).assign(uphill_jump_in_count=0)
+    work = float(np.abs(run["work"]).max())
+    run["dissipated_by_jump_in"].values[-1] = -0.1 * work
+    run["dissipated_by_jump_off"].values[-1] = 0.2 * work
+    assert "jumps in lose energy" in failed(run)
+    run["uphill_jump_in_count"] = 1
+    assert failed(run).isdisjoint({"jumps in lose energy", "jumps lose energy"})
+    old = run.drop_vars("uphill_jump_in_count")
+    assert failed(old).isdisjoint({"jumps in lose energy", "jumps lose energy"})
+
+
+def test_no_tolerance_covers_more_than_a_hundredth_of_the_work():
+    run = cyclic.run(between=2).copy(deep=True)
+    run["contact_stiffness"].values[...] *= 1e6
+    run["dissipated_by_jump_in"].values[-1] = 1.0
+    limits = {
+        check.name: check.limit for check in check_run(run) if check.name.endswith(("lose energy", "loses energy"))
+    }
+    assert limits and max(limits.values()) <= 1e-2
 
 
 def test_a_loop_without_adhesion_must_close_unless_spots_have_united():
@@ -190,7 +214,7 @@ def test_next_to_no_load_is_met_as_well_as_what_it_is_made_up_of():
 def bare_run(separations, legs, stiffness=0.0, model="asperities"):
     """What the errors of the work are made of, with an h_rms of 1 m."""
     values = {"mean_separation": np.array(separations), "leg": np.array(legs), "rms_height": np.array(1.0)}
-    return _Run(values | {"contact_stiffness": np.full(len(legs), stiffness)}, {}, {"contact_model": model})
+    return RunArrays(values | {"contact_stiffness": np.full(len(legs), stiffness)}, {}, {"contact_model": model})
 
 
 def test_separations_that_only_the_way_back_meets_are_counted():
@@ -318,6 +342,15 @@ def test_failed_runs_have_one_check_with_their_reason():
     }
     assert sum(check.subject in failed for check in checks) == 2
     assert sum(check.name == "completed" and check.passed for check in checks) == 2
+
+
+def test_a_run_that_failed_its_own_checks_has_that_as_its_reason():
+    run = small.run(material="soft").copy(deep=True)
+    run["converged"].values[-1] = 0
+    assert reasons_of_failure(check_run(run)) == (
+        "converged: 1 (number of steps that did not converge); expected at most 0"
+    )
+    assert reasons_of_failure(check_run(small.run(material="soft"))) == ""
 
 
 def test_only_failures_that_are_known_are_let_through():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from icha import Material, Path, Surface, simulate
-from icha.analysis.checks import check_run
 from icha.boundary_elements.contact import BoundaryElements
+from icha.checks.run import check_run
 from icha.contact.models import BOUNDARY_ELEMENTS
 
 PERIOD, HEIGHT, CELLS = 100e-6, 1e-6, 16

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import icha
-from icha.analysis.checks import check_run
 from icha.boundary_elements import adhesive
 from icha.boundary_elements.contact import BoundaryElements
 from icha.boundary_elements.elasticity import pressures_for
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import Linearised
+from icha.checks.run import check_run
 from icha.contact.failures import NotConverged
 from icha.contact.tolerances import HELD_CELLS
 from icha.references.short_range.against_finite_range import towards_short_range, without_adhesion

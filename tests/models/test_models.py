@@ -8,8 +8,9 @@ import small_campaign as small
 import xarray as xr
 
 import icha
-from icha.analysis.checks import check_campaign, check_run
+from icha.analysis.checks import check_campaign
 from icha.analysis.common_loads import compare_runs
+from icha.checks.run import check_run
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
 from icha.datasets.campaign_file.write import write_campaign

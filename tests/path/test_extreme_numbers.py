@@ -5,7 +5,7 @@ import pytest
 from few_asperities import HEIGHT, contact_of
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.analysis.checks import check_run
+from icha.checks.run import check_run
 from icha.contact.failures import NotConverged
 from icha.path import course
 from icha.path.course import Course

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
-from icha.analysis.checks import check_run
 from icha.asperity.jkr import JKR
+from icha.checks.run import check_run
 from icha.contact.failures import NotConverged
 from icha.contact.tolerances import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities

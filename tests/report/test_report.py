@@ -11,9 +11,10 @@ import pytest
 import small_campaign as small
 from scipy.stats import t
 
-from icha.analysis.checks import Check, check_campaign
+from icha.analysis.checks import check_campaign
 from icha.analysis.common_loads import at_round_pressures, compare_campaign, compare_runs, interpolated
 from icha.analysis.model_error import model_error
+from icha.checks.findings import Check
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import read_campaign, read_dataset, write_dataset
 from icha.datasets.labels import RunLabels

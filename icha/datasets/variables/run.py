@@ -173,6 +173,7 @@ CYCLE = {
     "event_y": Variable(_EVENT, "m", "y of the centre of the spot concerned"),
     "event_members": Variable(_EVENT, "1", "number of asperities in the spot concerned", int),
 }
+_ONLY_THE_SUM = "where uphill_jump_in_count is not 0, only the sum with the other kind of jump has a meaning"
 # ... and of one that ends in separation.
 LOOP = {
     "pull_off_pressure": Variable((), "Pa", "largest tension on the last unloading"),
@@ -196,8 +197,15 @@ LOOP = {
     "hysteresis_loss_over_surface_energy": Variable(
         (), "1", "work lost over the energy of adhesion; 0 without adhesion"
     ),
-    "loss_by_jump_in": Variable((), "J m^-2", "part of the loss in jumps into contact"),
-    "loss_by_jump_off": Variable((), "J m^-2", "part of the loss in jumps out of contact"),
+    "loss_by_jump_in": Variable(
+        (), "J m^-2", "part of the loss in jumps into contact", further={"comment": _ONLY_THE_SUM}
+    ),
+    "loss_by_jump_off": Variable(
+        (), "J m^-2", "part of the loss in jumps out of contact", further={"comment": _ONLY_THE_SUM}
+    ),
+    "uphill_jump_in_count": Variable(
+        (), "1", "number of jumps into contact that take energy, by the law of a single spot", int
+    ),
     "loss_by_coalescence": Variable((), "J m^-2", "part of the loss in unions of spots and their undoing"),
     "loss_by_load_jump": Variable((), "J m^-2", "part of the loss in jumps at constant load, under load control"),
     "loss_unattributed": Variable(
