@@ -21,8 +21,6 @@ _POINTS_PER_DECADE = 8
 _WAY_POINTS = 200
 # Stops whose loads differ by less than this part, from seed to seed, are stops at the same load.
 _SAME_LOAD = 1e-6
-# The round reduced pressures at which tables quote the results.
-ROUND_PRESSURES = (1e-4, 3.16e-4, 1e-3, 3.16e-3, 1e-2, 3.16e-2, 1e-1)
 
 _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
 _SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds whose runs are complete", np.int32)
@@ -244,17 +242,3 @@ def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.
         [group.attrs for group in groups.values()],
     )
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
-
-
-def at_round_pressures(run: xr.Dataset) -> list[tuple[float, float, float]]:
-    """(p*, A/A0, mean gap over h_rms) of a run at the round reduced pressures that its first loading covers."""
-    run = run.isel(step=loading_stops(run).values)
-    load = run["reduced_pressure"].values
-    positive = load > 0
-    if not positive.any():
-        return []
-    load = load[positive]
-    covered = [p for p in ROUND_PRESSURES if load.min() * (1 - 1e-9) <= p <= load.max() * (1 + 1e-9)]
-    area = interpolated(load, run["contact_area_fraction"].values[positive], covered, logarithmic=True)
-    gap = interpolated(load, reduced_gap(run).values[positive], covered, logarithmic=False)
-    return list(zip(covered, area.tolist(), gap.tolist(), strict=True))

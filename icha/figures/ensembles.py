@@ -35,7 +35,9 @@ _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zord
 _BARS = {"elinewidth": 0.6, "capsize": 1.5}
 # A cross over a hollow mark, and the number of seeds beside it, in points.
 _CROSS = {"ls": "none", "marker": "x", "mew": 0.7}
-_NUMBER = {"fontsize": 6.5, "textcoords": "offset points", "annotation_clip": True, "in_layout": False}
+_NUMBER = {"fontsize": 6.5, "textcoords": "offset points", "annotation_clip": True}
+# Points with bars are this far in front of what their look says.
+_BEFORE_POINTS = 0.101
 _BESIDE_MARK = ((5, -8), (-5, 5), (5, 5), (-5, -8))
 _SHADE = 0.22
 _FEW_BANDS = 3
@@ -111,10 +113,10 @@ def mark_fewer(
     stretches = [own[fewer[own]] for own in stretches]
     marks = np.unique(np.concatenate([[*own[own % every == 0], own[0], own[-1]] for own in stretches]))
     look = {name: look[name] for name in ("color", "mec", "mew", "ms", "marker", "zorder") if name in look}
-    colour, order = look.get("mec", look.get("color")), look.get("zorder", 2)
+    colour, order = look.get("color", look.get("mec")), look.get("zorder", 2) + _BEFORE_POINTS
     if look.get("marker") not in (None, "none", "+", "x", "1", "2", "3", "4"):
-        axes.plot(x[marks], y[marks], **look | {"ls": "none", "mfc": "white", "zorder": order + 0.001})
-    cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.002, "label": FEWER_SEEDS}
+        axes.plot(x[marks], y[marks], **look | {"ls": "none", "mfc": "white", "zorder": order})
+    cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.001, "label": FEWER_SEEDS}
     axes.plot(x[marks], y[marks], **cross | _CROSS)
     for own in stretches:
         place = sum(text.get_text().startswith("n=") for text in axes.texts) % len(_BESIDE_MARK)

@@ -62,8 +62,9 @@ DECLARATION = Declaration(
     caption=(
         "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over "
         "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed), by "
-        "interacting asperities. Tension is negative. Symbols with a black edge mark pull-off, the largest tension on "
-        "the last way back, if there is any. Where slopes share a panel, symbols without an edge mark where the first "
+        "interacting asperities. Of a study with several surfaces one is drawn, which stands above panel (a). Tension "
+        "is negative. Symbols with a black edge mark pull-off, the largest tension on the last way back, if there is "
+        "any. Where slopes share a panel, symbols without an edge mark where the first "
         "way in ends. Insets enlarge the region around zero load where the tension is small compared with the largest "
         "load. The energy lost per nominal area is the area between the two ways in the plot of pressure against mean "
         "separation. Where several seeds are drawn, the lines are means at common displacements from the turning "

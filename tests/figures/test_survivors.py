@@ -15,6 +15,7 @@ from icha.figures import (
     fig14_pull_off,
     fig15_loss,
 )
+from icha.figures.captions import count_runs
 from icha.figures.ensembles import draw_members, draw_points
 from icha.figures.legends import FEWER_SEEDS, NOT_APPLICABLE
 from icha.figures.style import new_figure
@@ -118,3 +119,26 @@ def test_runs_that_the_model_is_not_applicable_to_are_pale_and_apart(module):
     axes = figure.axes[0]
     assert sorted(set(numbers(axes))) == ["n=2", "n=3"]
     assert legend(figure).count(NOT_APPLICABLE) == 1
+
+
+def test_captions_count_what_is_missing():
+    assert count_runs(campaign(), ["five"]) == ""
+    tree = campaign(lacking=(2,), failed={3: 2}, checks=(4,), pale=(1, 5))
+    assert count_runs(tree, ["five"]) == (
+        "2 of 5 seeds of material soft did not complete and 1 of 5 seeds of material soft failed their checks: "
+        f"see Failed runs. 2 runs are drawn pale: {REASON}."
+    )
+
+
+def test_fig13_says_which_surface_it_draws_and_that_there_are_others():
+    runs = [
+        (RunLabels("both", "asperities", name, seed, 1.0, "soft"), cyclic.run(seed=seed))
+        for name in ("flat", "steep")
+        for seed in (1, 2)
+    ]
+    figure = fig13_loops.figure(campaign_tree(runs), study="both", surface="steep", seed=2)
+    assert figure.axes[0].get_title(loc="right") == "surface steep, seed 2"
+    assert "1 of 2 surfaces; choose with `surface:`; 1 of 2 seeds; choose with `seed:`" in legend(figure)
+    figure = fig13_loops.figure(campaign_tree(runs), study="both")
+    assert figure.axes[0].get_title(loc="right") == "surface flat"
+    assert "1 of 2 surfaces; choose with `surface:`" in legend(figure)
