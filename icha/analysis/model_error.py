@@ -375,14 +375,18 @@ def _entry_dataset(campaign, entry, states):
     of_state = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
     variables = {"status": variable(STATUS._replace(dims=_LABELS), np.reshape(of_state, shape).min(axis=-1))}
     variables |= _along_axes([states.get(labels) for labels in grid], shape)
-    variables |= _over_seeds(variables)
+    own = study.sel(model=ASPERITIES, surface=axes["surface"], seed=axes["seed"], material=axes["material"])
+    own = own.sel(rms_slope=axes["rms_slope"], method="nearest").assign_coords(rms_slope=coords["rms_slope"])
+    applicable = True
+    if "applicability" in own:  # which campaigns of earlier versions lack
+        applicable = own["applicability"].transpose(*_LABELS).values[..., None] == ""
+    variables |= _over_seeds(variables, applicable)
     bins = described(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
     result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
-    own = study.sel(model=ASPERITIES, surface=axes["surface"], seed=axes["seed"], material=axes["material"])
-    own = own.sel(rms_slope=axes["rms_slope"], method="nearest").assign_coords(rms_slope=result["rms_slope"])
-    for name in (*MATERIAL, "tabor_parameter"):
-        result[name] = own[name].drop_vars("model", errors="ignore")
+    for name in (*MATERIAL, "tabor_parameter", "applicability"):
+        if name in own:
+            result[name] = own[name].drop_vars("model", errors="ignore")
     return result
 
 
@@ -407,13 +411,13 @@ def _along_axes(states, shape):
     return variables
 
 
-def _over_seeds(variables):
-    """Mean and standard deviation over the seeds of what is summarised."""
+def _over_seeds(variables, applicable):
+    """Mean and standard deviation over the seeds of what is summarised, of the runs that the model is applicable to."""
     seeds = AXES.index("seed")
     others = tuple(axis for axis in AXES if axis != "seed")
     found = {}
     for name in SUMMARISED:
-        values, long_name = variables[name].values, MODEL_ERROR[name].long_name
+        values, long_name = np.where(applicable, variables[name].values, np.nan), MODEL_ERROR[name].long_name
         mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=MODEL_ERROR[name].further)
         # Of no complete run there is no mean.
         with warnings.catch_warnings():

@@ -34,6 +34,7 @@ from icha.figures.style import (
     slope_label,
     styled,
 )
+from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -215,7 +216,8 @@ def _draw_curve(row, errors, quantities, look, apart, counts):
         handle = draw_points(ax, p, members, look, positive=quantity.positive, asked=asked)
         counts.update(np.isfinite(members).sum(axis=0).tolist())
         if quantity.other and has_cohesive_zone(errors):
-            ax.plot(p, quantity.factor * errors[f"{quantity.other}_mean"].values, color=look["color"], **_OTHER)
+            mean = ensemble(errors[quantity.other].transpose("seed", ...).values).mean
+            ax.plot(p, quantity.factor * mean, color=look["color"], **_OTHER)
     return handle
 
 
