@@ -11,7 +11,7 @@ from icha.datasets.attributes import DERIVED, collected
 from icha.datasets.build import variable
 from icha.datasets.campaign import loading_stops, reduced_gap
 from icha.datasets.labels import LABELS
-from icha.datasets.variables.campaign import COMPLETE
+from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, MISSING
 from icha.datasets.variables.terms import Variable, term
 from icha.support.statistics import ensemble
 
@@ -21,11 +21,10 @@ _POINTS_PER_DECADE = 8
 _WAY_POINTS = 200
 # Stops whose loads differ by less than this part, from seed to seed, are stops at the same load.
 _SAME_LOAD = 1e-6
-# The round reduced pressures at which tables quote the results.
-ROUND_PRESSURES = (1e-4, 3.16e-4, 1e-3, 3.16e-3, 1e-2, 3.16e-2, 1e-1)
 
 _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
-_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds whose runs are complete", np.int32)
+_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds that means and deviations are over", np.int32)
+_ASKED_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds asked for", np.int32)
 _AVERAGED = (
     ("contact_area_fraction", "area", "A/A0"),
     ("reduced_separation", "separation", "the mean separation, of a free square the mean gap, over the rms height"),
@@ -81,18 +80,25 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     seeds mean, standard deviation and half the width of the 95 % confidence interval of both (`area_mean`,
     `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
     `material_spread` and `slope_spread`, the largest over the smallest area of all materials (slopes), minus one. Runs
-    that are not complete lack values, as `status` says, and do not count; `seed_count` says how many seeds there are of
-    every model, surface, slope and material. A single one has no deviation and no band: they are missing.
+    that are not complete lack values, as `status` says, and do not count; runs to which the asperity model is not
+    applicable are in no mean. `seed_count` says how many seeds means are over, and `asked_seed_count` how many were
+    asked for, of every model, surface, slope and material. A single one has no deviation and no band: they are missing.
     """
     complete = study["status"].transpose(*LABELS).values == COMPLETE
-    seed_count = complete.sum(axis=LABELS.index("seed"))
-    variables = {"status": study["status"], "seed_count": variable(_SEED_COUNT, seed_count)}
+    averaged = complete & _applicable(study)
+    asked = np.isin(study["status"].transpose(*LABELS).values, (*COMPUTED_RUNS, MISSING))
+    variables = {"status": study["status"]}
+    for name, description, counted in (
+        ("seed_count", _SEED_COUNT, averaged),
+        ("asked_seed_count", _ASKED_SEED_COUNT, asked),
+    ):
+        variables[name] = variable(description, counted.sum(axis=LABELS.index("seed")))
     coords = {label: study[label] for label in LABELS}
     for axis, load in _loads(study).items():
         suffix = "" if axis == "reduced_pressure" else "_at_load"
         at, on_grid = _on_common_grid(study, load, complete)
         coords[axis] = variable(term(axis)._replace(dims=(axis,)), at)
-        for name, (description, values) in (_curves(study, on_grid) | _spreads(on_grid)).items():
+        for name, (description, values) in (_curves(study, on_grid) | _spreads(on_grid, averaged)).items():
             along = description._replace(
                 dims=(*description.dims, axis), long_name=f"{description.long_name}, at {term(axis).long_name}"
             )
@@ -139,11 +145,18 @@ def _curves(study, on_grid):
     return {name: (Variable(LABELS, "1", study[name].attrs["long_name"]), values) for name, values in on_grid.items()}
 
 
-def _spreads(on_grid):
-    """Descriptions and values of what spreads the curves: seeds, and materials and slopes."""
+def _applicable(study):
+    """Which runs nothing is known of that makes the asperity model not applicable to them."""
+    if "applicability" not in study:  # which campaigns of earlier versions lack
+        return True
+    return study["applicability"].transpose(*LABELS).values == ""
+
+
+def _spreads(on_grid, averaged):
+    """Descriptions and values of what spreads the curves: the seeds that are averaged, and materials and slopes."""
     found = {}
     for name, short, symbol in _AVERAGED:
-        over_seeds = ensemble(on_grid[name], LABELS.index("seed"))
+        over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
         for part, words in _STATISTICS.items():
             further = {} if part == "mean" else {"missing": "where there is a single seed"}
             description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further=further)
@@ -244,17 +257,3 @@ def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.
         [group.attrs for group in groups.values()],
     )
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
-
-
-def at_round_pressures(run: xr.Dataset) -> list[tuple[float, float, float]]:
-    """(p*, A/A0, mean gap over h_rms) of a run at the round reduced pressures that its first loading covers."""
-    run = run.isel(step=loading_stops(run).values)
-    load = run["reduced_pressure"].values
-    positive = load > 0
-    if not positive.any():
-        return []
-    load = load[positive]
-    covered = [p for p in ROUND_PRESSURES if load.min() * (1 - 1e-9) <= p <= load.max() * (1 + 1e-9)]
-    area = interpolated(load, run["contact_area_fraction"].values[positive], covered, logarithmic=True)
-    gap = interpolated(load, reduced_gap(run).values[positive], covered, logarithmic=False)
-    return list(zip(covered, area.tolist(), gap.tolist(), strict=True))

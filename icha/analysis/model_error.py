@@ -383,23 +383,30 @@ def _entry_dataset(campaign, entry, states):
     of_state = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
     variables = {"status": variable(STATUS._replace(dims=_LABELS), np.reshape(of_state, shape).min(axis=-1))}
     variables |= _along_axes([states.get(labels) for labels in grid], shape)
-    variables |= _over_seeds(variables)
+    applicable, applicability = True, None
+    if "applicability" in study:  # which campaigns of earlier versions lack
+        applicability = _of_asperities(study["applicability"], labelled)
+        applicable = applicability.values[..., None] == ""
+    variables |= _over_seeds(variables, applicable)
     bins = described(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
     result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
     for name in MATERIAL:
         result[name] = study[name].sel(material=axes["material"])
     result["tabor_parameter"] = _of_asperities(study["tabor_parameter"], labelled)
+    if applicability is not None:
+        result["applicability"] = applicability
     return result
 
 
 def _of_asperities(quantity, labelled):
     """A quantity of the runs by asperities at all labels of a dataset; missing where the study has no such labels."""
-    values = np.full([labelled.sizes[label] for label in _LABELS], np.nan)
+    none = "" if quantity.dtype.kind in "OSU" else np.nan
+    values = np.full([labelled.sizes[label] for label in _LABELS], none, object if none == "" else float)
     for place in np.ndindex(values.shape):
         labels = dict(zip(_LABELS, labels_at(labelled, place, _LABELS), strict=True))
         with contextlib.suppress(KeyError):
-            values[place] = quantity.isel(place_of(quantity.to_dataset(), {"model": ASPERITIES} | labels))
+            values[place] = quantity.isel(place_of(quantity.to_dataset(), {"model": ASPERITIES} | labels)).item()
     return xr.Variable(_LABELS, values, quantity.attrs)
 
 
@@ -430,13 +437,13 @@ def _along_axes(states, shape):
     return variables
 
 
-def _over_seeds(variables):
-    """Mean and standard deviation over the seeds of what is summarised."""
+def _over_seeds(variables, applicable):
+    """Mean and standard deviation over the seeds of what is summarised, of the runs that the model is applicable to."""
     seeds = AXES.index("seed")
     others = tuple(axis for axis in AXES if axis != "seed")
     found = {}
     for name in SUMMARISED:
-        values, long_name = variables[name].values, MODEL_ERROR[name].long_name
+        values, long_name = np.where(applicable, variables[name].values, np.nan), MODEL_ERROR[name].long_name
         mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=MODEL_ERROR[name].further)
         # Of no complete run there is no mean.
         with warnings.catch_warnings():

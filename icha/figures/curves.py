@@ -10,7 +10,7 @@ import numpy as np
 from icha.contact.models import ASPERITIES
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.figures.ensembles import draw_members, lines_handles
+from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.legends import legend_below, named_handles, words_handle
 from icha.figures.palette import (
     ASPERITIES_NAME,
@@ -20,11 +20,14 @@ from icha.figures.palette import (
     material_colours,
     material_layers,
     model_handle,
+    pale_look,
     place_markers,
 )
 from icha.figures.scale import MOST_COLOURS, Scale, materials_scale, places_scale
 from icha.figures.select import (
     Snapshots,
+    asked_seeds,
+    is_applicable,
     name_of_place,
     path_steps,
     runs_by_boundary_elements,
@@ -64,14 +67,24 @@ def gap_label(data: xr.Dataset) -> str:
 class Line(NamedTuple):
     """The runs of one surface, slope and material, one for every seed, and the look of their markers.
 
-    `labels` are those of the first run, `runs` are on their study's stops, `back` holds the ways back of each, `look`
-    the arguments of `Axes.plot`.
+    Runs to which the asperity model is not applicable are a pale line of their own.
+
+    Parameters
+    ----------
+    labels : labels of the first run.
+    runs : the runs, on their study's stops.
+    back : the ways back of each run.
+    look : arguments of `Axes.plot`.
+    asked : number of seeds asked for.
+    applicable : whether the asperity model is applicable to the runs.
     """
 
     labels: RunLabels
     runs: list[xr.Dataset]
     back: list[list[xr.Dataset]]
     look: dict
+    asked: int
+    applicable: bool
 
 
 class Curves(NamedTuple):
@@ -111,7 +124,7 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     members = _by_contact(study_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
     materials = [name for name in dataset["material"].values.tolist() if name in {material for material, *_ in members}]
-    places = list(dict.fromkeys((surface, slope) for _, surface, slope in members))
+    places = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in members))
     colours, of_place, scale = material_colours(campaign), {}, None
     if len(places) > MOST_COLOURS:
         scale = places_scale(places)
@@ -123,7 +136,7 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     markers = place_markers(places)
     by_elements = shown_model(dataset) != ASPERITIES
     lines = []
-    for (material, *place), own in members.items():
+    for (material, *place, applicable), own in members.items():
         place = tuple(place)
         (first, *_), runs = zip(*own, strict=True)
         colour = of_place.get(place, colours[material])
@@ -136,7 +149,9 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
             look |= {"lw": 0.6, "ms": 0.8 * look["ms"]}
         if scale:
             look |= {"ls": "-", "lw": 0.6, "ms": 0.6 * look["ms"], "mew": 0.6}
-        lines.append(Line(first, [path_steps(run) for run in runs], [ways_back(run) for run in runs], look))
+        look = look if applicable else pale_look(look)
+        stops, back = [path_steps(run) for run in runs], [ways_back(run) for run in runs]
+        lines.append(Line(first, stops, back, look, asked_seeds(dataset, first), applicable))
     others = boundary_elements or (None if by_elements else study)
     beside = _crosses(campaign, others, lines, colours) if others else []
     handles = _curve_handles(dataset, lines, scale, bool(of_place))
@@ -144,25 +159,28 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
 
 
 def _by_contact(runs):
-    """Labels and runs of the seeds of every material, surface and slope."""
+    """Labels and runs of the seeds of every material, surface and slope, apart where the model is not applicable."""
     members: dict[tuple, list] = {}
     for labels, run in runs:
-        members.setdefault((labels.material, labels.surface, labels.rms_slope), []).append((labels, run))
+        key = labels.material, labels.surface, labels.rms_slope, is_applicable(run)
+        members.setdefault(key, []).append((labels, run))
     return members
 
 
 def _crosses(campaign, study, lines, colours):
     """The lines of a study by boundary elements, in the colours of others of the same contacts, or of the material."""
-    of_contact = {contact_of(line): line.look["color"] for line in lines}
-    energy, found = campaign[study]["surface_energy"], []
-    for contact, own in _by_contact(runs_by_boundary_elements(campaign, study)).items():
+    of_contact = {contact_of(line): line.look["color"] for line in lines if line.applicable}
+    dataset, found = campaign[study].to_dataset(), []
+    energy = dataset["surface_energy"]
+    for (*contact, applicable), own in _by_contact(runs_by_boundary_elements(campaign, study)).items():
         (first, *_), runs = zip(*own, strict=True)
         adhesive = float(energy.sel(material=first.material)) > 0
-        colour = of_contact.get(contact, colours.get(first.material, GREY))
+        colour = of_contact.get(tuple(contact), colours.get(first.material, GREY))
         # The larger ones show behind the others where the results agree, as the markers of asperities do.
         size = (8 if adhesive else 11) * (1 if len(lines) <= _FEW_LINES else 0.7)
         look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
-        found.append(Line(first, [path_steps(run) for run in runs], [], look | _CROSS))
+        stops = [path_steps(run) for run in runs]
+        found.append(Line(first, stops, [], look | _CROSS, asked_seeds(dataset, first), applicable))
     return found
 
 
@@ -182,6 +200,7 @@ def model_name(dataset: xr.Dataset) -> str:
 def _curve_handles(dataset, lines, scale, many_places):
     """What the legend names of the lines of a study, but for what the scale tells."""
     name = model_name(dataset)
+    lines = sorted(lines, key=lambda line: line.applicable)  # of two lines of one contact the last one is named
     several = any(len(line.runs) > 1 for line in lines)
     shape = {"ls": "-" if several or scale else "none"} | ({} if many_places else {"marker": MODEL_MARKERS[name]})
     materials = {line.labels.material: line.look for line in lines}
@@ -198,18 +217,26 @@ def _curve_handles(dataset, lines, scale, many_places):
     return handles | {name: model_handle(name, mfc="white")}
 
 
-def material_looks(campaign: xr.DataTree, study: str, materials: Sequence[str]) -> tuple[list[dict], Scale | None]:
+def material_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]) -> tuple[list[dict], Scale | None]:
     """Looks of the lines of a figure of one line for every material, and their scale where there are many."""
-    dataset = campaign[study].to_dataset()
+    dataset, scale = campaign[study].to_dataset(), None
     marker = MODEL_MARKERS[model_name(dataset)]
+    materials = list(dict.fromkeys(line.labels.material for line in lines))
     if len(materials) > MOST_COLOURS:
         scale = materials_scale(dataset, materials)
-        return [{"color": colour, "ls": "-", "lw": 0.9, "marker": marker, "ms": 2} for colour in scale.colours], scale
-    colours, layers = material_colours(campaign), material_layers(dataset, materials)
-    return [
-        closed_look(colours[name], layers[name]) | {"ls": "-", "marker": marker, "label": material_label(dataset, name)}
-        for name in materials
-    ], None
+        of_material = {
+            name: {"color": colour, "ls": "-", "lw": 0.9, "marker": marker, "ms": 2}
+            for name, colour in zip(materials, scale.colours, strict=True)
+        }
+    else:
+        colours, layers = material_colours(campaign), material_layers(dataset, materials)
+        shape = {"ls": "-", "marker": marker}
+        of_material = {
+            name: closed_look(colours[name], layers[name]) | shape | {"label": material_label(dataset, name)}
+            for name in materials
+        }
+    looks = [of_material[line.labels.material] for line in lines]
+    return [look if line.applicable else pale_look(look) for line, look in zip(lines, looks, strict=True)], scale
 
 
 def say_which_snapshots(
@@ -257,11 +284,13 @@ def draw_line(
     if len(members) > 1:
         load, values = at_common_loads(members, logarithmic=logarithmic)
         if len(load):
-            draw_members(axes, load, values, line.look, positive=logarithmic, lines=lines)
+            draw_members(axes, load, values, line.look, positive=logarithmic, lines=lines, asked=line.asked)
             return np.tile(load, len(values)), values.ravel()
     # Runs without a common load have no mean.
     for load, values in members:
         axes.plot(load, values, **line.look)
+        if len(members) < line.asked:
+            mark_fewer(axes, load, values, np.isfinite(values)[None], line.look, line.asked)
     load, values = map(np.concatenate, zip(*members, strict=True))
     return load, values
 
@@ -278,6 +307,7 @@ def draw_crosses(
     load, values = at_common_loads([points(run) for run in line.runs], logarithmic=logarithmic)
     mean = values.mean(axis=0)
     axes.plot(load, mean, **line.look)
+    mark_fewer(axes, load, mean, np.isfinite(values), line.look, line.asked)
     return load, mean
 
 

@@ -12,9 +12,16 @@ from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.legends import legend_below, words_handle
-from icha.figures.palette import PLACE_MARKERS, closed_look, material_colours, material_layers, place_markers
+from icha.figures.palette import (
+    PLACE_MARKERS,
+    closed_look,
+    material_colours,
+    material_layers,
+    pale_look,
+    place_markers,
+)
 from icha.figures.scale import MOST_COLOURS, Scale, places_scale
-from icha.figures.select import NothingToDraw, study_errors
+from icha.figures.select import NothingToDraw, asked_of_entry, study_errors
 from icha.figures.style import (
     DASHES,
     GREY,
@@ -28,6 +35,7 @@ from icha.figures.style import (
     slope_label,
     styled,
 )
+from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +68,8 @@ class Quantity(NamedTuple):
 
 
 class _Curves(NamedTuple):
-    """Curves (entry, surface, slope and material of each), and what tells them apart.
+    """Curves (entry, surface, slope and material of each, and whether the asperity model is applicable to its runs),
+    and what tells them apart.
 
     Of more surfaces and slopes than a few every material has a row of panels of its own, and they have colours of a
     scale, for those of the palette are the materials'.
@@ -77,7 +86,7 @@ class _Curves(NamedTuple):
 
     def look(self, key: tuple) -> tuple[str, dict]:
         """Name of a curve in the legend, and arguments of `Axes.errorbar`."""
-        entry, surface, slope, material = key
+        entry, surface, slope, material, applicable = key
         # Solutions of the same state at a finite range, or on another grid.
         same = [each[0] for each in self.keys if each[1:] == key[1:]]
         again, truths = same.index(entry), [self.entries[each].attrs["truth"] for each in same]
@@ -92,10 +101,11 @@ class _Curves(NamedTuple):
         name += ["at finite range"] if len(set(truths)) > 1 and truths[again] == FINITE_RANGE else []
         name += [entry] if truths.index(truths[again]) < again else []
         layers = material_layers(self.interfaces, [material] if self.own_rows else self.materials)
-        return ", ".join(name), closed_look(colour, layers[material]) | {
+        look = closed_look(colour, layers[material]) | {
             "marker": markers.get((surface, slope), PLACE_MARKERS[0]),
             "ls": DASHES[again % len(DASHES)],
         }
+        return ", ".join(name), look if applicable else pale_look(look)
 
 
 @styled
@@ -126,13 +136,14 @@ def draw_errors(
     named: dict[str, object] = {}
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
-        own = [key for key in curves.keys if key[-1] in shown]
-        for k, (entry, surface, slope, material) in enumerate(own):
-            errors = curves.entries[entry]
+        own = [key for key in curves.keys if key[3] in shown]
+        for k, (entry, surface, slope, material, applicable) in enumerate(own):
+            errors = of_applicability(curves.entries[entry], applicable)
             errors = errors.isel(place_of(errors, {"surface": surface, "rms_slope": slope, "material": material}))
             name, look = curves.look(own[k])
             handle = _draw_curve(row, errors, quantities, look, _APART ** (k - (len(own) - 1) / 2), counts)
-            named.setdefault(name, handle)
+            if applicable:
+                named.setdefault(name, handle)
         if curves.own_rows:
             row[-1].set_title(material_label(curves.interfaces, shown[0]), loc="right")
         for ax, quantity in zip(row, quantities, strict=True):
@@ -175,16 +186,19 @@ def _curves(model_error, study, quantities, palette):
     if not any(_compared(errors, quantities) for errors in entries.values()):
         raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
     keys = [
-        (entry, surface, slope, material)
+        (entry, surface, slope, material, applicable)
         for entry, errors in entries.items()
+        for applicable in (True, False)
         for material, (surface, slope) in itertools.product(
             errors["material"].values.tolist(), surfaces_and_slopes(errors)
         )
         # Not all combinations of an entry are asked for.
-        if _compared(errors, quantities, material=material, surface=surface, rms_slope=slope)
+        if _compared(
+            of_applicability(errors, applicable), quantities, material=material, surface=surface, rms_slope=slope
+        )
     ]
-    places = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in keys))
-    materials = list(dict.fromkeys(material for *_, material in keys))
+    places = list(dict.fromkeys((surface, slope) for _, surface, slope, _, _ in keys))
+    materials = list(dict.fromkeys(material for *_, material, _ in keys))
     scale = places_scale(places) if len(places) > MOST_COLOURS else None
     interfaces = interfaces_of(entries, materials)
     return _Curves(entries, keys, places, materials, interfaces, len(places) > _MOST_LINES, scale, palette)
@@ -198,14 +212,26 @@ def _compared(errors, quantities, **at):
 
 def _draw_curve(row, errors, quantities, look, apart, counts):
     """Draw a curve in all panels of a row; returns its handle, and adds to `counts` numbers of seeds of its points."""
-    p = errors["reduced_pressure"].values * apart
+    p, asked = errors["reduced_pressure"].values * apart, int(asked_of_entry(errors))
     for ax, quantity in zip(row, quantities, strict=True):
         members = quantity.factor * errors[quantity.name].transpose("seed", ...).values
-        handle = draw_points(ax, p, members, look, positive=quantity.positive)
+        handle = draw_points(ax, p, members, look, positive=quantity.positive, asked=asked)
         counts.update(np.isfinite(members).sum(axis=0).tolist())
         if quantity.other and has_cohesive_zone(errors):
-            ax.plot(p, quantity.factor * errors[f"{quantity.other}_mean"].values, color=look["color"], **_OTHER)
+            mean = ensemble(errors[quantity.other].transpose("seed", ...).values).mean
+            ax.plot(p, quantity.factor * mean, color=look["color"], **_OTHER)
     return handle
+
+
+def of_applicability(errors: xr.Dataset, applicable: bool) -> xr.Dataset:
+    """An entry with the values of the runs to which the asperity model is applicable, or of the others, alone."""
+    if "applicability" not in errors:
+        return errors if applicable else errors.where(False)
+    keep = (errors["applicability"] == "") == applicable
+    along_seeds = [
+        name for name, values in errors.data_vars.items() if "seed" in values.dims and values.dtype.kind == "f"
+    ]
+    return errors.assign({name: errors[name].where(keep) for name in along_seeds})
 
 
 def has_cohesive_zone(errors):

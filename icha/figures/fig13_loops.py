@@ -14,7 +14,7 @@ from icha.datasets.labels import ContactLabels, RunLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import draw_scatter, lines_handles
+from icha.figures.ensembles import draw_scatter, lines_handles, mark_fewer
 from icha.figures.hysteresis import (
     BRANCH_DASHES,
     ROUNDING,
@@ -22,10 +22,10 @@ from icha.figures.hysteresis import (
     pull_off_step,
     unloaded_runs,
 )
-from icha.figures.legends import legend_below
+from icha.figures.legends import legend_below, words_handle
 from icha.figures.options import TruthFigure, not_unloaded
 from icha.figures.palette import MODEL_MARKERS, WAY_BACK_MARKERS
-from icha.figures.select import branches, pick, runs_by_boundary_elements, ways_back
+from icha.figures.select import asked_seeds, branches, is_applicable, pick, runs_by_boundary_elements, ways_back
 from icha.figures.style import GREY, TWO_COLUMNS, legend_handle, new_figure, panel_label, slope_label, styled
 from icha.support.values import Label, Problem, Seed
 
@@ -62,8 +62,9 @@ DECLARATION = Declaration(
     caption=(
         "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over "
         "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed), by "
-        "interacting asperities. Tension is negative. Symbols with a black edge mark pull-off, the largest tension on "
-        "the last way back, if there is any. Where slopes share a panel, symbols without an edge mark where the first "
+        "interacting asperities. Of a study with several surfaces one is drawn, which stands above panel (a). Tension "
+        "is negative. Symbols with a black edge mark pull-off, the largest tension on the last way back, if there is "
+        "any. Where slopes share a panel, symbols without an edge mark where the first "
         "way in ends. Insets enlarge the region around zero load where the tension is small compared with the largest "
         "load. The energy lost per nominal area is the area between the two ways in the plot of pressure against mean "
         "separation. Where several seeds are drawn, the lines are means at common displacements from the turning "
@@ -94,7 +95,8 @@ _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 
 
 class _Loop(NamedTuple):
-    """The runs of a loop, one for every seed, what is drawn of them, boundary elements, and the look of markers.
+    """The runs of a loop, one for every seed, what is drawn of them, boundary elements, the look of markers, and how
+    many seeds were asked for.
 
     `ways` are branch, reduced separation, reduced pressure and contact area of every leg, the last two also of the
     single members where there are several seeds.
@@ -104,6 +106,7 @@ class _Loop(NamedTuple):
     ways: list[_Way]
     truths: list[xr.Dataset]
     marker: dict
+    asked: int
 
 
 class _Way(NamedTuple):
@@ -169,16 +172,20 @@ def figure(
     if seed is None:
         seed = next((labels.seed for labels, _ in runs if labels.surface == surface and labels in truths), None)
     seeds = seeds if seed is None else [pick("seed", seed, seeds)]
-    own: dict[RunLabels, list[xr.Dataset]] = {}
+    # By the labels of their first run and whether the model is applicable.
+    own: dict[tuple[RunLabels, bool], list[xr.Dataset]] = {}
     for labels, run in runs:
         if labels.surface == surface and labels.seed in seeds:
-            same = (each for each in own if each._replace(seed=labels.seed) == labels)
-            own.setdefault(next(same, labels), []).append(run)
-    slopes = sorted({labels.rms_slope for labels in own}, reverse=True)
-    own_rows = len(own) > _MOST_LOOPS and 1 < len(slopes) < len(own)
+            key = labels, is_applicable(run)
+            same = (each for each in own if (each[0]._replace(seed=labels.seed), each[1]) == key)
+            own.setdefault(next(same, key), []).append(run)
+    slopes = sorted({labels.rms_slope for labels, _ in own}, reverse=True)
+    contacts = {labels._replace(seed=seeds[0]) for labels, _ in own}
+    own_rows = len(contacts) > _MOST_LOOPS and 1 < len(slopes) < len(contacts)
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
     # Where every slope has its panels, they need not tell them apart in another way.
-    keys = {each: (each.material, surface, None if own_rows else each.rms_slope) for each in own}
+    keys = {each: (each[0].material, surface, None if own_rows else each[0].rms_slope) for each in own}
+    dataset = campaign[study].to_dataset()
     lines = Lines(campaign, [study], list(keys.values()))
 
     fig = new_figure(TWO_COLUMNS, 2.7 * len(rows))
@@ -186,9 +193,15 @@ def figure(
     letters = iter("abcdefghijklmnopqrstuvwxyz")
     for (left, right), shown in zip(panels, rows, strict=True):
         drawn = [
-            _Loop(members, _ways(members), truths.get(labels, []), lines.marker(keys[labels]))
-            for labels, members in own.items()
-            if labels.rms_slope in shown
+            _Loop(
+                members,
+                _ways(members),
+                truths.get(each[0], []),
+                lines.marker(keys[each], applicable=each[1]),
+                asked_seeds(dataset, each[0]) if seed is None else 1,
+            )
+            for each, members in own.items()
+            if each[0].rms_slope in shown
         ]
         for ax, axis in ((left, _LOADS), (right, _AREAS)):
             for loop in drawn:
@@ -203,8 +216,25 @@ def figure(
         ax.set_xlabel(axis.x_label)
     if lines.scale:
         lines.scale.draw(fig, panels.ravel().tolist())
-    legend_below(fig, _handles(lines, rows, own, truths))
+    _say_which(panels[0, 0], surface, seed)
+    legend_below(fig, _handles(lines, rows, own, truths) | _others(dataset, seed))
     return fig
+
+
+def _say_which(ax, surface, seed):
+    """Name above a panel the surface that is drawn, and the seed unless it is a mean over them."""
+    ax.set_title(f"surface {surface}" + ("" if seed is None else f", seed {seed}"), loc="right", parse_math=False)
+
+
+def _others(dataset, seed):
+    """What the legend says of surfaces and seeds that are not drawn."""
+    drawn = {"surface": 1, "seed": dataset.sizes["seed"] if seed is None else 1}
+    words = [
+        f"{drawn[label]} of {dataset.sizes[label]} {label}s; choose with `{label}:`"
+        for label in drawn
+        if drawn[label] < dataset.sizes[label]
+    ]
+    return words_handle("; ".join(words)) if words else {}
 
 
 class _Axis(NamedTuple):
@@ -219,7 +249,7 @@ _AREAS = _Axis("reduced_pressure", "contact_area_fraction", PRESSURE_LABEL, AREA
 
 
 def _draw(ax, loop, axis, *, turn, lines):
-    """Draw a loop, a mark at its pull-off and, if wanted, one where it turns first."""
+    """Draw a loop, a mark at its pull-off, and one where it turns first if that is wanted or the loop lacks seeds."""
     colour = loop.marker["mec"]
     for way in loop.ways:
         x, y = (getattr(way, name) for name in (axis.x, axis.y))
@@ -229,12 +259,18 @@ def _draw(ax, loop, axis, *, turn, lines):
             draw_scatter(
                 ax, way.members.get(axis.x, x), way.members[axis.y], colour, positive=False, lines=lines, ls=dashes
             )
-    if turn:
+    marked = []
+    if turn or len(loop.runs) < loop.asked:
         ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in loop.runs]
-        ax.plot(*_mean_point(ends, axis), **loop.marker | {"ls": "none", "zorder": 5})
+        marked.append((ends, loop.marker | {"ls": "none", "zorder": 5}))
     pulls = [run.isel(step=at) for run in loop.runs if (at := pull_off_step(run)) is not None]
     if pulls:
-        ax.plot(*_mean_point(pulls, axis), **loop.marker | _PULL_OFF)
+        marked.append((pulls, loop.marker | _PULL_OFF))
+    for states, look in marked:
+        x, y = _mean_point(states, axis)
+        ax.plot(x, y, **look)
+        known = np.ones((len(states), 1), bool)
+        mark_fewer(ax, np.array([x]), np.array([y]), known, look | {"color": colour}, loop.asked)
     for truth in loop.truths:
         for branch, markers in _CROSSES.items():
             way = truth.isel(step=truth["branch"].values == branch)
@@ -293,7 +329,7 @@ def _handles(lines, rows, runs, truths):
         handles |= lines_handles(counts)
     if any(pull_off_step(run) is not None for members in runs.values() for run in members):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
-    shown = [truth for labels in runs for truth in truths.get(labels, [])]
+    shown = [truth for labels, _ in runs for truth in truths.get(labels, [])]
     for name in dict.fromkeys(map(_truth_name, shown)):
         for branch, markers in _CROSSES.items():
             handles[f"{name}, {branch}"] = legend_handle(color=GREY, marker=markers[name], **_TRUTH)

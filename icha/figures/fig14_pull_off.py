@@ -21,7 +21,7 @@ from icha.figures.hysteresis import (
 )
 from icha.figures.legends import legend_below
 from icha.figures.options import StudyFigure, not_unloaded, studies_problems
-from icha.figures.select import pick
+from icha.figures.select import asked_seeds, is_applicable, pick
 from icha.figures.style import (
     GREY,
     ONE_COLUMN,
@@ -113,21 +113,22 @@ def figure(
     from matplotlib.ticker import LogLocator, NullFormatter
 
     pick("quantity", quantity, list(_QUANTITIES))
+    # Of every line and whether the model is applicable to its runs, x and value by point and seed.
     by_slope, by_load = {}, {}
     for labels, run in detached_runs_of(campaign, [study]):
         at, value = labels.rms_slope, float(run[quantity])
-        line = by_slope.setdefault((labels.material, labels.surface, None), {})
-        line.setdefault(at, {})[labels.seed] = (at, value)
+        line = by_slope.setdefault(((labels.material, labels.surface, None), is_applicable(run)), {})
+        line.setdefault(labels._replace(seed=None), {})[labels.seed] = (at, value)
     load_studies = several("load_studies", load_studies) if load_studies else []
     for labels, run in detached_runs_of(campaign, load_studies):
         at, value = float(run["largest_reduced_pressure"]), float(run[quantity])
-        line = by_load.setdefault((labels.material, labels.surface, labels.rms_slope), {})
-        line.setdefault(labels.study, {})[labels.seed] = (at, value)
-    loaded_slopes = {slope for *_, slope in by_load}
+        line = by_load.setdefault(((labels.material, labels.surface, labels.rms_slope), is_applicable(run)), {})
+        line.setdefault(labels._replace(seed=None), {})[labels.seed] = (at, value)
+    loaded_slopes = {slope for (*_, slope), _ in by_load}
     if len(loaded_slopes) == 1:
         # The panel's title names it, and the lines look like those of (a).
-        by_load = {(material, surface, None): line for (material, surface, _), line in by_load.items()}
-    lines = Lines(campaign, [study, *load_studies], [*by_slope, *by_load])
+        by_load = {((material, surface, None), own): line for ((material, surface, _), own), line in by_load.items()}
+    lines = Lines(campaign, [study, *load_studies], [key for key, _ in (*by_slope, *by_load)])
     values = [
         seeds[seed][1] for line in (*by_slope.values(), *by_load.values()) for seeds in line.values() for seed in seeds
     ]
@@ -137,16 +138,24 @@ def figure(
     panels = fig.subplots(1, 2 if by_load else 1, squeeze=False)[0]
     means = []
     for ax, letter, drawn in zip(panels, "ab", (by_slope, by_load), strict=False):
-        shown = {key: averages(list(line.values()), factor) for key, line in drawn.items()}
-        for key, line in shown.items():
-            draw_averages(ax, line, color=lines.colour(key), **lines.marker(key), **_LINE)
+        shown = {
+            key: averages(
+                list(line.values()),
+                factor,
+                [asked_seeds(campaign[labels.study].to_dataset(), labels) for labels in line],
+            )
+            for key, line in drawn.items()
+        }
+        for (key, applicable), line in shown.items():
+            look = {"color": lines.colour(key)} | lines.marker(key, applicable=applicable)
+            draw_averages(ax, line, **look, **_LINE)
         means += shown.values()
         _scale(ax, np.concatenate([line.y for line in shown.values()]))
         panel_label(ax, letter)
     label = _QUANTITIES[quantity] + (f" ({unit})" if unit else "")
     panels[0].set_ylabel(label)
     panels[0].set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
-    slopes = sorted({slope for line in by_slope.values() for slope in line})
+    slopes = sorted({labels.rms_slope for line in by_slope.values() for labels in line})
     panels[0].set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
     panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
     panels[0].minorticks_off()

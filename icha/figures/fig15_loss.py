@@ -14,7 +14,7 @@ from icha.figures.ensembles import POINTS_OF_SEEDS, points_handles
 from icha.figures.hysteresis import Lines, averages, detached_runs_of, draw_averages, say_which_model, several
 from icha.figures.legends import legend_below
 from icha.figures.options import studies_problems
-from icha.figures.select import NothingToDraw
+from icha.figures.select import NothingToDraw, asked_seeds, is_applicable
 from icha.figures.style import GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
 from icha.support.values import Flag, Problem, list_of_names
 
@@ -76,6 +76,8 @@ _FIT_POINTS = 100
 _SPAN = 30.0
 # Parts that are smaller than this everywhere are not in the legend.
 _LEAST_SHARE = 1e-6
+# Opacity of the bars of runs to which the asperity model is not applicable.
+_PALE = 0.35
 
 
 class LinearFit(NamedTuple):
@@ -109,13 +111,15 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     from matplotlib.patches import Patch
 
     studies = several("studies", studies)
-    # Of every line the runs of every study, by seed.
-    runs: dict[tuple, dict[str, dict[int, xr.Dataset]]] = {}
+    # Of every line, and whether the model is applicable to its runs, those of every study by seed.
+    runs: dict[tuple[tuple, bool], dict[str, dict[int, xr.Dataset]]] = {}
+    asked: dict[tuple[tuple, bool], dict[str, int]] = {}
     for labels, run in detached_runs_of(campaign, studies):
-        line = runs.setdefault((labels.material, labels.surface, labels.rms_slope), {})
-        line.setdefault(labels.study, {})[labels.seed] = run
-    lines = Lines(campaign, studies, list(runs))
-    sticky = {key: line for key, line in runs.items() if lines.adhesive(key[0])}
+        key = (labels.material, labels.surface, labels.rms_slope), is_applicable(run)
+        runs.setdefault(key, {}).setdefault(labels.study, {})[labels.seed] = run
+        asked.setdefault(key, {})[labels.study] = asked_seeds(campaign[labels.study].to_dataset(), labels)
+    lines = Lines(campaign, studies, [key for key, _ in runs])
+    sticky = {key: line for key, line in runs.items() if lines.adhesive(key[0][0])}
     if over_surface_energy and not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
 
@@ -128,10 +132,13 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     }
     largest = max(np.abs(averages(line).y).max() for line in points.values())
     factor, unit = (1.0, "") if over_surface_energy else unit_for(largest, "J/m²")
-    drawn, handles = {key: averages(line, factor) for key, line in points.items()}, {}
-    for key, line in drawn.items():
-        look = {"color": lines.colour(key), "ls": "none"} | lines.marker(key)
+    drawn = {key: averages(line, factor, list(asked[key].values())) for key, line in points.items()}
+    handles = {}
+    for (key, applicable), line in drawn.items():
+        look = {"color": lines.colour(key), "ls": "none"} | lines.marker(key, applicable=applicable)
         handle = draw_averages(loss, line, **look)
+        if not applicable:
+            continue
         fit = linear_fit(line.x, line.y) if line.same_seeds else None
         if fit is not None:
             along = np.linspace(line.x.min(), line.x.max(), _FIT_POINTS)
@@ -201,13 +208,23 @@ def _draw_parts(ax, runs, lines):
     """Draw a bar for every line; the parts that are there."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
-    for place, (key, bar) in enumerate(bars.items()):
+    for place, ((key, applicable), bar) in enumerate(bars.items()):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
-            ax.bar(place, share, 0.8, bottom=above if share > 0 else below, ec="black", lw=0.4, **PARTS[name][1])
+            ax.bar(
+                place,
+                share,
+                0.8,
+                bottom=above if share > 0 else below,
+                ec="black",
+                lw=0.4,
+                alpha=None if applicable else _PALE,
+                **PARTS[name][1],
+            )
             above, below = above + max(share, 0), below + min(share, 0)
-        ax.plot(place, -0.055, ls="none", transform=ax.get_xaxis_transform(), clip_on=False, **lines.marker(key))
+        look = lines.marker(key, applicable=applicable)
+        ax.plot(place, -0.055, ls="none", transform=ax.get_xaxis_transform(), clip_on=False, **look)
     ax.axhline(0, color="black", lw=0.6)
     ax.set_xlim(-0.7, len(bars) - 0.3)
     ax.set_xticks([])

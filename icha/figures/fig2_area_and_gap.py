@@ -24,10 +24,10 @@ from icha.figures.curves import (
     whose_theories,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import LINES_OF_SEEDS, draw_members
+from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, mark_fewer
 from icha.figures.options import StudyFigure, finite_range_error
 from icha.figures.palette import FINITE_RANGE_MARKERS
-from icha.figures.select import finite_range_errors
+from icha.figures.select import asked_of_entry, finite_range_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
 
@@ -164,9 +164,11 @@ def _label_separations(ax, gaps):
 
 
 class _Difference(NamedTuple):
-    """What is drawn of a quantity in its lower panel: of every line loads and values (members, k), and the label."""
+    """What is drawn of a quantity in its lower panel: of every line loads and values (members, k) and how many members
+    were asked for, and the label.
+    """
 
-    drawn: list[tuple[Line, np.ndarray, np.ndarray]]
+    drawn: list[tuple[Line, np.ndarray, np.ndarray, int]]
     label: str
 
 
@@ -175,16 +177,18 @@ def _differences(curves, entries, references):
     from icha.references.persson import persson_area
 
     # The limit of a short range comes first: the other one with adhesion only bounds it.
-    truths = {contact_of(line): line.runs for line in curves.beside}
+    truths = {contact_of(line): line for line in curves.beside}
     areas, separations = [], []
     for line in curves.lines:
-        if runs := truths.get(contact_of(line)):
-            areas.append((line, *_from_runs(line.runs, runs, _areas, logarithmic=True)))
-            separations.append((line, *_from_runs(line.runs, runs, _separations, logarithmic=False)))
+        if truth := truths.get(contact_of(line)):
+            asked = min(line.asked, truth.asked)
+            areas.append((line, *_from_runs(line.runs, truth.runs, _areas, logarithmic=True), asked))
+            separations.append((line, *_from_runs(line.runs, truth.runs, _separations, logarithmic=False), asked))
         elif (errors := _errors_of(line.labels, entries.values())) is not None:
-            load = errors["reduced_pressure"].values
-            areas.append((line, load, 100 * _by_seed(errors["area_error"])))
-            separations.append((line, load, 100 * _by_seed(errors["separation_error"])))
+            load, asked = errors["reduced_pressure"].values, asked_of_entry(errors)
+            own = errors.sel(seed=[int(run["seed"]) for run in line.runs if int(run["seed"]) in errors["seed"].values])
+            areas.append((line, load, 100 * _by_seed(own["area_error"]), asked))
+            separations.append((line, load, 100 * _by_seed(own["separation_error"]), asked))
     if areas:
         return [
             _Difference(areas, r"$A/A_{\mathrm{BEM}}-1$  (%)"),
@@ -247,15 +251,16 @@ def _from_theory(lines, points, theory):
             load, values = points(run)
             load, values = load[load > 0], values[load > 0]
             members.append((load, 100 * (values / theory(load) - 1)))
-        found.append((line, *at_common_loads(members, logarithmic=False)))
+        found.append((line, *at_common_loads(members, logarithmic=False), line.asked))
     return found
 
 
 def _draw_difference(ax, difference, lines):
     """Draw the differences of all lines."""
-    for line, load, members in difference.drawn:
-        if len(load):
-            draw_members(ax, load, members, line.look | {"ls": "-", "lw": 0.6}, positive=False, lines=lines)
+    for line, load, members, asked in difference.drawn:
+        if members.size:
+            look = line.look | {"ls": "-", "lw": 0.6}
+            draw_members(ax, load, members, look, positive=False, lines=lines, asked=asked)
     logarithmic_axes(ax, "x")
     ax.axhline(0, color="0.6", lw=0.6, zorder=0)
     ax.set_ylabel(difference.label)
@@ -278,10 +283,12 @@ def _draw_solutions(left, right, colours, entries):
             again = drawn.count((name, material))
             drawn.append((name, material))
             own = errors.sel(material=material)
-            area, gap = (
-                ensemble(own[f"{name}_boundary_elements"].transpose("seed", ..., "reduced_pressure").values).mean
-                for name in ("contact_area_fraction", "reduced_separation")
-            )
+            members = [
+                own[f"{quantity}_boundary_elements"].transpose("seed", ..., "reduced_pressure").values
+                for quantity in ("contact_area_fraction", "reduced_separation")
+            ]
+            area, gap = (ensemble(values).mean for values in members)
+            asked = np.broadcast_to(asked_of_entry(own)[..., None], area.shape)
             p = np.broadcast_to(own["reduced_pressure"].values, area.shape)
             # Of measured surfaces each has its own slope, and no states at those of others.
             there = np.isfinite(area)
@@ -295,8 +302,10 @@ def _draw_solutions(left, right, colours, entries):
                 "zorder": 6 + (float(own["surface_energy"]) > 0),
             }
             states.append((p[there], area[there], gap[there]))
+            known = np.isfinite(members[0])[:, there]
             for ax, values in ((left, states[-1][1]), (right, states[-1][2])):
                 ax.plot(states[-1][0], values, **look)
+                mark_fewer(ax, states[-1][0], values, known, look, asked[there])
             label = f"{name}, {entry}" if again else name
             if label not in named:
                 named.add(label)

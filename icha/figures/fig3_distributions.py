@@ -86,14 +86,14 @@ def figure(
 
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
-    looks, scale = material_looks(campaign, study, [line.labels.material for line in lines])
+    looks, scale = material_looks(campaign, study, lines)
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2)
     lowest, highest, top, named, floor = -0.3, 0.3, 0.0, {}, []
     truths = same_snapshots_by_boundary_elements(campaign, lines)
     for line, truth, look in zip(lines, truths, looks, strict=True):
         u, densities = gap_densities(line.members)
-        drawn = {"positive": True, "lines": len(lines)}
+        drawn = {"positive": True, "lines": len(lines), "asked": line.asked}
         draw_members(left, u, densities, look, **drawn, markevery=1 + len(u) // _MOST_MARKERS)
         floor.append(plausible(densities.mean(axis=0)).min())
         p, densities = pressure_densities(line.members)

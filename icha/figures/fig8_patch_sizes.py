@@ -66,7 +66,7 @@ def figure(
     """
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
-    looks, scale = material_looks(campaign, study, [line.labels.material for line in lines])
+    looks, scale = material_looks(campaign, study, lines)
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2, sharex=True)
     truths = same_snapshots_by_boundary_elements(campaign, lines)
@@ -80,7 +80,7 @@ def figure(
             (left, patch_density, look, MODEL_MARKERS[SHORT_RANGE]),
             (right, patches_above, smooth, "none"),
         ):
-            draw_members(ax, *points(areas, cell), own, positive=True, lines=len(lines))
+            draw_members(ax, *points(areas, cell), own, positive=True, lines=len(lines), asked=line.asked)
             if truth.members:
                 area, values = points(true_areas, cell)
                 ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **BESIDE_LINE)

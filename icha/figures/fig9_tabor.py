@@ -12,9 +12,9 @@ from icha.figures.declaration import Campaign, Declaration
 from icha.figures.ensembles import POINTS_OF_SEEDS, draw_points, points_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import SnapshotFigure
-from icha.figures.palette import PLACE_MARKERS, material_colours, place_markers
+from icha.figures.palette import PLACE_MARKERS, material_colours, pale_look, place_markers
 from icha.figures.scale import MOST_COLOURS, places_scale
-from icha.figures.select import NothingToDraw, snapshot_label, study_runs
+from icha.figures.select import NothingToDraw, asked_seeds, is_applicable, snapshot_label, study_runs
 from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, quantity, styled
 from icha.support.statistics import ensemble
 from icha.support.values import Problem
@@ -80,19 +80,19 @@ def figure(
     curves, bare, colours, shown = _points(campaign, study, kind, target)
     fig = new_figure(TWO_COLUMNS, 3.1)
     panels = fig.subplots(1, 2)
-    places = list(dict.fromkeys([*(place for place, _ in curves), *bare]))
-    interfaces = list(dict.fromkeys(interface for _, interface in curves))
+    places = list(dict.fromkeys([*(place for place, *_ in curves), *bare]))
+    interfaces = list(dict.fromkeys(interface for _, interface, _ in curves))
     scale = places_scale(places) if len(places) > MOST_COLOURS else None
     markers = place_markers(places)
     drawn = []
-    for (place, interface), points in curves.items():
+    for (place, interface, applicable), points in curves.items():
         kind_of, place_of = interfaces.index(interface), places.index(place)
         look = {
             "color": scale.colours[place_of] if scale else colours[interface],
             "marker": PLACE_MARKERS[kind_of % len(PLACE_MARKERS)] if scale else markers[place],
             "label": _name(interface, place, [] if scale else places),
         }
-        drawn += _draw_curve(panels, points, look)
+        drawn += _draw_curve(panels, points, look if applicable else pale_look(look))
     for place, members in bare.items():
         colour = scale.colours[places.index(place)] if scale else GREY
         name = "no adhesion" if place == next(iter(bare)) else None
@@ -105,22 +105,24 @@ def figure(
         ax.set_ylabel(label)
         panel_label(ax, letter)
     panels[0].set_title(shown, loc="right")
-    counts = [len(members) for points in curves.values() for members in points.values()]
+    counts = [len(members) for points in curves.values() for members, _ in points.values()]
     legend_below(fig, named_handles(panels) | points_handles(counts))
     return fig
 
 
 def _points(campaign, study, kind, target):
-    """Of every curve its points by range of attraction, a (Tabor parameter, area, separation) for each seed; those
-    without adhesion by place, (area, separation) for each seed; colours by modulus and energy; and what snapshot it is.
+    """Of every curve its points by range of attraction, a (Tabor parameter, area, separation) for each seed, and how
+    many seeds were asked for; those without adhesion by place, (area, separation) for each seed; colours by modulus
+    and energy; and what snapshot it is. Runs to which the asperity model is not applicable are curves of their own.
     """
     from icha.datasets.campaign import find_snapshot
 
-    curves: dict[tuple, dict[float, list]] = {}
+    runs, dataset = study_runs(campaign, study, ragged=False), campaign[study].to_dataset()
+    curves: dict[tuple, dict[float, tuple[dict[int, tuple], int]]] = {}
     colours: dict[tuple, str] = {}
     of_material = material_colours(campaign)
     bare: dict[tuple, list] = {}
-    for labels, run in study_runs(campaign, study, ragged=False):
+    for labels, run in runs:
         at = find_snapshot(run, kind, target)
         step = int(run["snapshot_step"].values[at])
         state = [float(run[name].values[step]) for name in ("contact_area_fraction", "reduced_separation")]
@@ -128,9 +130,10 @@ def _points(campaign, study, kind, target):
         if float(run["surface_energy"]) > 0:
             interface = (float(run["contact_modulus"]), float(run["surface_energy"]))
             colours.setdefault(interface, of_material[labels.material])
-            points = curves.setdefault((place, interface), {})
-            points.setdefault(float(run["interaction_range"]), []).append((float(run["tabor_parameter"]), *state))
-        else:
+            points = curves.setdefault((place, interface, is_applicable(run)), {})
+            members, _ = points.setdefault(float(run["interaction_range"]), ({}, asked_seeds(dataset, labels)))
+            members[labels.seed] = (float(run["tabor_parameter"]), *state)
+        elif is_applicable(run):
             bare.setdefault(place, []).append(state)
         shown = snapshot_label(run, at)
     if not curves:
@@ -140,15 +143,16 @@ def _points(campaign, study, kind, target):
 
 def _draw_curve(panels, points, look):
     """Draw the means over the seeds in both panels; their Tabor parameters."""
-    most = max(map(len, points.values()))
-    # Along members, points and (Tabor parameter, area, separation); NaN where a point has fewer members.
-    states = np.full((most, len(points), 3), np.nan)
-    for k, members in enumerate(points.values()):
-        states[: len(members), k] = members
+    seeds = sorted({seed for members, _ in points.values() for seed in members})
+    # Along seeds, points and (Tabor parameter, area, separation); NaN where a point lacks a seed.
+    states = np.full((len(seeds), len(points), 3), np.nan)
+    for k, (members, _) in enumerate(points.values()):
+        states[[seeds.index(seed) for seed in members], k] = list(members.values())
+    asked = np.array([asked for _, asked in points.values()])
     mu = np.nanmean(states[..., 0], axis=0)
     order = np.argsort(mu)
     for k, ax in enumerate(panels, 1):
-        draw_points(ax, mu[order], states[:, order, k], look | {"lw": 0.8, "ms": 4}, positive=True)
+        draw_points(ax, mu[order], states[:, order, k], look | {"lw": 0.8, "ms": 4}, positive=True, asked=asked[order])
     return mu.tolist()
 
 

@@ -13,7 +13,14 @@ from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import UNLOADING
 from icha.figures.ensembles import draw_means
 from icha.figures.errors import interfaces_of
-from icha.figures.palette import PLACE_MARKERS, closed_look, material_colours, material_layers, place_markers
+from icha.figures.palette import (
+    PLACE_MARKERS,
+    closed_look,
+    material_colours,
+    material_layers,
+    pale_look,
+    place_markers,
+)
 from icha.figures.scale import MOST_COLOURS, materials_scale, places_scale
 from icha.figures.select import NothingToDraw, shown_model, study_runs, ways_back
 from icha.figures.style import GREY, legend_handle, material_label, slope_label
@@ -96,9 +103,16 @@ def pull_off_step(run: xr.Dataset) -> int | None:
 
 
 class Averages(NamedTuple):
-    """Means over seeds of the points of a line, lower and upper ends (2, k) of their 95 % bands (NaN of a single seed),
-    numbers of seeds, whether all points are of the same seeds, and x and y (seeds, k, 2) of every one (NaN where a
-    point has fewer).
+    """Means over seeds of the points of a line, in the order of x.
+
+    Parameters
+    ----------
+    x, y : (k,) float, the means.
+    x_band, y_band : (2, k) float, lower and upper ends of their 95 % bands; NaN of a single seed.
+    counts : (k,) int, numbers of seeds.
+    same_seeds : whether all points are of the same seeds.
+    members : (seeds, k, 2) float, x and y of every seed; NaN where a point lacks it.
+    asked : (k,) int, numbers of seeds asked for.
     """
 
     x: np.ndarray
@@ -108,30 +122,37 @@ class Averages(NamedTuple):
     counts: np.ndarray
     same_seeds: bool
     members: np.ndarray
+    asked: np.ndarray
 
 
-def averages(points: Sequence[Mapping[int, tuple[float, float]]], factor: float = 1.0) -> Averages:
+def averages(
+    points: Sequence[Mapping[int, tuple[float, float]]], factor: float = 1.0, asked: Sequence[int] | None = None
+) -> Averages:
     """Means over the seeds that all points of a line have, or over each point's own where they share none.
 
     Parameters
     ----------
     points : for every point of the line x and y of every seed, neither of them negative as a rule.
     factor : unit of y, which it is multiplied by.
+    asked : for every point the number of seeds asked for; left out, those that there are.
 
     Returns
     -------
     Averages in the order of x.
     """
     common = set.intersection(*(set(point) for point in points))
-    members = np.full((max(map(len, points)), len(points), 2), np.nan)
+    seeds = sorted(common or set().union(*points))
+    members = np.full((len(seeds), len(points), 2), np.nan)
     for k, point in enumerate(points):
-        own = [point[seed] for seed in sorted(common or point)]
-        members[: len(own), k] = np.array(own) * (1.0, factor)
+        for row, seed in enumerate(seeds):
+            if seed in point:
+                members[row, k] = np.array(point[seed]) * (1.0, factor)
     over = ensemble(members)
     low, high = over.band(positive=True)
     order = np.argsort(over.mean[:, 0], kind="stable")
     bands = (np.array([low[order, axis], high[order, axis]]) for axis in (0, 1))
-    return Averages(*over.mean[order].T, *bands, over.count[order, 0], bool(common), members[:, order])
+    asked = np.array([len(point) for point in points] if asked is None else asked)[order]
+    return Averages(*over.mean[order].T, *bands, over.count[order, 0], bool(common), members[:, order], asked)
 
 
 def draw_averages(axes, line: Averages, **look):
@@ -139,7 +160,7 @@ def draw_averages(axes, line: Averages, **look):
     # A coordinate that all seeds share, such as a slope, has no bar.
     x_band = line.x_band if np.any(line.x_band[1] > line.x_band[0] * (1 + 1e-9)) else None
     return draw_means(
-        axes, (line.x, x_band), (line.y, line.y_band), line.counts, np.moveaxis(line.members, -1, 0), look
+        axes, (line.x, x_band), (line.y, line.y_band), line.counts, np.moveaxis(line.members, -1, 0), look, line.asked
     )
 
 
@@ -177,14 +198,15 @@ class Lines:
             return places_scale(self.places).colours[self.places.index(tuple(place))]
         return self.palette[material]
 
-    def marker(self, key: tuple) -> dict:
-        """Look of a line's markers, arguments of `Axes.plot`."""
+    def marker(self, key: tuple, *, applicable: bool = True) -> dict:
+        """Look of a line's markers, arguments of `Axes.plot`; pale if the asperity model is not applicable."""
         material, *place = key
         marker = self.markers[tuple(place)]
         if self.many_places:
             marker = PLACE_MARKERS[self.materials.index(material) % len(PLACE_MARKERS)]
         look = closed_look(self.colour(key), self.layers[material])
-        return {name: look[name] for name in ("mec", "mfc", "mew", "ms", "zorder")} | {"marker": marker}
+        own = {name: look[name] for name in ("mec", "mfc", "mew", "ms", "zorder")} | {"marker": marker}
+        return own if applicable else pale_look(own | {"color": look["color"]})
 
     def handles(self, **look) -> dict[str, Line2D]:
         """Legend of what tells the lines apart: materials by colour, surfaces and slopes by marker, in `look`.

@@ -20,9 +20,15 @@ _MANY_NAMES = 12
 _BESIDE, _CHARACTER, _ROW = 0.7, 0.062, 0.155
 _MOST_COLUMNS = 4
 
+# Labels of what is drawn of incomplete ensembles and of runs that are no use as predictions, and how legends show it.
+FEWER_SEEDS = "crossed: mean over n seeds, fewer than asked for"
+NOT_APPLICABLE = "pale: asperity model not applicable"
+_PALE_GREY = "0.72"
+
 
 def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
     """Add a legend below the panels, in as many columns as have room; the figure grows by its height."""
+    handles = dict(handles) | _marks(figure)
     if not handles:
         return
     size = 8 if len(handles) <= _MANY_NAMES else 7
@@ -33,6 +39,20 @@ def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
     rows = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.06 + _ROW * size / 8 * rows)
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)
+
+
+def _marks(figure):
+    """What the legend says of crossed and pale marks, as far as a panel has some."""
+    shown = named_handles(figure.axes)
+    ring = {"ls": "none", "marker": "o", "ms": 5, "mew": 0.9, "mfc": "white"}
+    looks = {
+        FEWER_SEEDS: (
+            legend_handle(color=GREY, **ring),
+            legend_handle(color=GREY, **ring | {"marker": "x", "mew": 0.7}),
+        ),
+        NOT_APPLICABLE: legend_handle(color=_PALE_GREY, **ring | {"ls": "-", "lw": 0.9}),
+    }
+    return {name: look for name, look in looks.items() if name in shown}
 
 
 def named_handles(panels: Iterable[Axes]) -> dict[str, object]:

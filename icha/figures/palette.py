@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
+from icha.figures.legends import NOT_APPLICABLE
 from icha.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, legend_handle
 
 if TYPE_CHECKING:
@@ -92,6 +93,18 @@ def closed_look(colour: str, layer: Layer) -> dict:
         "lw": _LINE_WIDTH * layer.size,
         "zorder": layer.order,
     }
+
+
+def pale_look(look: dict) -> dict:
+    """Look of runs to which the asperity model is not applicable: open and in a lighter colour than others have."""
+    from matplotlib.colors import to_hex, to_rgb
+
+    colour = to_hex([1 - _PALENESS * (1 - part) for part in to_rgb(look["color"])])
+    return look | {"color": colour, "mec": colour, "mfc": "white", "label": NOT_APPLICABLE}
+
+
+# Part of a colour that is left in its pale one.
+_PALENESS = 0.4
 
 
 def model_handle(name: str, **look: object) -> Line2D:

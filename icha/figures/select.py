@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.contact.models import BOUNDARY_ELEMENTS, first_of
-from icha.datasets.labels import RunLabels
-from icha.datasets.places import slopes_of
+from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.places import place_of, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.style import number, slope_label
 
@@ -69,6 +69,19 @@ def runs_by_boundary_elements(
         return study_runs(campaign, study, ragged=ragged, model=BOUNDARY_ELEMENTS)
     except NothingToDraw:
         return []
+
+
+def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
+    """Number of seeds that a study asks for of a run's model, surface, slope and material, whatever became of them."""
+    from icha.datasets.variables.campaign import COMPUTED_RUNS, MISSING
+
+    at = place_of(study, {label: getattr(labels, label) for label in LABELS if label != "seed"})
+    return int(np.isin(study["status"].isel(at).values, (*COMPUTED_RUNS, MISSING)).sum())
+
+
+def is_applicable(run: xr.Dataset) -> bool:
+    """Whether nothing is known that makes the asperity model not applicable to a run."""
+    return not run.attrs.get("applicability")
 
 
 def shown_model(study: xr.Dataset) -> str:
@@ -179,16 +192,23 @@ def ways_back(run: xr.Dataset) -> list[xr.Dataset]:
 
 
 class Snapshots(NamedTuple):
-    """The runs of one contact, one for every seed, and where their snapshots of one kind and target are."""
+    """The runs of one contact, one for every seed, and where their snapshots of one kind and target are.
+
+    `asked` is the number of seeds asked for, `applicable` whether the asperity model is applicable to the runs.
+    """
 
     labels: RunLabels
     members: list[tuple[xr.Dataset, int]]
+    asked: int = 0
+    applicable: bool = True
 
 
 def first_line(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
     """Of every material on the first surface and slope of a study a snapshot of every seed, by its `shown_model`.
+
+    Runs to which the asperity model is not applicable are apart from the others of their material.
 
     Raises
     ------
@@ -197,12 +217,13 @@ def first_line(
     """
     from icha.datasets.campaign import find_snapshot
 
-    runs = study_runs(campaign, study)
+    runs, dataset = study_runs(campaign, study), campaign[study].to_dataset()
     first = runs[0][0]
-    found: dict[str, Snapshots] = {}
+    found: dict[tuple[str, bool], Snapshots] = {}
     for labels, run in runs:
         if (labels.surface, labels.rms_slope) == (first.surface, first.rms_slope):
-            own = found.setdefault(labels.material, Snapshots(labels, []))
+            key = labels.material, is_applicable(run)
+            own = found.setdefault(key, Snapshots(labels, [], asked_seeds(dataset, labels), key[1]))
             own.members.append((run, find_snapshot(run, kind, target)))
     return list(found.values())
 
@@ -211,7 +232,7 @@ def same_snapshots_by_boundary_elements(campaign: xr.DataTree, lines: Sequence[S
     """For every line by asperities the same snapshot by boundary elements, of those seeds that keep it, if any."""
     from icha.datasets.campaign import find_snapshot
 
-    found = [Snapshots(line.labels._replace(model=BOUNDARY_ELEMENTS), []) for line in lines]
+    found = [line._replace(labels=line.labels._replace(model=BOUNDARY_ELEMENTS), members=[]) for line in lines]
     first = lines[0].labels
     if first.model == BOUNDARY_ELEMENTS:
         return found
@@ -258,3 +279,10 @@ def finite_range_errors(model_error: xr.DataTree | None, study: str) -> dict[str
     """Those of `study_errors` that compare with boundary elements at a finite range."""
     entries = study_errors(model_error, study)
     return {name: errors for name, errors in entries.items() if errors.attrs["truth"] == FINITE_RANGE}
+
+
+def asked_of_entry(errors: xr.Dataset) -> np.ndarray:
+    """Numbers of seeds that an entry of a model error compares, whatever became of their runs, along other labels."""
+    from icha.datasets.variables.campaign import NOT_IN_DESIGN
+
+    return (errors["status"] != NOT_IN_DESIGN).sum("seed").values

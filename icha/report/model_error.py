@@ -9,18 +9,21 @@ import numpy as np
 from icha.analysis.model_error import SUMMARISED
 from icha.datasets.places import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.support.statistics import ensemble
+from icha.support.statistics import ENOUGH, ensemble
 
 
 def entry_section(errors):
     """What the page says about one entry of the model error: a row for every surface, material and load."""
-    several = errors.sizes["seed"] > 1
 
     def scatter(state, name):
-        over = ensemble(state[name].values)
-        if not over.count:
+        """Mean, half the width of its 95 % interval of five seeds or more, and smallest and largest of fewer."""
+        values = state[name].values[np.isfinite(state[name].values)]
+        if not len(values):
             return None  # of no snapshot
-        return float(over.mean), float(over.confidence) if several else None
+        over = ensemble(values)
+        if len(values) >= ENOUGH:
+            return float(over.mean), float(over.confidence), None
+        return float(over.mean), None, (float(values.min()), float(values.max())) if len(values) > 1 else None
 
     rows = []
     for (surface, slope), material in itertools.product(

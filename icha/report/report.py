@@ -21,6 +21,7 @@ from icha.analysis.validity import of_dataset
 from icha.checks.findings import Check
 from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.results import EXPLORER
+from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
 from icha.report.model_error import entry_section
 from icha.report.provenance import provenance
@@ -90,7 +91,7 @@ def write_report(
     def link(target):
         return Path(os.path.relpath(target, folder)).as_posix()
 
-    pictures = _pictures(figures, list(campaign.children), link)
+    pictures = _pictures(figures, campaign, link)
     studies = [study_section(campaign, name, comparison) for name in campaign.children]
     dataset = link(dataset_path) if dataset_path is not None else None
     linked = {name: link(target) for name, target in files.items()}
@@ -101,7 +102,8 @@ def write_report(
         figures=pictures,
         graph=provenance(studies, surfaces, pictures, model_error, linked, dataset),
         studies=studies,
-        totals={name: sum(study[name] for study in studies) for name in ("asked", "complete", "failed", "missing")},
+        totals={name: sum(study[name] for study in studies) for name in ("asked", "complete", "failed", "missing")}
+        | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
         entries=[entry_section(node.to_dataset()) for node in _entries(model_error)],
         surfaces=[surface_row(surface) for surface in surfaces[:MOST_ROWS]],
         surface_count=len(surfaces),
@@ -129,11 +131,13 @@ def write_report(
         temporary.write_text(page, encoding="utf-8")
 
 
-def _pictures(figures, studies, link):
+def _pictures(figures, campaign, link):
     """What the page shows of the figures: those of one study with it, after those of none or of several.
 
     They have the numbers of their names, so that a figure has one number in the page, in its files and in the docs.
+    Captions count the runs that are missing or drawn pale.
     """
+    studies = list(campaign.children)
     places = [None, *studies]
     own = [each.studies[0] if len(each.studies) == 1 and each.studies[0] in studies else None for each in figures]
     ordered = sorted(zip(own, figures, strict=True), key=lambda pair: places.index(pair[0]))
@@ -141,7 +145,7 @@ def _pictures(figures, studies, link):
         {
             "name": figure.name,
             "number": figure_number(figure.name),
-            "caption": figure.caption,
+            "caption": " ".join(filter(None, (figure.caption, count_runs(campaign, figure.studies)))),
             "data": base64.b64encode(Path(figure.png).read_bytes()).decode("ascii"),
             "pdf": link(figure.pdf),
             "study": study,

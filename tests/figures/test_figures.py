@@ -651,7 +651,9 @@ def test_fig10_names_finite_ranges_where_the_limit_of_a_short_one_is_known():
 @pytest.mark.parametrize("module", COMPARED)
 def test_errors_of_runs_that_all_failed_are_nothing_to_draw(module):
     errors = compared.errors()
-    empty = {f"/{name}": node.to_dataset() * np.nan for name, node in errors.children.items()}
+    empty = {
+        f"/{name}": node.to_dataset().drop_vars("applicability") * np.nan for name, node in errors.children.items()
+    }
     for name, node in errors.children.items():
         empty[f"/{name}"].attrs = node.attrs
     with pytest.raises(NothingToDraw, match="study one: no run beside boundary elements is complete"):

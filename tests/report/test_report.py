@@ -12,7 +12,7 @@ import small_campaign as small
 from scipy.stats import t
 
 from icha.analysis.checks import check_campaign
-from icha.analysis.common_loads import at_round_pressures, compare_campaign, compare_runs, interpolated
+from icha.analysis.common_loads import compare_campaign, compare_runs, interpolated
 from icha.analysis.model_error import model_error
 from icha.checks.findings import Check
 from icha.datasets.campaign import campaign_tree
@@ -24,8 +24,9 @@ from icha.figures.select import path_steps
 from icha.figures.style import quantity, save
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, read_benchmarks, write_times_page
+from icha.report.studies import _range, own_stops
 from icha.report.surfaces import read_surface_statistics
-from icha.report.template import MOST_ROWS
+from icha.report.template import MOST_ROWS, scientific
 
 
 class Page(HTMLParser):
@@ -111,7 +112,7 @@ def test_page_shows_parameters_results_and_checks(write):
     for part in ("Small campaign", "25 MPa", "50 mJ/m²", "2.071 nm", passed, "100 µm", "CC0-1.0"):
         assert part in text, part
     assert "<script>alert" not in text and "&lt;script&gt;alert" in text
-    area = dict((p, a) for p, a, _ in at_round_pressures(small.run(rms_slope=0.2, material="hertz")))[1e-2]
+    area = own_stops(small.run(rms_slope=0.2, material="hertz"))["reduced_pressure", 1e-2]["area"]
     assert f"{area:.4f}" in text
 
 
@@ -136,7 +137,8 @@ def test_error_of_the_model_has_a_section_where_it_is_known(write):
     errors = 100 / np.array(list(compared.AREA_FACTORS.values())) - 100
     for value in (np.median(errors), errors.min(), errors.max()):
         assert f"{value:.1f} %".replace("-", "−") in adhesive
-    assert f"{errors.mean():.1f} ± {_half_width(errors):.1f}".replace("-", "−") in adhesive
+    assert f"{errors.mean():.1f} ({errors.min():.1f} … {errors.max():.1f})".replace("-", "−") in adhesive
+    assert "±" not in adhesive
     run = compared.runs()["one", "asperities", "rough", 2, 1.0, "hertz"]
     areas = [
         float(own["contact_area_fraction"].values[0])
@@ -194,7 +196,7 @@ def test_runs_that_come_back_have_tables_of_pull_off_and_loss(write):
     runs = [run for labels, run in cyclic.runs().items() if (labels.study, labels.material) == ("loops", "soft")]
     tensions = np.array([float(run["pull_off_pressure"]) for run in runs]) / 1e3
     assert tensions.min() > 10 and tensions.max() < 1000
-    assert pull_off["soft"]["Pull-off"] == f"{tensions.mean():.0f} kPa<br>±&thinsp;{_half_width(tensions):.0f}"
+    assert pull_off["soft"]["Pull-off"] == f"{tensions.mean():.0f} kPa<br>({tensions.min():.0f} … {tensions.max():.0f})"
     assert pull_off["soft"]["Seeds"] == "2" and pull_off["soft"]["over all asperities"] == "0.250"
     assert pull_off["soft"]["Last contact"].startswith("−")
     assert pull_off["hertz"]["Pull-off"] == "0 Pa" and pull_off["hertz"]["Last contact"] == "–"
@@ -202,7 +204,8 @@ def test_runs_that_come_back_have_tables_of_pull_off_and_loss(write):
     assert loss["soft"]["Jumping off, %"] == "100.0" and loss["hertz"]["Jumping off, %"] == "–"
     assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["over Δγ"] == "–"
     over = np.array([float(run["hysteresis_loss"]) / 0.05 for run in runs])
-    assert re.sub("<.*?>", "", loss["soft"]["over Δγ"]) == f"{plain(over.mean())}±&thinsp;{plain(_half_width(over))}"
+    known = f"{plain(over.mean())}({plain(over.min())} … {plain(over.max())})"
+    assert re.sub("<.*?>", "", loss["soft"]["over Δγ"]) == known
     assert "Unions, %" not in loss["soft"], "what is nowhere lost has no column"
     formed, broken = loss["soft"]["Contacts formed, broken"].split("<br>")
     assert formed == broken == f"{np.mean([float(run['spot_count'].max()) for run in runs]):.4g}"
@@ -248,8 +251,8 @@ def test_the_mean_gap_of_free_squares_is_not_called_mean_separation(write):
     (labels, _), *_ = small.runs()
     text = section(write(campaign=campaign_tree([(labels, free)]), checks=[], comparison=None), "studies", "checks")
     assert "mean gap over rms height" in text and "mean separation over" not in text
-    shown = at_round_pressures(free)[-1][2]
-    assert shown == pytest.approx(at_round_pressures(small.run())[-1][2] + 0.5) and f"{shown:.3f}" in text
+    shown, other = (own_stops(run)["reduced_pressure", 3e-2]["gap"] for run in (free, small.run()))
+    assert shown == pytest.approx(other + 0.5) and f"{shown:.3f}" in text
 
 
 def test_comparison_is_of_the_first_loading():
@@ -259,7 +262,7 @@ def test_comparison_is_of_the_first_loading():
     assert one.sizes["reduced_pressure"] > 5
     for name in other.data_vars:
         np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=name)
-    assert at_round_pressures(cyclic.run(between=3)) == at_round_pressures(small.run())
+    assert own_stops(cyclic.run(between=3)) == own_stops(small.run())
 
 
 def test_failures_are_loud(write):
@@ -330,8 +333,45 @@ def test_means_over_the_seeds_have_their_confidence(write):
     table = text[text.index("Means over <i>n</i> seeds") :].split("</table>")[0]
     pressures = re.findall(r'<th class="num">([\d.]+)</th>', table)
     cells = dict(zip(pressures, re.findall(r"<td[^>]*>(.*?)</td>", table)[-len(pressures) :], strict=True))
-    areas = [dict((p, a) for p, a, _ in at_round_pressures(small.run(seed)))[1e-2] for seed in (1, 2)]
-    assert cells["0.01"].split("<br>")[0] == f"{np.mean(areas):.4f} ± {_half_width(areas):.4f}"
+    areas = [own_stops(small.run(seed))["reduced_pressure", 1e-2]["area"] for seed in (1, 2)]
+    assert list(cells) == [f"{p:g}" for p in small.PRESSURES], "the stops of the path"
+    assert cells["0.01"].split("<br>")[0] == f"{np.mean(areas):.4f} ({min(areas):.4f} … {max(areas):.4f})"
+    assert "±" not in table.split("<tbody>")[1]
+
+
+def test_tables_of_survivors_promise_no_confidence_and_count(write, tmp_path):
+    runs = {RunLabels("five", "asperities", "rough", seed, 1.0, "soft"): small.run(seed) for seed in range(1, 6)}
+    files = [tmp_path / "figures" / f"fig1_jkr.{ending}" for ending in ("png", "pdf")]
+    figures = [ReportFigure("fig2_area", "Areas.", *files, ("five",))]
+
+    def means(text):
+        table = text[text.index("Means over <i>n</i> seeds") :].split("</table>")[0].split("<tbody>")[1]
+        return [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row) for row in table.split("</tr>")[:-1]]
+
+    whole = write(campaign=campaign_tree(runs.items()), checks=[], comparison=None, figures=figures)
+    (row,) = means(whole)
+    areas = np.array([own_stops(run)["reduced_pressure", 1e-2]["area"] for run in runs.values()])
+    assert row[3] == "5" and row[-2].split("<br>")[0] == f"{areas.mean():.4f} ±&thinsp;{_half_width(areas):.5f}"
+    assert "Areas.</p>" in whole and 'id="not-applicable"' not in whole
+    marks = [{"failed_checks": "loss below zero"}, {"applicability": "asperity model not applicable: steps"}]
+    some = {labels: run.assign_attrs(marks[labels.seed - 1] if labels.seed < 3 else {}) for labels, run in runs.items()}
+    text = write(campaign=campaign_tree(some.items()), checks=[], comparison=None, figures=figures)
+    Page(text)
+    apart, row = sorted(means(text), key=lambda cells: cells[3])
+    assert apart[0].endswith("(model not applicable)") and apart[3] == "1 of 5"
+    assert row[3] == "3 of 5" and not any("±" in cell for cell in row)
+    assert row[-2].split("<br>")[0] == (
+        f"{scientific(areas[2:].mean())} ({scientific(areas[2:].min())} … {scientific(areas[2:].max())})"
+    )
+    assert "loss below zero" in section(text, "failures", "not-applicable")
+    assert "seed 2" in section(text, "not-applicable", "studies")
+    assert "Areas. 1 of 5 seeds of material soft failed their checks: see Failed runs. 1 run is drawn pale:" in text
+
+
+def test_no_interval_of_areas_reaches_below_zero():
+    assert _range(np.array([1.0, 1e-3, 1e-3, 1e-3, 1e-3]), "{:.3f}".format).startswith("(0.0")
+    assert _range(np.array([1.0, 1e-3]), "{:.3f}".format) == "(0.001 … 1.000)"
+    assert _range(np.array([2.0, 2.0]), "{:.3f}".format) == ""
 
 
 def test_figures_stand_with_their_study_and_have_the_numbers_of_their_files(write, tmp_path):

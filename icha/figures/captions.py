@@ -1,0 +1,63 @@
+"""What captions say of the runs that a figure lacks or draws apart, counted in the campaign dataset."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from icha.contact.models import ASPERITIES
+from icha.datasets.labels import LABELS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
+    """Count the runs of some studies that a figure of their means lacks, and those that it draws pale.
+
+    Returns
+    -------
+    Sentences for the end of a caption; "" where all runs are complete and the asperity model is applicable to them.
+    """
+    found: list[str] = []
+    for name in studies:
+        if name in campaign.children:
+            study, several = campaign[name].to_dataset(), f" of study {name}" if len(studies) > 1 else ""
+            found += [*_missing_runs(study, several), *_runs_not_applicable(study, several)]
+    return " ".join(found)
+
+
+def _missing_runs(study: xr.Dataset, several: str) -> Iterator[str]:
+    """Count by model and material the runs that did not complete or whose checks failed."""
+    from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING
+
+    status = study["status"].transpose("model", "material", ...)
+    seeds = "seeds" if status.sizes["surface"] == status.sizes["rms_slope"] == 1 else "runs"
+    for model in study["model"].values.tolist():
+        for material in study["material"].values.tolist():
+            own = status.sel(model=model, material=material).values
+            asked = int(np.isin(own, (*COMPUTED_RUNS, MISSING)).sum())
+            ended, checks = int(np.isin(own, (INCOMPLETE, MISSING)).sum()), int((own == FAILED_CHECKS).sum())
+            parts = [f"{ended} of {asked} {seeds} of material {material} did not complete"] if ended else []
+            if checks:
+                parts.append(f"{checks} of {asked} {seeds} of material {material} failed their checks")
+            if parts:
+                by = "" if model == ASPERITIES else " by " + model.replace("_", " ")
+                yield f"{' and '.join(parts)}{several}{by}: see Failed runs."
+
+
+def _runs_not_applicable(study: xr.Dataset, several: str) -> Iterator[str]:
+    """Count the complete runs that the asperity model is not applicable to, by reason."""
+    from icha.datasets.variables.campaign import COMPLETE
+
+    if "applicability" not in study:  # which campaigns of earlier versions lack
+        return
+    complete = study["status"].transpose(*LABELS).values == COMPLETE
+    reasons = study["applicability"].transpose(*LABELS).values[complete].tolist()
+    for reason, count in Counter(map(str, reasons)).items():
+        if reason:
+            runs = "run is" if count == 1 else "runs are"
+            yield f"{count} {runs} drawn pale{several}: {reason}."

@@ -1,0 +1,144 @@
+"""Figures of means whose runs are not all there show it, and count what is missing in their captions."""
+
+import cyclic_campaign as cyclic
+import numpy as np
+import pytest
+import small_campaign as small
+
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.labels import RunLabels
+from icha.figures import (
+    fig2_area_and_gap,
+    fig5_multi_slope,
+    fig7_stiffness,
+    fig13_loops,
+    fig14_pull_off,
+    fig15_loss,
+)
+from icha.figures.captions import count_runs
+from icha.figures.ensembles import draw_members, draw_points
+from icha.figures.legends import FEWER_SEEDS, NOT_APPLICABLE
+from icha.figures.style import new_figure
+
+SEEDS = range(1, 6)
+REASON = "asperity model not applicable: 40 % of the load is on summits that no node supports"
+LOADING = (fig2_area_and_gap, fig5_multi_slope, fig7_stiffness)
+LOOPS = (fig13_loops, fig14_pull_off, fig15_loss)
+
+
+def campaign(failed=None, checks=None, pale=(), lacking=(), run=small.run):
+    """Five seeds of two materials, of which some runs of the soft one failed, lack or are not applicable."""
+    runs = []
+    for material in ("soft", "hertz"):
+        for seed in SEEDS:
+            own = run(seed=seed, material=material)
+            if material == "soft":
+                own = own.isel(step=slice(0, (failed or {}).get(seed)))
+                attrs = {"incomplete": "no equilibrium"} if seed in (failed or {}) else {}
+                attrs |= {"failed_checks": "loss below zero"} if seed in (checks or ()) else {}
+                attrs |= {"applicability": REASON} if seed in pale else {}
+                own = own.assign_attrs(attrs)
+            runs.append((RunLabels("five", "asperities", "rough", seed, 1.0, material), own))
+    design = [labels for labels, _ in runs]
+    return campaign_tree(
+        [(labels, own) for labels, own in runs if (labels.material, labels.seed) not in {("soft", k) for k in lacking}],
+        design=design,
+    )
+
+
+def draw(module, tree):
+    return module.figure(tree, **{"studies": ["five"]} if module is fig15_loss else {"study": "five"})
+
+
+def crossed(axes):
+    return [line for line in axes.get_lines() if line.get_label() == FEWER_SEEDS]
+
+
+def numbers(axes):
+    return [text.get_text() for text in axes.texts if text.get_text().startswith("n=")]
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+@pytest.mark.parametrize("module", [*LOADING, *LOOPS])
+def test_means_over_the_survivors_are_crossed_with_their_number(module):
+    run = cyclic.run if module in LOOPS else small.run
+    whole = draw(module, campaign(run=run))
+    assert not any(crossed(axes) or numbers(axes) for axes in whole.axes)
+    assert FEWER_SEEDS not in legend(whole)
+    figure = draw(module, campaign(lacking=(2,), checks=(4,), run=run))
+    axes = figure.axes[0]
+    assert numbers(axes) and set(numbers(axes)) == {"n=3"}
+    for cross in crossed(axes):
+        x, y = cross.get_data()
+        hollow = [
+            line
+            for line in axes.get_lines()
+            if line.get_marker() not in ("x", ".") and line.get_markerfacecolor() == "white"
+        ]
+        assert any(np.array_equal(line.get_data(), (x, y)) for line in hollow)
+    assert legend(figure).count(FEWER_SEEDS) == 1
+
+
+def test_runs_that_failed_at_different_steps_are_in_no_mean():
+    tree = campaign(failed={2: 2, 4: 3})
+    (cross,) = crossed(fig2_area_and_gap.figure(tree, study="five").axes[0])
+    own = [
+        small.run(k)["contact_area_fraction"].sel(step=small.run(k)["step_kind"] == "reduced_pressure")
+        for k in (1, 3, 5)
+    ]
+    np.testing.assert_allclose(cross.get_ydata(), np.mean(own, axis=0), rtol=1e-12)
+
+
+def segments(line):
+    """The ends of the segments of a line that are drawn, as pairs of x."""
+    x, y = line.get_data()
+    return [(a, b) for a, b, c, d in zip(x, x[1:], y, y[1:], strict=False) if np.isfinite([a, b, c, d]).all()]
+
+
+@pytest.mark.parametrize("few", [draw_members, draw_points])
+def test_no_line_joins_means_over_different_seeds(few):
+    members = np.arange(1.0, 21.0).reshape(5, 4)
+    members[1, 2:], members[3, 1:] = np.nan, np.nan
+    axes = new_figure(3, 3).subplots()
+    look = {"color": "#0072B2", "mec": "#0072B2", "mfc": "#0072B2", "marker": "o", "ms": 4, "ls": "-"}
+    few(axes, np.arange(4.0), members, look, positive=False, asked=5)
+    (mean,) = [line for line in axes.get_lines() if line.get_linestyle() == "-" and line.get_marker() == "o"]
+    assert segments(mean) == [(2.0, 3.0)]
+    assert numbers(axes) == ["n=4", "n=3"]
+    (cross,) = crossed(axes)
+    assert cross.get_xdata().tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize("module", [*LOADING, *LOOPS])
+def test_runs_that_the_model_is_not_applicable_to_are_pale_and_apart(module):
+    run = cyclic.run if module in LOOPS else small.run
+    figure = draw(module, campaign(pale=(1, 5), run=run))
+    axes = figure.axes[0]
+    assert sorted(set(numbers(axes))) == ["n=2", "n=3"]
+    assert legend(figure).count(NOT_APPLICABLE) == 1
+
+
+def test_captions_count_what_is_missing():
+    assert count_runs(campaign(), ["five"]) == ""
+    tree = campaign(lacking=(2,), failed={3: 2}, checks=(4,), pale=(1, 5))
+    assert count_runs(tree, ["five"]) == (
+        "2 of 5 seeds of material soft did not complete and 1 of 5 seeds of material soft failed their checks: "
+        f"see Failed runs. 2 runs are drawn pale: {REASON}."
+    )
+
+
+def test_fig13_says_which_surface_it_draws_and_that_there_are_others():
+    runs = [
+        (RunLabels("both", "asperities", name, seed, 1.0, "soft"), cyclic.run(seed=seed))
+        for name in ("flat", "steep")
+        for seed in (1, 2)
+    ]
+    figure = fig13_loops.figure(campaign_tree(runs), study="both", surface="steep", seed=2)
+    assert figure.axes[0].get_title(loc="right") == "surface steep, seed 2"
+    assert "1 of 2 surfaces; choose with `surface:`; 1 of 2 seeds; choose with `seed:`" in legend(figure)
+    figure = fig13_loops.figure(campaign_tree(runs), study="both")
+    assert figure.axes[0].get_title(loc="right") == "surface flat"
+    assert "1 of 2 surfaces; choose with `surface:`" in legend(figure)
