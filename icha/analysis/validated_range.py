@@ -41,6 +41,8 @@ VALIDATED = {
     "height_kurtosis": Range("kurtosis of heights", 2.3, 3.5),
     # Narrower spectra than those there, with 3.3, have fewer unions of spots; 1.5 is the least of isotropic surfaces.
     "nayak_parameter": Range("Nayak's parameter", 1.5, 47.0),
+    # Of the validation's surfaces at most one in two hundred.
+    "unsupported_summits": Range("share of unsupported summits", 0.0, 0.01),
     # Better resolved surfaces and less adhesion are no harder; so there is no upper end.
     "nodes_per_short_wave": Range("nodes per shortest wave", 5.8, math.inf),
     "full_contact_energy_ratio": Range("U_full/dgamma", 76.0, math.inf),

@@ -184,11 +184,16 @@ def _cases(study):
         name: study[name].broadcast_like(status).transpose(*LABELS).values
         for name in (*measured, "grid", "asperity_count", "boundary")
     }
+    unsupported = np.zeros(status.shape)
+    if "unsupported_summit_count" in study:  # which campaigns of earlier versions lack
+        unsupported = study["unsupported_summit_count"].broadcast_like(status).transpose(*LABELS).values
     labels = [study[label].values for label in LABELS]
     for at in map(tuple, np.argwhere(np.isin(status.values, COMPUTED_RUNS))):
         model, surface, _, _, material = (str(own[index]) for own, index in zip(labels, at, strict=True))
         facts = {name: float(values[name][at]) for name in measured}
-        facts["nodes_per_short_wave"] = cells_per_short_wave(values["grid"][at], values["asperity_count"][at])
+        summits = values["asperity_count"][at] + unsupported[at]
+        facts["nodes_per_short_wave"] = cells_per_short_wave(values["grid"][at], summits)
+        facts["unsupported_summits"] = float(unsupported[at] / max(summits, 1))
         facts["free_edges"] = float(values["boundary"][at] != "periodic")
         yield Case(model, surface, material, facts)
 

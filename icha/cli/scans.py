@@ -51,6 +51,16 @@ def about_scan(name: str, scan, *, to_scale: bool = True, by_patches: bool = Fal
         f"{name}: {nodes}{scale} {in_words.counted(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} nodes for each"
         f"{few}{LEAST_CELLS_OF_SUMMIT}, with which summits are resolved"
     )
+    if unsupported := len(scan.asperities.unsupported_height):
+        yield (
+            f"{name}: {unsupported} of them are left out by asperities, as the nodes around them do not support their "
+            "heights; steps, spikes, pits and plateaus make such summits"
+        )
+    if reasons := scan.reasons_against_asperities:
+        yield (
+            f"{name}: warning: asperity model not applicable ({'; '.join(reasons)}); use a `cutoff` that smooths the "
+            "surface, or `models: [boundary_elements]`"
+        )
     if by_patches and scan.cells_per_short_wave < RESOLVED_CELLS:
         yield (
             f"{name}: boundary elements have about {scan.cells_per_short_wave:.2g} nodes for its shortest waves, with "

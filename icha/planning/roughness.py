@@ -47,20 +47,23 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         moments = SpectralMoments(*self_affine_moments(*lengths, section.hurst))
         skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, False
         summits = section.period**2 * summit_density(moments.m2, moments.m4)
-        grid = section.grid
+        unsupported, grid = 0, section.grid
     else:
-        from icha.surfaces.summits import count_summits
+        from icha.surfaces.summits import locate_summits
 
         surface = _read(section)
         moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
         anisotropy, free = slope_anisotropy(surface), surface.free
-        summits, grid = count_summits(surface), surface.grid
+        found, grid = locate_summits(surface), surface.grid
+        unsupported = len(found.unsupported_height)
+        summits = len(found) + unsupported
     return {
         "slope_anisotropy": anisotropy,
         "height_skewness": skewness,
         "height_kurtosis": kurtosis,
         "nayak_parameter": moments.nayak_parameter,
         "nodes_per_short_wave": cells_per_short_wave(grid, summits),
+        "unsupported_summits": unsupported / max(summits, 1),
         "free_edges": float(free),
     }
 

@@ -14,7 +14,7 @@ from icha.configuration.load import load_configuration
 from icha.datasets.campaign import campaign_tree
 from icha.planning.roughness import surface_facts
 from icha.surfaces.moments import cells_per_short_wave, height_statistics, slope_anisotropy, spectral_moments
-from icha.surfaces.summits import count_summits
+from icha.surfaces.summits import locate_summits
 
 
 @pytest.mark.parametrize("adhesive", [False, True])
@@ -34,6 +34,7 @@ INSIDE = {
     "height_skewness": 0.0,
     "height_kurtosis": 3.0,
     "nayak_parameter": 14.0,
+    "unsupported_summits": 0.0,
     "nodes_per_short_wave": 8.0,
     "free_edges": 0.0,
     "full_contact_energy_ratio": 140.0,
@@ -121,12 +122,15 @@ def test_the_range_of_the_validation_is_that_of_its_surfaces():
             surface = icha.SelfAffineSpectrum(*lengths, section.hurst).realise(section.grid, seed)
             skewness, kurtosis = height_statistics(surface)
             energy = surface.full_contact_energy
+            summits = locate_summits(surface)
+            unsupported = len(summits.unsupported_height)
             measured = {
+                "unsupported_summits": unsupported / (len(summits) + unsupported),
                 "slope_anisotropy": slope_anisotropy(surface),
                 "height_skewness": skewness,
                 "height_kurtosis": kurtosis,
                 "nayak_parameter": spectral_moments(surface).nayak_parameter,
-                "nodes_per_short_wave": cells_per_short_wave(section.grid, count_summits(surface)),
+                "nodes_per_short_wave": cells_per_short_wave(section.grid, len(summits) + unsupported),
                 "free_edges": 0,
                 "full_contact_energy_ratio": energy * material.contact_modulus / material.surface_energy,
             }

@@ -18,7 +18,8 @@ from icha.surfaces.moments import (
     radial_power_spectrum,
     ring_edges,
 )
-from icha.surfaces.summits import count_summits
+from icha.surfaces.summit_coverage import SummitCoverage
+from icha.surfaces.summits import Asperities, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
 # The spectrum of a self-affine surface falls at least as q^-2 (its Hurst exponent is not negative), that of
@@ -68,9 +69,20 @@ class ScanResolution:
         return self.used.free or edges_fit(self.used.heights)
 
     @cached_property
+    def asperities(self) -> Asperities:
+        """Summits of the prepared surface, and those that its nodes do not support."""
+        return locate_summits(self.used)
+
+    @property
     def summits(self) -> int:
-        """Number of summits of the prepared surface."""
-        return count_summits(self.used)
+        """Number of summits of the prepared surface, supported or not."""
+        return len(self.asperities) + len(self.asperities.unsupported_height)
+
+    @property
+    def reasons_against_asperities(self) -> list[str]:
+        """Reasons why asperities do not stand for the surface 3 to 1 rms heights above its mean, where contact begins."""
+        heights = np.linspace(3, 1, 5) * self.used.rms_height
+        return SummitCoverage.of(self.used, self.asperities).reasons_against(heights)
 
     @property
     def cells_per_summit(self) -> float:
