@@ -80,7 +80,7 @@ class ScanResolution:
 
     @property
     def reasons_against_asperities(self) -> list[str]:
-        """Reasons why asperities do not stand for the surface 3 to 1 rms heights above its mean, where contact begins."""
+        """Reasons why asperities do not stand for the surface 3 to 1 rms heights above its mean, where it touches."""
         heights = np.linspace(3, 1, 5) * self.used.rms_height
         return SummitCoverage.of(self.used, self.asperities).reasons_against(heights)
 
