@@ -53,8 +53,8 @@ def about_scan(name: str, scan, *, to_scale: bool = True, by_patches: bool = Fal
     )
     if unsupported := len(scan.asperities.unsupported_height):
         yield (
-            f"{name}: {unsupported} of them are left out by asperities, as the nodes around them do not support their "
-            "heights; steps, spikes, pits and plateaus make such summits"
+            f"{name}: asperities leave out {unsupported} of them, which the nodes around do not support, as at steps, "
+            "spikes, pits and plateaus"
         )
     if reasons := scan.reasons_against_asperities:
         yield (
