@@ -34,6 +34,7 @@ from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD
 from icha.path.waypoints import Waypoint
 from icha.support.rules import ALL_MODELS, Integer
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
+from icha.surfaces.summit_coverage import SummitCoverage
 from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
 
@@ -144,8 +145,9 @@ def unfollowed(
 
     Arguments are those of `simulate`.
     """
-    met = _Met([], [], [], reason)
-    return _dataset(surface, material, path, model, seed, met, summit_counts(locate_summits(surface)))
+    met, summits = _Met([], [], [], reason), locate_summits(surface)
+    reasons = SummitCoverage.of(surface, summits).reasons_against([surface.rms_height])
+    return _dataset(surface, material, path, model, seed, met, summit_counts(summits), reasons)
 
 
 def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):

@@ -444,7 +444,8 @@ def _over_seeds(variables, applicable):
     found = {}
     for name in SUMMARISED:
         values, long_name = np.where(applicable, variables[name].values, np.nan), MODEL_ERROR[name].long_name
-        mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=MODEL_ERROR[name].further)
+        further = {"missing": "where no run counts"} | MODEL_ERROR[name].further
+        mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=further)
         # Of no complete run there is no mean.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
