@@ -1,8 +1,8 @@
 """Asperities on surfaces with steps, pits, spikes and plateaus: right within a factor, or marked as not applicable.
 
 Boundary elements, which know nothing of summits, say what is right. A smooth random surface is damaged in one of nine
-ways; some have a window. Five hundred cases are a series of `make random-cases`; `make test-all` takes the first of
-twenty, `make test` the beginning of that.
+ways; some have a window. Ten series have six hundred cases (`--series 0-9`); `make test-all` takes one,
+`make test` a part of the first.
 """
 
 import numpy as np

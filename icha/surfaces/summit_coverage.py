@@ -14,6 +14,9 @@ from icha.surfaces.surface import Surface
 # Largest share of the load, and of the summits, that may be without support before asperities do not stand for the
 # surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
 MAX_SHARE = 0.1
+# Rows and columns between a node and the summit that stands for it: on a crest oblique to the grid there are two nodes
+# higher than their neighbours beside one summit.
+_NEAR = range(-2, 3)
 # Rows of the grid that are examined at a time, which bounds the memory.
 _LINES = 16
 
@@ -24,7 +27,7 @@ class SummitCoverage:
 
     peak_height : (k,) array, heights of the nodes that are not lower than any of their eight neighbours, m. Every node
         of a plateau is one.
-    covered : (k,) array, whether a summit is found within a cell of the node.
+    covered : (k,) array, whether a summit is found within two rows and columns of the node.
     summit_height : (n,) array, heights of the summits, m.
     unsupported_height : (m,) array, heights of the maxima that are left out, as their nodes do not support them, m.
     """
@@ -41,8 +44,8 @@ class SummitCoverage:
         rows, columns = _peaks(surface)
         x, y = np.mod(np.rint(asperities.position / surface.spacing).astype(int), grid).T
         occupied = np.zeros((grid, grid), dtype=bool)
-        for down in (-1, 0, 1):
-            for across in (-1, 0, 1):
+        for down in _NEAR:
+            for across in _NEAR:
                 occupied[(y + down) % grid, (x + across) % grid] = True
         return cls(
             surface.heights[rows, columns],
