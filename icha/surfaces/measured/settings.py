@@ -28,7 +28,6 @@ class Preparation:
     ----------
     format : a name of `READERS`, or "auto".
     boundary : "periodic", "window", "mirror" or "free".
-    columns : numbers, from 1, of the columns x, y and z of a text; None: it has just these.
     data : name of variable, dataset or channel; None: the only one, or the file's own default.
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
     height_unit, lateral_unit : metres; None: as the file says, and the lateral one else that of height.
@@ -40,11 +39,11 @@ class Preparation:
     cutoff : nesting index of the S-filter, m; None: no filter.
     taper : with a window, the part of the side over which heights fall at each edge.
     grid : nodes along a side of the result; None: as the scan.
+    columns : numbers, from 1, of the columns x, y and z of a text; None: it has just these.
     """
 
     format: str
     boundary: str
-    columns: tuple[int, int, int] | None = None
     data: str | None = None
     first_axis: str = "y"
     height_unit: float | None = None
@@ -57,3 +56,4 @@ class Preparation:
     cutoff: float | None = None
     taper: float | None = None
     grid: int | None = None
+    columns: tuple[int, int, int] | None = None

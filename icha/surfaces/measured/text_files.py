@@ -72,14 +72,14 @@ def _columns_of_points(values, how):
     count = values.shape[1]
     columns = how.columns or (1, 2, 3)
     if max(columns) > count:
-        raise UnfitTopography("columns", f"is {list(columns)}, and a line has {count} numbers; expected 1 to {count}")
+        raise UnfitTopography("columns", f"is {list(columns)}, and a line has {count} numbers; allowed: 1 to {count}")
     if how.columns is None and count != 3:
         if not 3 < count < _FEWEST_COLUMNS:
             raise ValueError(f"{count} numbers in a line, not x y z")
         other = ", and no Fourier series, whose opposite waves have conjugate amplitudes" if count == 4 else ""
         raise UnfitTopography(
             "columns",
-            f"is missing, and a line has {count} numbers{other}; expected which are x, y and z, such as [1, 2, 3]",
+            f"is missing, and a line has {count} numbers{other}; allowed: which are x, y and z, such as [1, 2, 3]",
         )
     return values[:, [column - 1 for column in columns]]
 
@@ -91,7 +91,7 @@ def _ticks(values, axis):
     except ValueError as error:
         raise UnfitTopography(
             "path",
-            f"holds points that are not on a regular grid ({error}); expected rows and columns of points. Interpolate "
+            f"holds points that are not on a regular grid ({error}); allowed: rows and columns of points. Interpolate "
             "them onto a grid in the program of the instrument, such as Gwyddion",
         ) from None
 

@@ -128,7 +128,7 @@ def _refuse_damaged_row(heading, found):
 def _not_a_number(field, line, column):
     return UnfitTopography(
         "path",
-        f"has {field[:40]!r} in line {line}, column {column}; expected a number, or NaN where a point is missing. "
+        f"has {field[:40]!r} in line {line}, column {column}; allowed: a number, or NaN where a point is missing. "
         "Correct or remove the line",
     )
 
@@ -147,7 +147,7 @@ def _delimiter(text: str) -> tuple[str | None, bool]:
     if len(by_blanks) > 1 and all(map(_DECIMAL_COMMA.match, by_blanks)):
         raise UnfitTopography(
             "path",
-            f"has commas in {text[:40]!r} that may be decimal or stand between numbers; expected decimal points. "
+            f"has commas in {text[:40]!r} that may be decimal or stand between numbers; allowed: decimal points. "
             "Replace the commas",
         )
     for delimiter in ";,":
@@ -241,7 +241,7 @@ def _read_any(path, layout):
         if len(row) != usual:
             raise UnfitTopography(
                 "path",
-                f"has {len(row)} numbers in line {number} and {usual} in most lines; expected rows of one length. "
+                f"has {len(row)} numbers in line {number} and {usual} in most lines; allowed: rows of one length. "
                 "Complete or remove the line; missing points may be NaN",
             )
     return np.array(rows)
