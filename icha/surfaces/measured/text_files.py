@@ -39,7 +39,7 @@ def _as_instrument_file(path, how, table):
         found = read_instrument(path, how)
     except Exception:  # whatever it raises at texts of other kinds
         return None
-    if found.unit is None or found.heights.shape != table.values.shape:
+    if found.unit is None or found.heights.shape != table.values.shape or np.isnan(table.values).any():
         return None
     scale = np.max(np.abs(found.heights)) / np.max(np.abs(table.values))
     same = np.allclose(found.heights, scale * table.values, rtol=1e-9, atol=1e-9 * np.max(np.abs(found.heights)))
