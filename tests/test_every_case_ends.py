@@ -20,6 +20,8 @@ from icha.equilibrium.interacting_asperities import InteractingAsperities
 
 PERIOD = 100e-6
 CASES_IN_SERIES = 100
+# Of loops with adhesion, which take seconds each, fewer: fifteen series have three hundred.
+STICKY_LOOPS_IN_SERIES = 20
 # Equilibria of one run, with those of its search for stops and events.
 MOST_EQUILIBRIA = 20_000
 # Of the cases of a series, the part that reaches its end at least: odd ones (a third does), and loops (nearly all do).
@@ -226,7 +228,7 @@ def loss_and_rise(run):
 @pytest.mark.hypothesis
 def test_loops_that_gain_energy_or_move_apart_in_loading_are_marked(series):
     @seed(series)
-    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 2), derandomize=False)
+    @settings(max_examples=STICKY_LOOPS_IN_SERIES, derandomize=False)
     @given(sticky_loops())
     def are_marked(case):
         with warnings.catch_warnings():
