@@ -33,6 +33,8 @@ def is_instrument_text(path: Path) -> bool:
             return file.format() not in _OF_ANY_TEXT
     except CannotDetectFileFormat:
         return False
+    except Exception:  # a damaged file of a format that it knows; reading it gives the message
+        return True
 
 
 def read_instrument(path: Path, how: Preparation) -> Found:
