@@ -25,8 +25,8 @@ from icha.publication.environment import differences
 from icha.publication.source import PROGRAM
 from icha.publication.strangers_files import Found, unpack
 from icha.support.checksums import sha256_of
-from icha.support.hdf5 import refuse_traps
 from icha.support.in_words import counted
+from icha.support.input_files import refuse_traps
 from icha.support.program import own_workflow, package_of
 from icha.support.values import NAME_PATTERN
 
