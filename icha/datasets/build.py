@@ -1,12 +1,19 @@
 """The builder of datasets: values by name, and a table of the vocabulary that describes them."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from icha.datasets.variables.terms import Table, Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Lower and upper edge of a bin, as CF has bounds.
+BOUND = "bound"
 
 
 def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
@@ -23,6 +30,8 @@ def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> 
     ValueError
         If a value has no description.
     """
+    import xarray as xr  # which takes a while, and the vocabulary needs no more than `bin_table`
+
     variables = described(table, values)
     coordinates = {name: variables.pop(name) for name in table if name in variables and table[name].coordinate}
     return xr.Dataset(variables, coordinates, attrs)
@@ -37,6 +46,8 @@ def described(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]
 
 def variable(description: Variable, values: Any) -> xr.Variable:
     """A variable with the dimensions, type and attributes of its description."""
+    import xarray as xr
+
     dtype = object if description.dtype is str else description.dtype
     return xr.Variable(description.dims, np.asarray(values, dtype), description.attributes)
 
@@ -70,10 +81,6 @@ def joined(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: 
     names = [name for name, own in table.items() if own.dims == (dim,) and name != index]
     values = {name: np.concatenate([np.empty(0), *(row[name] for row in rows)]) for name in names}
     return values | {index: np.repeat(np.arange(len(rows)), [len(row[names[0]]) for row in rows])}
-
-
-# Lower and upper edge of a bin, as CF has bounds.
-BOUND = "bound"
 
 
 def bin_table(quantity: str, units: str, over: str = "") -> Table:
