@@ -17,8 +17,8 @@ import pytest
 import yaml
 from reproduced import caller, lock
 
-from icha.publication.deposit_files import verify_deposit, whole_deposit
-from icha.publication.rerun import Refused, environment_target
+from icha.deposit.deposit_files import verify_deposit, whole_deposit
+from icha.deposit.rerun import Refused, environment_target
 
 NAME = "mine-1.0.0"
 # Nothing is isolated, so that a test can plant something; `LC_` is a beginning of names that are passed on.
