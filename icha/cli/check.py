@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import FAILED, WRONG, say
-from icha.publication.deposit_files import CHECKSUMS
+from icha.deposit.deposit_files import CHECKSUMS
 from icha.support.in_words import counted, printable
 
 # What of a campaign is no netCDF file, by its name.

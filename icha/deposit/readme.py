@@ -20,13 +20,13 @@ from icha.datasets.attributes import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
+from icha.deposit.attributes import acknowledgement
+from icha.deposit.citation import paragraphs, web_address
+from icha.deposit.deposit_files import COMPUTED
+from icha.deposit.dictionary import Entry
+from icha.deposit.licences import Licence
 from icha.planning.costs import Cost
 from icha.planning.software import further_software
-from icha.publication.attributes import acknowledgement
-from icha.publication.citation import paragraphs, web_address
-from icha.publication.deposit_files import COMPUTED
-from icha.publication.dictionary import Entry
-from icha.publication.licences import Licence
 from icha.support import in_words
 
 _TEMPLATE = "README.md.jinja"
