@@ -8,11 +8,12 @@ import numpy as np
 
 from icha.support import in_words
 from icha.support.in_words import printable
-from icha.support.input_files import TooLarge, bounded_memory, is_hdf5, refuse_traps
+from icha.support.input_files import RefusedFile, bounded_memory, is_hdf5, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
 from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
+from icha.surfaces.measured.text_tables import SourceFile
 
 READERS = {
     "npy": read_npy,
@@ -61,10 +62,7 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     """Read a file of any of the formats; errors as `icha.surfaces.measured.topography.prepared_topography`."""
     if not path.stat().st_size:
         raise UnfitTopography("path", "is empty; allowed: a file of heights")
-    name = how.format
-    if name == "auto":
-        name = "xyz" if how.columns else format_of(path)
-    found = _read(path, name, how)
+    name, found = _read(path, how)
     unit = how.height_unit or found.unit
     if unit is None:
         raise UnfitTopography("height_unit", "is missing, and the file does not say it; allowed: such as 'um'")
@@ -89,17 +87,26 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     return scan
 
 
-def _read(path, name, how):
-    """What the reader of a format finds, if that are heights."""
+def _read(path, how):
+    """The format of a file, and what its reader finds, if that are heights."""
+    file, name = SourceFile(path), how.format
     try:
-        if name in _LIBRARIES:
-            importlib.import_module(_LIBRARIES[name])
         with bounded_memory():
-            _refuse_traps(path)
-            found = READERS[name](path, how)
+            refuse_traps(path)
+            if name == "auto":
+                name = "xyz" if how.columns else _format_of(path)
+            library = _LIBRARIES.get(name)
+            if name in ("text", "matrix") and (file.layout is None or file.layout.heading):
+                library = "SurfaceTopography"
+        if library is not None:
+            importlib.import_module(library)
+        with bounded_memory():
+            if name == "text":
+                name = format_of_text(file) or "instrument"
+            found = READERS[name](file, how)
     except UnfitTopography:
         raise
-    except TooLarge as error:
+    except RefusedFile as error:
         raise UnfitTopography("path", str(error)) from None
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
         raise UnfitTopography(
@@ -113,20 +120,9 @@ def _read(path, name, how):
     if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
         # Two columns are x and z.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
-    if heights.ndim != 2:
+    if heights.ndim != 2 or not heights.size:
         raise UnfitTopography("path", f"holds an array of shape {heights.shape}; allowed: rows and columns of heights")
-    if not heights.size:
-        raise UnfitTopography(
-            "path", f"holds an array of shape {heights.shape}, no heights; allowed: a file of heights"
-        )
-    return found
-
-
-def _refuse_traps(path):
-    try:
-        refuse_traps(path)
-    except ValueError as error:
-        raise UnfitTopography("path", str(error)) from None
+    return name, found
 
 
 def _own_reason(error):
@@ -138,14 +134,12 @@ def _own_reason(error):
     return f" ({error})" if own else ""
 
 
-def format_of(path: Path) -> str:
-    """The format that a file has by the ending of its name and, if it is text, by its columns."""
+def _format_of(path: Path) -> str:
+    """The format that a file has by its name or, if it is HDF5, by what is in it; else "text", which may be others."""
     suffix = path.suffix.lower()
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:
         return known[suffix]
     if is_hdf5(path):
         return format_of_hdf5(path)
-    if path.name.lower().endswith(".xyz.gz"):
-        return "xyz"
-    return format_of_text(path) or "instrument"
+    return "xyz" if path.name.lower().endswith(".xyz.gz") else "text"
