@@ -1,7 +1,7 @@
 """A scan in metres: what a file of any format says, with units and size."""
 
 import importlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,12 +33,13 @@ class Scan:
     """What a file says in metres: heights (ny, nx), nan where missing, first axis y, and the size (x, y) of it all.
 
     coordinate_unit: metres, where the size follows from coordinates whose unit the file does not tell. format: as
-    which the file was read. data: name of the array or channel that was taken, empty if the file has only one.
+    which the file was read. data: name of the array or channel that was taken, empty if the file has only one. steps:
+    what was read and done, in words.
     """
 
     heights: np.ndarray
     size: tuple[float, float]
-    description: str = ""
+    steps: tuple[str, ...] = ()
     coordinate_unit: float | None = None
     format: str = ""
     data: str = ""
@@ -48,6 +49,10 @@ class Scan:
         """Distance of neighbouring nodes along x and along y, m."""
         rows, columns = self.heights.shape
         return self.size[0] / columns, self.size[1] / rows
+
+    def after(self, heights: np.ndarray, *said: str, size: tuple[float, float] | None = None) -> "Scan":
+        """The scan with other heights after a step, what is to be said about it, and another size if it has one."""
+        return replace(self, heights=heights, size=size or self.size, steps=(*self.steps, *said))
 
     @property
     def remark_on_unit(self) -> str:
@@ -79,7 +84,7 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     if found.data:
         said += f", data {printable(found.data)} of several"
     format_ = f"{name} ({found.format})" if name == "instrument" else name
-    scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit, format_, found.data)
+    scan = Scan(found.heights.astype(float) * unit, tuple(size), (said,), coordinate_unit, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
         raise UnfitTopography(
             "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; allowed: give it here"
