@@ -20,12 +20,12 @@ from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning import costs
 from icha.planning.roughness import measured_roughness
-from icha.references.error_sources.variants import error_sources
 from icha.references.finite_range import finite_range_solution
 from icha.references.finite_range_loops import finite_range_loop
 from icha.simulation import simulate
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import spectral_moments
+from validation.error_sources.variants import error_sources
 
 PERIOD, RANGE, MODULUS = 100e-6, 2.071e-9, 25e6
 TOPOGRAPHIES = Path(__file__).resolve().parents[1] / "config/topographies"

@@ -2,9 +2,8 @@
 
 import itertools
 
-from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
-from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, number_label
+from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
@@ -30,22 +29,10 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
     ]
 
 
-def source_cases(campaign: Campaign) -> list[ContactLabels]:
-    """All studies of the sources of the model's error, entry by entry."""
-    return _cases(campaign, campaign.error_sources)
-
-
 def loop_cases(campaign: Campaign) -> list[ContactLabels]:
     """All boundary elements both ways of a campaign, entry by entry."""
-    return _cases(campaign, campaign.boundary_element_loops)
-
-
-def _cases(campaign: Campaign, entries: dict[str, BesideStudy]) -> list[ContactLabels]:
-    return [ContactLabels(label, *contact) for label, entry in entries.items() for contact in campaign.solved(entry)]
-
-
-def asperity_cases(campaign: Campaign) -> dict[str, float | None]:
-    """Names of the comparisons of one asperity, and their Tabor parameters; None is Hertz's contact."""
-    if campaign.one_asperity is None:
-        return {}
-    return {"hertz": None} | {f"mu{number_label(mu)}": mu for mu in campaign.one_asperity.tabor_parameters}
+    return [
+        ContactLabels(label, *contact)
+        for label, entry in campaign.boundary_element_loops.items()
+        for contact in campaign.solved(entry)
+    ]

@@ -14,6 +14,12 @@ from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 # Of what is wrong with a configuration so much is told at once.
 MOST_TOLD = 50
+# Keys that campaigns no longer have, and what is there instead.
+_GONE = {
+    "error_sources": "is no section of a campaign; instead: `python -m validation.error_sources` in a clone",
+    "one_asperity": "is no section of a campaign; instead: `python -m validation.one_asperity` in a clone",
+    "fig12_error_sources": "is no figure of a campaign; instead: `python -m validation.error_sources` in a clone",
+}
 
 
 class ConfigurationError(ValueError):
@@ -48,6 +54,8 @@ def problem_of(details: Mapping, content: Mapping) -> Problem:
     if kind == "extra_forbidden":
         section = _section_at(location[:-1], content)
         allowed = sorted(section.model_fields) if section else []
+        if (gone := _GONE.get(location[-1])) is not None:
+            return location, NOTHING, gone
         near = difflib.get_close_matches(str(location[-1]), allowed, 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
         return location, NOTHING, f"unknown key{hint}; allowed: {', '.join(allowed)}"

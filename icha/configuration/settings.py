@@ -42,12 +42,6 @@ def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
     return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
 
 
-def source_settings(campaign: Campaign, case: ContactLabels) -> dict:
-    """Everything but the topography that determines a study of the sources of the error, in SI units."""
-    entry = campaign.error_sources[case.entry]
-    return _solver_settings(campaign, entry, case) | {"reduced_pressures": entry.reduced_pressures}
-
-
 def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
     """Everything but the topography that determines boundary elements both ways, in SI units."""
     entry = campaign.boundary_element_loops[case.entry]

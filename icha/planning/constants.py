@@ -129,10 +129,6 @@ class FiniteRange:
     """A load on 256 nodes a side with adhesion; s."""
     loop_step: float = 0.76
     """A step of a way there and back, in loads."""
-    sources: float = 0.066
-    """Sources of the error at a load, in loads."""
-    asperity: float = 240
-    """One asperity on 800 nodes a side; s."""
 
 
 @dataclass(frozen=True)

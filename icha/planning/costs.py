@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from icha.datasets.storage import COMPRESSED_SIZES, LEFT_IN_FILE
 from icha.path.limits import DEFAULT_STEP
-from icha.planning.constants import FITTED, Constants, MiB
+from icha.planning.constants import FITTED, Constants
 from icha.support.parallel import LARGE_GRID
 from icha.surfaces.moments import summit_density
 
@@ -237,20 +237,6 @@ def loop_cost(nodes: int, separation_step: float, of: Constants = FITTED, *, adh
     steps = 7 / separation_step + (35 if adhesive else 0)
     seconds = of.finite_range.run + of.finite_range.loop_step * steps * _solver(nodes, 0.01, of, adhesive)
     return Cost(seconds, of.workflow.forked + 20 * _DOUBLE * nodes**2, 33e3)
-
-
-def sources_cost(nodes: int, reduced_pressures: Sequence[float], of: Constants = FITTED, *, adhesive: bool) -> Cost:
-    """Sources of the model's error: some variants of the model and of boundary elements at every load."""
-    here = of.finite_range
-    each = sum(0.2 + here.sources * _solver(nodes, load, of, adhesive) for load in reduced_pressures)
-    return Cost(here.run + 0.7 + each, of.workflow.forked + 25 * MiB + 20 * _DOUBLE * nodes**2, 28e3)
-
-
-def one_asperity_cost(tabor_parameter: float | None, of: Constants = FITTED) -> Cost:
-    """One asperity by model and boundary elements, whose nodes a side grow with the square of the Tabor parameter."""
-    nodes = 800 * ((tabor_parameter or 1.5) / 4) ** 2
-    seconds = of.finite_range.run + 2.0 + of.finite_range.asperity * (nodes / 800) ** 3
-    return Cost(seconds, of.workflow.forked + 20 * _DOUBLE * nodes**2, 23e3)
 
 
 def theories_cost(of: Constants = FITTED) -> Cost:

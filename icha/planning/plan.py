@@ -139,15 +139,6 @@ def _computed(campaign, results, files, of) -> Iterator[Item]:
         costs.loop_cost,
         lambda entry, case: entry.separation_step,
     )
-    yield from beside(
-        "error sources",
-        campaign.error_sources,
-        files.error_sources,
-        costs.sources_cost,
-        lambda entry, case: tuple(entry.reduced_pressures),
-    )
-    for path, tabor_parameter in files.one_asperity.items():
-        yield there("one asperity", path, costs.one_asperity_cost(tabor_parameter, of))
 
 
 def _gathered(

@@ -7,21 +7,21 @@ import xarray as xr
 import icha
 from icha.asperity.jkr import JKR
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.figures import fig12_error_sources
 from icha.path.follow import follow
-from icha.references.error_sources.chain import (
+from icha.references.finite_range import NodalState, contact_state, perimeter_correction
+from icha.surfaces.summits import Asperities, find_summits
+from validation.error_sources import figure
+from validation.error_sources.chain import (
     CATEGORIES,
     chain,
     effects,
     shape_ratio,
     shape_ratio_of_fourth_order,
 )
-from icha.references.error_sources.paraboloids import fourth_order_terms, paraboloids, summit_curvatures
-from icha.references.error_sources.spot_by_spot import contact_patches, match
-from icha.references.error_sources.variants import error_sources
-from icha.references.error_sources.without_unions import Discs, discs_apart, independent_discs, union_area_fraction
-from icha.references.finite_range import NodalState, contact_state, perimeter_correction
-from icha.surfaces.summits import Asperities, find_summits
+from validation.error_sources.paraboloids import fourth_order_terms, paraboloids, summit_curvatures
+from validation.error_sources.spot_by_spot import contact_patches, match
+from validation.error_sources.variants import error_sources
+from validation.error_sources.without_unions import Discs, discs_apart, independent_discs, union_area_fraction
 
 HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)
 LAW = JKR(HARD)
@@ -298,7 +298,7 @@ def test_odd_refinements_are_refused(surface):
 
 
 def test_figure_shows_the_ratios(sources):
-    drawn = fig12_error_sources.figure([sources.assign(seed=4), sources])
+    drawn = figure.figure([sources.assign(seed=4), sources])
     areas = drawn.axes[0]
     black = next(line for line in areas.get_lines() if line.get_color() == "#000000" and len(line.get_xdata()) == 3)
     area = sources["contact_area_fraction"]
@@ -309,15 +309,15 @@ def test_figure_shows_the_ratios(sources):
 
 def test_figure_refuses_what_cannot_be_averaged(sources):
     with pytest.raises(ValueError, match="no dataset"):
-        fig12_error_sources.figure([])
+        figure.figure([])
     with pytest.raises(ValueError, match="reduced pressures"):
-        fig12_error_sources.figure([sources, sources.isel(reduced_pressure=[0, 1])])
+        figure.figure([sources, sources.isel(reduced_pressure=[0, 1])])
     with pytest.raises(ValueError, match="adhesion"):
-        fig12_error_sources.figure([sources.assign(surface_energy=1.0)])
+        figure.figure([sources.assign(surface_energy=1.0)])
 
 
 def test_medians_of_equally_filled_bins():
     x = np.arange(80.0)
-    at, middle = fig12_error_sources.medians(x[::-1], np.where(x < 50, np.nan, 3.0)[::-1])
+    at, middle = figure.medians(x[::-1], np.where(x < 50, np.nan, 3.0)[::-1])
     assert at == pytest.approx(np.arange(8) * 10 + 4.5)
     assert middle == pytest.approx([np.nan] * 5 + [3.0] * 3, nan_ok=True)

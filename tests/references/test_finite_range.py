@@ -19,9 +19,10 @@ from icha.references.finite_range import (
     perimeter_correction,
     states_at_mean_separations,
 )
-from icha.references.one_asperity import hertz_asperity, one_asperity, paraboloid
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
+from validation.one_asperity import hertz_asperity, one_asperity
+from validation.surfaces import paraboloid
 
 HERTZ = MATERIALS["hertz"]
 

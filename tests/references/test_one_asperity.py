@@ -12,7 +12,8 @@ from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
 from icha.asperity.material import Material
 from icha.datasets.files import read_dataset, write_dataset
 from icha.references.finite_range import contact_state, perimeter_correction, states_at_mean_separations
-from icha.references.one_asperity import hertz_asperity, one_asperity, paraboloid, resolving_grid
+from validation.one_asperity import hertz_asperity, one_asperity, resolving_grid
+from validation.surfaces import paraboloid
 
 PERIOD = 10.0
 

@@ -7,7 +7,7 @@ from scipy.integrate import quad
 from icha import Material
 from icha.asperity.jkr import JKR
 from icha.half_space.interaction import displacement_at
-from icha.references.short_range.closed_forms import (
+from validation.closed_forms import (
     IMAGES_CUBED,
     CrackInTrough,
     PennyCrack,
