@@ -6,18 +6,22 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.options import Config, Cores, Folder, core_count
 from icha.cli.project import (
+    Config,
+    Cores,
+    Folder,
     Mistake,
     configuration_path,
+    core_count,
+    markup,
     profile_settings,
     project,
     read_configuration,
+    say,
     shown,
     workflow_folder,
 )
 from icha.cli.scans import about_scan, check_picture, draw_scans
-from icha.cli.terminal import markup, say
 from icha.support import in_words
 from icha.support.in_words import counted
 
@@ -89,12 +93,12 @@ def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: 
     """
     from rich.console import Console
 
+    from icha.deposit.licences import licence_problem
     from icha.planning.belonging import belongs_to_another
     from icha.planning.needs import wanting
     from icha.planning.plan import plan
     from icha.planning.software import missing_software
     from icha.planning.validity import expected_validity
-    from icha.publication.licences import licence_problem
     from icha.support.checksums import damaged
 
     results = home / "results" / campaign.name

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import Mistake
-from icha.cli.terminal import say
+from icha.cli.project import Mistake, say
 from icha.support.in_words import counted
 
 
@@ -35,7 +34,7 @@ def explore(
     file and needs no network. What does not fit into it is left out and counted.
     """
     from icha.datasets.results import EXPLORER
-    from icha.publication.deposit_files import CHECKSUMS
+    from icha.deposit.deposit_files import CHECKSUMS
     from icha.report.explorer import NothingToExplore, write_explorer
 
     if not results.is_dir():

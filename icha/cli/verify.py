@@ -6,11 +6,9 @@ from typing import Annotated
 import typer
 
 from icha.cli.deposits import flaws_of, listed
-from icha.cli.options import Large
-from icha.cli.project import FAILED
-from icha.cli.terminal import say
+from icha.cli.project import FAILED, Large, say
 from icha.support import in_words
-from icha.support.printable import printable
+from icha.support.in_words import printable
 
 
 def verify(
@@ -24,7 +22,7 @@ def verify(
 
     Exit status: 0 if it is whole, 1 if not (the first hundred flaws are printed), 2 if there is no such file or folder.
     """
-    from icha.publication.deposit_files import whole_deposit
+    from icha.deposit.deposit_files import whole_deposit
 
     if problems := flaws_of(deposit, large=large):
         say(listed(problems))

@@ -9,16 +9,18 @@ from pydantic import BaseModel
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SURFACE_KINDS
-from icha.support.printable import printable
+from icha.support.in_words import printable
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 # Of what is wrong with a configuration so much is told at once.
 MOST_TOLD = 50
-# Keys that campaigns no longer have, and what is there instead.
-_GONE = {
-    "error_sources": "is no section of a campaign; instead: `python -m validation.error_sources` in a clone",
-    "one_asperity": "is no section of a campaign; instead: `python -m validation.one_asperity` in a clone",
-    "fig12_error_sources": "is no figure of a campaign; instead: `python -m validation.error_sources` in a clone",
+# Keys of older versions, by the model of their section: why each is refused, and what is allowed in its place.
+_FORMER_KEYS = {
+    ("Campaign", "boundary_elements"): "is now `finite_range`; allowed: the same section by that name (`models: "
+    "[boundary_elements]` of a study keeps its name)",
+    ("Campaign", "error_sources"): "is no longer a section; allowed: `make error-sources` in a clone",
+    ("Campaign", "one_asperity"): "is no longer a section; allowed: `python -m validation.one_asperity` in a clone",
+    ("Figures", "fig12_error_sources"): "is no longer a figure of campaigns; allowed: `make error-sources` in a clone",
 }
 
 
@@ -53,9 +55,9 @@ def problem_of(details: Mapping, content: Mapping) -> Problem:
         return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
     if kind == "extra_forbidden":
         section = _section_at(location[:-1], content)
+        if section and (former := _FORMER_KEYS.get((section.__name__, location[-1]))):
+            return location, NOTHING, former
         allowed = sorted(section.model_fields) if section else []
-        if (gone := _GONE.get(location[-1])) is not None:
-            return location, NOTHING, gone
         near = difflib.get_close_matches(str(location[-1]), allowed, 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
         return location, NOTHING, f"unknown key{hint}; allowed: {', '.join(allowed)}"

@@ -12,7 +12,7 @@ from icha.figures.options import ComparedFigure, campaign_and_model_error
 DECLARATION = Declaration(
     description=(
         "Relative error of contact area and mean separation against boundary elements. The study needs both `models`, "
-        "or an entry of `boundary_elements`."
+        "or an entry of `finite_range`."
     ),
     caption=(
         "Error of the model: contact area and mean separation of interacting asperities divided by those of boundary "

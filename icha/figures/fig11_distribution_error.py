@@ -12,7 +12,7 @@ from icha.figures.options import ComparedFigure, campaign_and_model_error
 DECLARATION = Declaration(
     description=(
         "Distance of the distributions of pressure and gap, and of the contact map, from those of boundary elements. "
-        "The study needs both `models`, or an entry of `boundary_elements`."
+        "The study needs both `models`, or an entry of `finite_range`."
     ),
     caption=(
         "Difference between the states of interacting asperities and those of boundary elements, on the same "

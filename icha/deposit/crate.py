@@ -1,0 +1,430 @@
+"""The deposit as a Provenance Run RO-Crate: what every file is, and which job made it from what.
+
+Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Provenance Run Crate 0.5
+(https://w3id.org/ro/wfrun/provenance/0.5), with those that it builds on.
+
+A job has no times here, and nobody who ran it: the same data have the same crate, whenever and by whomever they are
+made.
+"""
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
+from importlib.metadata import version
+from pathlib import Path, PurePosixPath
+from typing import Any, NamedTuple
+from urllib.parse import quote
+
+from rocrate.model import ContextEntity, Dataset, Entity, File
+from rocrate.rocrate import ROCrate
+
+from icha.configuration.publication import Author, Publication
+from icha.datasets.attributes import MODEL_PAPER
+from icha.datasets.results import CONFIGURATION
+from icha.deposit.citation import web_address
+from icha.deposit.deposit_files import CRATE, README, SOURCE
+from icha.deposit.licences import known_licence
+from icha.support.atomic_files import whole_file
+
+_PROGRAM = f"{SOURCE}/"
+WORKFLOW = f"{_PROGRAM}Snakefile"
+LOCK = f"{_PROGRAM}uv.lock"
+PROGRAM_LICENCE = f"{_PROGRAM}LICENSE"
+
+_RUN_PROFILES = {
+    "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
+    "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
+    "https://w3id.org/ro/wfrun/provenance/0.5": ("Provenance Run Crate", "0.5"),
+}
+_WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
+_BIOSCHEMAS = "https://bioschemas.org/profiles"
+# Of the run crates' own terms, the one that is used here (https://w3id.org/ro/terms/workflow-run/context).
+_TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
+_COMPLETED = "http://schema.org/CompletedActionStatus"
+# What IANA calls the formats of a deposit's files; netCDF has no name there but one that is in use.
+_FORMATS = {
+    ".bib": "application/x-bibtex",
+    ".cff": "application/yaml",
+    ".csv": "text/csv",
+    ".html": "text/html",
+    ".json": "application/json",
+    ".jsonl": "application/jsonl",
+    ".lock": "application/toml",
+    ".md": "text/markdown",
+    ".nc": "application/netcdf",
+    ".pdf": "application/pdf",
+    ".png": "image/png",
+    ".py": "text/x-python",
+    ".smk": "text/plain",
+    ".svg": "image/svg+xml",
+    ".toml": "application/toml",
+    ".tsv": "text/tab-separated-values",
+    ".txt": "text/plain",
+    ".yaml": "application/yaml",
+    ".yml": "application/yaml",
+    "": "text/plain",
+}
+# Publications are cited; what is not one is used or mentioned.
+_PUBLICATIONS = (
+    "Book",
+    "BookChapter",
+    "ConferencePaper",
+    "Dissertation",
+    "JournalArticle",
+    "Preprint",
+    "Report",
+    "Text",
+)
+
+
+class Job(NamedTuple):
+    """What one job did; its files are named as they lie in the deposit.
+
+    Attributes
+    ----------
+    rule : name of the rule of the workflow.
+    inputs, outputs : files read and written; at least one is written.
+    parameters : names and values of its settings.
+    description : what its program does.
+    script : its program.
+    """
+
+    rule: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: tuple[tuple[str, str], ...]
+    description: str
+    script: str
+
+
+def write_crate(
+    folder: Path,
+    publication: Publication,
+    jobs: Iterable[Job],
+    *,
+    campaign: str,
+    revision: str,
+    checksums: Mapping[str, str],
+) -> None:
+    """Write the deposit's `ro-crate-metadata.json`.
+
+    Parameters
+    ----------
+    folder : the deposit; all files of `checksums` are there.
+    publication : what the deposit says of itself; complete.
+    jobs : those that made the results, in any order.
+    campaign : its name.
+    revision : the state of the program, the source of which is in `source/`.
+    checksums : sha256 of every file, hexadecimal, by its path in the deposit.
+
+    Raises
+    ------
+    ValueError
+        If a job names a file that is not in the deposit, if two jobs made the same file, or if files are made from
+        each other.
+    """
+    sizes = {path: (Path(folder) / path).stat().st_size for path in checksums}
+    metadata = crate_metadata(publication, jobs, campaign=campaign, revision=revision, checksums=checksums, sizes=sizes)
+    with whole_file(Path(folder) / CRATE) as part:
+        part.write_text(json.dumps(metadata, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def crate_metadata(
+    publication: Publication,
+    jobs: Iterable[Job],
+    *,
+    campaign: str,
+    revision: str,
+    checksums: Mapping[str, str],
+    sizes: Mapping[str, int],
+) -> dict[str, Any]:
+    """The content of `ro-crate-metadata.json`; arguments and errors as of `write_crate`, `sizes` in bytes."""
+    jobs = sorted(jobs, key=lambda job: job.outputs)
+    steps = _steps(jobs, checksums)
+    crate = ROCrate()
+    crate.metadata.extra_terms.update(_TERMS)
+    crate.metadata["conformsTo"] = [{"@id": crate.metadata.PROFILE}, {"@id": _WORKFLOW_PROFILE}]
+    _describe(crate, publication, campaign)
+
+    shown = {path for path in checksums if not path.startswith(_PROGRAM)}
+    shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in steps)} & set(checksums)
+    files = {path: _add_file(crate, path, sizes[path], checksums[path]) for path in sorted(shown)}
+    _add_source(crate, files, revision)
+    engine = _engine(crate)
+    workflow = _describe_workflow(crate, files, engine, revision, steps)
+    made = {path for job in jobs for path in job.outputs}
+    given = sorted({path for job in jobs for path in job.inputs} - made | {CONFIGURATION})
+    run = _add(
+        crate,
+        "#campaign",
+        "CreateAction",
+        name=f"Campaign {campaign}",
+        description=publication.title,
+        instrument=workflow,
+        object=[files[path] for path in given],
+        result=[files[path] for path in sorted(made)],
+        actionStatus=_COMPLETED,
+    )
+    actions, controls = [], []
+    for job in jobs:
+        action, control = _add_job(crate, job, files)
+        actions.append(action)
+        controls.append(control)
+    _add(
+        crate,
+        "#organised",
+        "OrganizeAction",
+        name=f"Campaign {campaign}, organised by {engine['name']}",
+        instrument=engine,
+        object=controls,
+        result=run,
+        actionStatus=_COMPLETED,
+    )
+    _set(crate.root_dataset, mainEntity=workflow)
+    crate.root_dataset.append_to("mentions", [run, *actions])
+    if README in files:
+        _set(files[README], about=crate.root_dataset)
+    return crate.metadata.generate()
+
+
+def _steps(jobs: Sequence[Job], checksums: Mapping[str, str]) -> list[Job]:
+    """A job of every rule, in an order in which they can be run, after a look at whether the jobs make sense."""
+    if not jobs:
+        raise ValueError("no job: the deposit has no results whose origin could be told")
+    named = [(path, job) for job in jobs for path in (*job.inputs, *job.outputs, job.script)]
+    for path, job in [*named, (CONFIGURATION, jobs[0])]:
+        if path not in checksums:
+            raise ValueError(f"{path}: a file of rule {job.rule} ({job.outputs[0]}) is not in the deposit")
+    twice = [path for path, times in Counter(path for job in jobs for path in job.outputs).items() if times > 1]
+    if twice:
+        raise ValueError(f"{twice[0]}: is made by more than one job")
+    maker = {path: job for job in jobs for path in job.outputs}
+    before = {job.outputs[0]: {maker[path].outputs[0] for path in job.inputs if path in maker} for job in jobs}
+    depth: dict[str, int] = {}
+    latest: dict[str, int] = {}
+    try:
+        for output in TopologicalSorter(before).static_order():
+            depth[output] = 1 + max((depth[earlier] for earlier in before[output]), default=0)
+            rule = maker[output].rule
+            latest[rule] = max(latest.get(rule, 0), depth[output])
+    except CycleError as error:
+        raise ValueError(f"{error.args[1][0]}: is made from itself") from error
+    first = {job.rule: job for job in reversed(jobs)}
+    return [first[rule] for rule in sorted(latest, key=lambda rule: (latest[rule], rule))]
+
+
+def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
+    """What the publication says of the whole."""
+    licence = known_licence(publication.license)
+    profiles = [
+        _add(crate, address, "CreativeWork", name=name, version=number)
+        for address, (name, number) in _RUN_PROFILES.items()
+    ]
+    profiles.append(_add(crate, _WORKFLOW_PROFILE, "CreativeWork", name="Workflow RO-Crate", version="1.0"))
+    funders, grants = _funding(crate, publication)
+    _set(
+        crate.root_dataset,
+        name=publication.title,
+        alternateName=f"{campaign}-{publication.version}",
+        description=publication.summary,
+        datePublished=publication.date,
+        version=publication.version,
+        license=_add(crate, licence.address, "CreativeWork", name=licence.name, identifier=licence.identifier),
+        author=[_add_author(crate, author) for author in publication.authors],
+        conformsTo=profiles,
+        keywords=publication.keywords,
+        identifier=publication.doi and web_address(publication.doi),
+        funder=funders,
+        funding=grants,
+    )
+    related: dict[str, list[Entity]] = {"citation": [_add_paper(crate)]}
+    for each in publication.related_identifiers:
+        cited = each.resource is None or each.resource in _PUBLICATIONS
+        key = "isBasedOn" if each.relation == "IsDerivedFrom" else "citation" if cited else "mentions"
+        # A dataset, too, is no more than a work here: what is called a Dataset is part of the crate.
+        kind = "ScholarlyArticle" if each.resource in _PUBLICATIONS else "CreativeWork"
+        address = web_address(each.identifier)
+        related.setdefault(key, []).append(_add(crate, address, kind, name=each.identifier, identifier=address))
+    _set(crate.root_dataset, **related)
+
+
+def _add_author(crate: ROCrate, author: Author) -> Entity:
+    if not author.is_person:
+        return _add_organisation(crate, author.name, author.ror)
+    person = _add(
+        crate,
+        author.orcid_address or f"#person/{quote(author.full_name)}",
+        "Person",
+        name=author.full_name,
+        givenName=author.given_names,
+        familyName=author.family_names,
+    )
+    if author.affiliation:
+        _set(person, affiliation=_add_organisation(crate, author.affiliation, author.ror))
+    return person
+
+
+def _add_paper(crate: ROCrate) -> Entity:
+    """The paper of the model."""
+    people = []
+    for given, family in MODEL_PAPER.authors:
+        # Whoever wrote the paper may have made the data, too.
+        key = f"#person/{quote(f'{given} {family}')}"
+        names = {"name": f"{given} {family}", "givenName": given, "familyName": family}
+        people.append(crate.dereference(key) or _add(crate, key, "Person", **names))
+    described = {"name": MODEL_PAPER.title, "author": people, "datePublished": str(MODEL_PAPER.year)}
+    return _add(crate, MODEL_PAPER.address, "ScholarlyArticle", **described)
+
+
+def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
+    return _add(crate, address or f"#organisation/{quote(name)}", "Organization", name=name, url=address)
+
+
+def _funding(crate: ROCrate, publication: Publication) -> tuple[list[Entity], list[Entity]]:
+    """Funders, and their grants where they are named."""
+    funders, grants = {}, {}
+    for each in publication.funding:
+        funder = _add_organisation(crate, each.funder, each.funder_id and web_address(each.funder_id))
+        funders[funder.id] = funder
+        award = each.award_number or each.award_title
+        if award:
+            grant = _add(
+                crate,
+                web_address(each.award_url) if each.award_url else f"#grant/{quote(each.funder)}/{quote(award)}",
+                "Grant",
+                name=each.award_title or award,
+                identifier=award,
+                funder=funder,
+            )
+            grants[grant.id] = grant
+    return list(funders.values()), list(grants.values())
+
+
+def _add_file(crate: ROCrate, path: str, size: int, sha256: str) -> File:
+    known = _FORMATS.get(PurePosixPath(path).suffix, "application/octet-stream")
+    properties = {"name": path, "contentSize": str(size), "sha256": sha256, "encodingFormat": known}
+    return crate.add(File(crate, dest_path=path, properties=properties))
+
+
+def _add_source(crate: ROCrate, files: Mapping[str, File], revision: str) -> None:
+    """The folder with the source, of which only some files are shown."""
+    _set(
+        crate.add(Dataset(crate, dest_path=_PROGRAM)),
+        name="Source of the workflow and of its program",
+        version=revision,
+        identifier=revision,
+        hasPart=[file for path, file in files.items() if path.startswith(_PROGRAM)],
+    )
+
+
+def _engine(crate: ROCrate) -> Entity:
+    """Snakemake, in the version that is installed."""
+    number = version("snakemake")
+    return _add(
+        crate,
+        "#snakemake",
+        ["SoftwareApplication", "ComputerLanguage"],
+        name=f"Snakemake {number}",
+        url="https://snakemake.github.io",
+        identifier="https://w3id.org/workflowhub/workflow-ro-crate#snakemake",
+        version=number,
+    )
+
+
+def _describe_workflow(
+    crate: ROCrate, files: Mapping[str, File], engine: Entity, revision: str, steps: Sequence[Job]
+) -> Entity:
+    """What the workflow's file is besides a file: a program, with tools and steps."""
+    configuration = _add_parameter(crate, "#configuration", "File", valueRequired=True)
+    _set(files[CONFIGURATION], exampleOfWork=configuration)
+    tools = {job.script: files[job.script] for job in steps}
+    for job in steps:
+        _set(
+            tools[job.script],
+            ["File", "SoftwareSourceCode"],
+            name=job.rule,
+            description=job.description,
+            version=revision,
+            programmingLanguage=_add(crate, "#python", "ComputerLanguage", name="Python", url="https://www.python.org"),
+        )
+    workflow = files[WORKFLOW]
+    _set(
+        workflow,
+        ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"],
+        name="ICHA: adhesive rough contact by interacting and coalescing asperities",
+        version=revision,
+        conformsTo=_add(crate, f"{_BIOSCHEMAS}/ComputationalWorkflow/1.0-RELEASE", "CreativeWork"),
+        license=files.get(PROGRAM_LICENCE),
+        programmingLanguage=engine,
+        hasPart=list(tools.values()),
+        step=[
+            _add(
+                crate,
+                f"{WORKFLOW}#{job.rule}",
+                "HowToStep",
+                name=job.rule,
+                position=str(position),
+                workExample=tools[job.script],
+            )
+            for position, job in enumerate(steps, 1)
+        ],
+        input=[configuration],
+    )
+    return workflow
+
+
+def _add_job(crate: ROCrate, job: Job, files: Mapping[str, File]) -> tuple[Entity, Entity]:
+    """What a job did, and the step of the workflow that had it done."""
+    name = quote(job.outputs[0])
+    action = _add(
+        crate,
+        f"#job/{name}",
+        "CreateAction",
+        name=f"{job.rule}: {job.outputs[0]}",
+        description=job.description,
+        instrument=files[job.script],
+        object=[*(files[path] for path in job.inputs), *(_add_value(crate, job, *each) for each in job.parameters)],
+        result=[files[path] for path in job.outputs],
+        actionStatus=_COMPLETED,
+    )
+    control = _add(
+        crate,
+        f"#control/{name}",
+        "ControlAction",
+        name=f"step {job.rule}: {job.outputs[0]}",
+        instrument={"@id": f"{WORKFLOW}#{job.rule}"},
+        object=action,
+        actionStatus=_COMPLETED,
+    )
+    return action, control
+
+
+def _add_value(crate: ROCrate, job: Job, name: str, value: str) -> Entity:
+    """A setting of a job; jobs of a rule with the same setting share it."""
+    digest = hashlib.sha256(value.encode()).hexdigest()[:16]
+    key = f"#{job.rule}/{quote(name)}/{digest}"
+    return crate.dereference(key) or _add(crate, key, "PropertyValue", name=name, value=value)
+
+
+def _add_parameter(crate: ROCrate, key: str, kind: str, **properties: Any) -> Entity:
+    """A parameter of the workflow."""
+    profile = _add(crate, f"{_BIOSCHEMAS}/FormalParameter/1.0-RELEASE", "CreativeWork")
+    name = key.removeprefix("#")
+    return _add(crate, key, "FormalParameter", name=name, additionalType=kind, conformsTo=profile, **properties)
+
+
+def _add(crate: ROCrate, key: str, kind: str | list[str], **properties: Any) -> Entity:
+    entity = crate.add(ContextEntity(crate, key, {"@type": kind}))
+    _set(entity, **properties)
+    return entity
+
+
+def _set(entity: Entity, kind: list[str] | None = None, **properties: Any) -> None:
+    """Give an entity properties, but those that are empty, and other types, if there are any."""
+    if kind:
+        entity.properties()["@type"] = kind
+    for name, value in properties.items():
+        if value not in (None, "", []):
+            entity[name] = value[0] if isinstance(value, list) and len(value) == 1 else value

@@ -1,0 +1,271 @@
+"""The deposit as an RO-Crate: what it says of files and jobs is so, and other programs read it."""
+
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from outside_validators import sealed, validated
+from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
+
+from icha.configuration.publication import Author
+from icha.datasets.attributes import MODEL_PAPER
+from icha.deposit.crate import Job, write_crate
+from icha.deposit.deposit_files import CRATE
+
+SCRIPTS = "source/workflow/scripts"
+SCAN = "inputs/scan 1 µm.npy"
+JOBS = (
+    Job("surface", (SCAN,), ("surfaces/a/seed1.nc",), (("kind", "measured"),), "Make it.", f"{SCRIPTS}/surface.py"),
+    *(
+        Job(
+            "run",
+            ("surfaces/a/seed1.nc",),
+            (f"runs/load/a/seed1/slope{slope}/soft+dry.nc",),
+            (("material.contact_modulus", "2000000.0"), ("rms_slope", slope)),
+            "Press it.",
+            f"{SCRIPTS}/run.py",
+        )
+        for slope in ("0.5", "1")
+    ),
+    Job(
+        "gather",
+        ("runs/load/a/seed1/slope0.5/soft+dry.nc", "runs/load/a/seed1/slope1/soft+dry.nc"),
+        ("dataset/mine.nc",),
+        (),
+        "Gather them.",
+        f"{SCRIPTS}/gather.py",
+    ),
+    Job(
+        "figure",
+        ("config.used.yaml", "dataset/mine.nc"),
+        ("figures/fig.pdf", "figures/fig.png"),
+        (),
+        "Draw them.",
+        f"{SCRIPTS}/figure.py",
+    ),
+)
+OTHERS = ("README.md", "LICENSE.txt", "CITATION.cff", "source/Snakefile", "source/uv.lock", "source/LICENSE")
+OTHERS += ("source/icha/path/follow.py",)
+
+
+def checksums_of(folder):
+    """What `sha256sum` would say of all files."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != CRATE)
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def written(folder, publication, jobs=JOBS):
+    """A deposit with files of some bytes, and its crate."""
+    for path in {*OTHERS, *(path for job in JOBS for path in (*job.inputs, *job.outputs, job.script))}:
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(f"{path}\n" * len(path))
+    write_crate(folder, publication, jobs, campaign="mine", revision=COMMIT, checksums=checksums_of(folder))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def deposit(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("deposit"), ALL)
+
+
+@pytest.fixture(scope="module")
+def entities(deposit):
+    """What the crate says, by identifiers."""
+    graph = json.loads((deposit / CRATE).read_bytes())["@graph"]
+    assert len({entity["@id"] for entity in graph}) == len(graph)
+    return {entity["@id"]: entity for entity in graph}
+
+
+def references(value):
+    """Identifiers that a property names."""
+    values = value if isinstance(value, list) else [value]
+    return [entry["@id"] for entry in values if isinstance(entry, dict)]
+
+
+def of_type(entities, name):
+    return [entity for entity in entities.values() if name in [entity["@type"], *entity["@type"]]]
+
+
+def tool_actions(entities):
+    return [action for action in of_type(entities, "CreateAction") if action["instrument"]["@id"] != "source/Snakefile"]
+
+
+def test_whatever_is_named_is_described(entities):
+    for entity in entities.values():
+        for key, value in entity.items():
+            for name in references(value):
+                outside = entity["@id"] == CRATE and key == "conformsTo" and name.startswith("https://w3id.org/")
+                assert name in entities or outside, (entity["@id"], key, name)
+
+
+def test_files_are_those_of_the_deposit_with_size_and_checksum(deposit, entities):
+    files = {unquote(file["@id"]): file for file in of_type(entities, "File")}
+    known = checksums_of(deposit)
+    shown = {path for path in known if not path.startswith("source/")}
+    assert shown | {job.script for job in JOBS} | {"source/Snakefile", "source/uv.lock"} <= set(files) <= set(known)
+    for path, file in files.items():
+        assert file["sha256"] == known[path]
+        assert int(file["contentSize"]) == (deposit / path).stat().st_size
+    assert files["dataset/mine.nc"]["encodingFormat"] == "application/netcdf"
+    assert files["figures/fig.png"]["encodingFormat"] == "image/png"
+    parts = {unquote(name) for name in references(entities["./"]["hasPart"])}
+    assert set(files) | {"source/"} == parts
+    assert entities["source/"]["version"] == COMMIT
+
+
+def test_every_job_has_an_action_with_its_files_and_settings(entities):
+    found = set()
+    for action in tool_actions(entities):
+        objects = [entities[name] for name in references(action["object"])]
+        found.add(
+            (
+                action["instrument"]["@id"],
+                tuple(sorted(unquote(each["@id"]) for each in objects if each["@type"] != "PropertyValue")),
+                tuple(sorted(map(unquote, references(action["result"])))),
+                tuple(sorted((each["name"], each["value"]) for each in objects if each["@type"] == "PropertyValue")),
+            )
+        )
+    assert found == {(job.script, tuple(sorted(job.inputs)), job.outputs, job.parameters) for job in JOBS}
+
+
+def test_data_flow_from_the_files_given_to_the_last_result_and_never_back(entities):
+    actions = tool_actions(entities)
+    made = [name for action in actions for name in references(action["result"])]
+    assert len(made) == len(set(made))
+    there = {"config.used.yaml", "inputs/scan%201%20%C2%B5m.npy"}
+    assert there == set(references(entities["#campaign"]["object"]))
+    pending = list(actions)
+    while pending:
+        ready = [
+            action
+            for action in pending
+            if {name for name in references(action["object"]) if not name.startswith("#")} <= there
+        ]
+        assert ready, "files are made from each other"
+        there |= {name for action in ready for name in references(action["result"])}
+        pending = [action for action in pending if action not in ready]
+    assert (
+        set(made)
+        == set(references(entities["#campaign"]["result"]))
+        == there
+        - {
+            "config.used.yaml",
+            "inputs/scan%201%20%C2%B5m.npy",
+        }
+    )
+
+
+def test_steps_stand_in_the_order_of_the_data(entities):
+    workflow = entities["source/Snakefile"]
+    steps = sorted((entities[name] for name in references(workflow["step"])), key=lambda step: int(step["position"]))
+    assert [step["name"] for step in steps] == ["surface", "run", "gather", "figure"]
+    assert {step["workExample"]["@id"] for step in steps} == set(references(workflow["hasPart"]))
+    (organised,) = of_type(entities, "OrganizeAction")
+    controls = [entities[name] for name in references(organised["object"])]
+    assert len(controls) == len(JOBS)
+    for control in controls:
+        step, action = entities[control["instrument"]["@id"]], entities[control["object"]["@id"]]
+        assert step["workExample"] == action["instrument"]
+
+
+def test_who_made_it_under_which_licence_and_who_paid(entities):
+    root = entities["./"]
+    people = [entities[name] for name in references(root["author"])]
+    assert [person["@type"] for person in people] == ["Person", "Organization", "Person"]
+    assert people[0]["@id"] == f"https://orcid.org/{ORCID}" and people[0]["name"] == "Josiah Carberry"
+    assert people[0]["affiliation"]["@id"] == "https://ror.org/03yrm5c26"
+    assert entities[root["license"]["@id"]]["identifier"] == "CC0-1.0"
+    assert root["datePublished"] == "2026-01-31" and root["version"] == "1.0.0-rc.1"
+    assert root["identifier"] == "https://doi.org/10.5281/zenodo.1234567"
+    assert root["keywords"] == ["adhesion", "rough surfaces, soft"]
+    assert references(root["funder"])[0] == "https://doi.org/10.13039/501100000780"
+    assert {entities[name]["identifier"] for name in references(root["funding"])} == {"284382", "7 b"}
+    cited = [
+        MODEL_PAPER.address,
+        "https://doi.org/10.1007/s11249-017-0900-2",
+        "https://arxiv.org/abs/1606.03166",
+        "https://example.org/page",
+    ]
+    assert references(root["citation"]) == cited
+    assert references(root["isBasedOn"]) == ["https://doi.org/10.5281/zenodo.5171937"]
+    assert "https://snakemake.github.io" in references(root["mentions"])
+
+
+def test_no_time_no_name_made_at_random_and_no_place_of_this_machine(deposit):
+    text = (deposit / CRATE).read_text(encoding="utf-8")
+    assert not re.search(r"\d\d:\d\d", text)
+    assert set(re.findall(r"\d{4}-\d\d-\d\d", text)) - {ORCID[:10]} == {"2026-01-31"}
+    assert not re.search(r"[0-9a-f]{8}-[0-9a-f]{4}-", text)
+    assert not re.search(r'(startTime|endTime|"/|file:|arcp:)', text)
+    assert str(Path.home()) not in text and str(deposit) not in text
+
+
+def test_the_paper_of_the_model_is_cited_beside_what_the_publication_names(entities, tmp_path):
+    cited = [entities[name] for name in references(entities["./"]["citation"])]
+    (paper,) = (each for each in cited if each["name"] == MODEL_PAPER.title)
+    assert paper["@type"] == "ScholarlyArticle" and len(cited) > 1
+    assert paper["@id"] == MODEL_PAPER.address and paper["datePublished"] == str(MODEL_PAPER.year)
+    authors = [entities[name] for name in references(paper["author"])]
+    assert [(author["givenName"], author["familyName"]) for author in authors] == list(MODEL_PAPER.authors)
+    # Whoever wrote it and made the data is the same person, with all that is said of them.
+    given, family = MODEL_PAPER.authors[0]
+    own = LEAST.model_copy(update={"authors": [Author(family_names=family, given_names=given, affiliation="Here")]})
+    graph = json.loads((written(tmp_path, own) / CRATE).read_bytes())["@graph"]
+    (person,) = (entity for entity in graph if entity.get("familyName") == family)
+    assert person["affiliation"] == {"@id": "#organisation/Here"}
+
+
+def test_the_same_deposit_has_the_same_bytes(deposit, tmp_path):
+    code = (
+        "import sys; sys.path[:0] = sys.argv[2:]; from pathlib import Path; from test_crate import *; "
+        "written(Path(sys.argv[1]), ALL, reversed(JOBS))"
+    )
+    command = [sys.executable, "-c", code, tmp_path, Path(__file__).parent, Path(__file__).parents[1]]
+    subprocess.run(command, check=True, env={"PYTHONHASHSEED": "7", "LC_ALL": "C"})
+    assert (tmp_path / CRATE).read_bytes() == (deposit / CRATE).read_bytes()
+
+
+def test_jobs_that_make_no_sense_are_refused(deposit):
+    surface, run, *others = JOBS
+    cases = {
+        r"^no job: ": [],
+        r"^runs/none.nc: a file of rule run .* is not in the deposit": [run._replace(outputs=("runs/none.nc",))],
+        r"^surfaces/a/seed1.nc: is made by more than one job": [surface, run._replace(outputs=surface.outputs)],
+        r": is made from itself": [surface._replace(inputs=("dataset/mine.nc",)), run, *others],
+    }
+    for message, jobs in cases.items():
+        with pytest.raises(ValueError, match=message):
+            write_crate(deposit, ALL, jobs, campaign="mine", revision=COMMIT, checksums=checksums_of(deposit))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PUBLICATIONS)
+def test_it_is_a_provenance_run_crate_and_can_be_read(name, deposit, tmp_path):
+    folder = tmp_path / "tiny"
+    if name == "all":
+        shutil.copytree(deposit, folder)
+    else:
+        written(folder, PUBLICATIONS[name])
+    done = validated(sealed(folder), "roc-validator", "runcrate")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(r"^roc-validator: passed; \d{2,} checks of provenance-run-crate-0.5, 0 problems", done.stdout)
+    assert f"runcrate: passed; {len(JOBS) + 1} actions" in done.stdout
+
+
+@pytest.mark.slow
+def test_a_crate_that_lacks_something_is_refused(deposit, tmp_path):
+    folder = shutil.copytree(deposit, tmp_path / "deposit")
+    content = json.loads((folder / CRATE).read_bytes())
+    content["@graph"] = [entity for entity in content["@graph"] if entity["@id"] != "source/Snakefile#run"]
+    (folder / CRATE).write_text(json.dumps(content))
+    (folder / "dataset/mine.nc").unlink()
+    done = validated(sealed(folder), "roc-validator")
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "A ControlAction must reference a HowToStep instance" in done.stdout
+    assert "dataset/mine.nc" in done.stdout

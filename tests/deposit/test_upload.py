@@ -1,0 +1,460 @@
+"""`icha upload` against servers on this machine: what is sent, what is asked, and what servers may do wrong."""
+
+import hashlib
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+import threading
+import zipfile
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+import requests
+from typer.testing import CliRunner
+from zenodo_mock.testing import spawn
+
+from icha.cli import app
+from icha.deposit import zenodo
+from icha.deposit.zenodo import Zenodo, ZenodoError, server_address
+
+TOKEN = "Secret0f4ToKeN"
+NAME = "mine-1.0.0"
+METADATA = {
+    "upload_type": "dataset",
+    "title": "A campaign",
+    "version": "1.0.0",
+    "license": "cc-by-4.0",
+    "creators": [{"name": "Carberry, Josiah"}, {"name": "The team"}],
+    "communities": [{"identifier": "contact"}],
+    "description": "<p>Small.</p>",
+}
+FILES = {
+    "README.md": b"# A campaign\n",
+    "ro-crate-metadata.json": b'{"@graph": []}\n',
+    "dataset/mine.nc": bytes(range(256)) * 4000,
+}
+SENT = {f"{NAME}.zip", "README.md", "ro-crate-metadata.json"}
+
+
+def make_deposit(folder, **metadata):
+    """A deposit, as a folder and a zip, with just what an upload looks at."""
+    files = FILES | {".zenodo.json": json.dumps(METADATA | metadata).encode()}
+    files["SHA256SUMS"] = "".join(
+        f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in sorted(files.items())
+    ).encode()
+    with zipfile.ZipFile(folder / f"{NAME}.zip", "w") as archive:
+        for name, content in sorted(files.items()):
+            (folder / NAME / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / NAME / name).write_bytes(content)
+            archive.writestr(zipfile.ZipInfo(f"{NAME}/{name}"), content)
+    return folder / f"{NAME}.zip"
+
+
+@pytest.fixture
+def deposit(tmp_path):
+    return make_deposit(tmp_path)
+
+
+def upload(*arguments, token=TOKEN):
+    """The exit status and all that was printed; the token is never among it."""
+    done = CliRunner().invoke(app, ["upload", *map(str, arguments)], env={"ZENODO_TOKEN": token})
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    assert not token or token not in done.output
+    return done.exit_code, done.output
+
+
+class Server(ThreadingHTTPServer):
+    """Answers as Zenodo does, counts what it is asked, and fails as it is told to.
+
+    `failures` are taken one after the other by the requests that they are for: method, part of the path, and what the
+    handler does instead of answering.
+    """
+
+    daemon_threads = True
+
+    def __init__(self):
+        super().__init__(("127.0.0.1", 0), Handler)
+        self.requests, self.failures, self.files, self.metadata, self.published = [], [], {}, {}, False
+        self.address = f"http://127.0.0.1:{self.server_port}"
+
+    def handle_error(self, request, client_address):
+        """What is broken off is meant to be."""
+
+    def deposition(self, number="77"):
+        files = [
+            {
+                "id": f"id-{name}",
+                "filename": name,
+                "filesize": len(content),
+                "checksum": hashlib.md5(content).hexdigest(),
+            }
+            for name, content in self.files.items()
+        ]
+        return {
+            "id": int(number),
+            "submitted": self.published,
+            "metadata": self.metadata | {"prereserve_doi": {"doi": f"10.5072/zenodo.{number}"}},
+            "files": files,
+            "links": {
+                "bucket": f"{self.address}/api/files/b-{number}",
+                "html": f"{self.address}/deposit/{number}",
+                "self": f"{self.address}/api/deposit/depositions/{number}",
+            },
+        }
+
+
+class Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+    def log_message(self, *arguments):
+        pass
+
+    def _handle(self):
+        server, length = self.server, int(self.headers.get("Content-Length", 0))
+        server.requests.append((self.command, self.path, self.headers.get("Authorization")))
+        for failure in server.failures:
+            method, part, action = failure
+            if method == self.command and part in self.path:
+                server.failures.remove(failure)
+                if action(self) is None:
+                    return
+                break
+        body = self.rfile.read(length)
+        parts = self.path.strip("/").split("/")
+        if parts[:2] == ["api", "files"] and self.command == "PUT":
+            server.files[parts[3]] = body
+            return self.answer(201, {"key": parts[3], "checksum": f"md5:{hashlib.md5(body).hexdigest()}"})
+        if self.command == "DELETE":
+            del server.files[parts[5].removeprefix("id-")]
+            return self.answer(204)
+        if parts[-1] == "publish":
+            server.published = True
+            return self.answer(
+                202, {"doi": "10.5072/zenodo.77", "links": {"record_html": f"{server.address}/records/77"}}
+            )
+        if self.command == "PUT":
+            server.metadata = json.loads(body)["metadata"]
+        return self.answer(201 if self.command == "POST" else 200, server.deposition())
+
+    do_GET = do_POST = do_PUT = do_DELETE = _handle
+
+    def answer(self, status, content=None, **headers):
+        body = b"" if content is None else json.dumps(content).encode()
+        self.send_response(status)
+        for name, value in headers.items():
+            self.send_header(name.replace("_", "-"), value)
+        if status != 204:
+            self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+
+@pytest.fixture
+def server():
+    with Server() as each:
+        thread = threading.Thread(target=each.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
+        thread.start()
+        yield each
+        each.shutdown()
+
+
+def refuse(status, content=None, **headers):
+    """A failure: read what is sent, and answer otherwise."""
+
+    def action(handler):
+        handler.rfile.read(int(handler.headers.get("Content-Length", 0)))
+        handler.answer(status, content, **headers)
+
+    return action
+
+
+def break_off(handler):
+    """A failure: end the connection in the middle of what is sent."""
+    handler.rfile.read(min(1000, int(handler.headers["Content-Length"])))
+    handler.close_connection = True
+    handler.connection.close()
+
+
+# Round trips.
+
+
+def test_a_deposit_goes_to_zenodo_and_comes_back(tmp_path, deposit):
+    with spawn(tmp_path / "zenodo") as address:
+        status, said = upload(deposit, "--url", address, "--publish", "--yes")
+        assert status == 0, said
+        number = re.search(r"published: \S+/records/(\d+)", said)[1]
+        assert f"DOI:       10.5072/zenodo.{number}" in said
+        record = requests.get(f"{address}/api/records/{number}").json()
+        assert {key: record["metadata"][key] for key in METADATA} == METADATA
+        assert {file["key"] for file in record["files"]} == SENT
+        got = {file["key"]: requests.get(file["links"]["download"]).content for file in record["files"]}
+        assert got[f"{NAME}.zip"] == deposit.read_bytes()
+        assert got["README.md"] == FILES["README.md"]
+        # A new version begins with the files of the one before, of which none is left.
+        (tmp_path / "next").mkdir()
+        other = make_deposit(tmp_path / "next", version="1.1.0").rename(tmp_path / "next/mine-1.1.0.zip")
+        status, said = upload(other, "--url", address, "--new-version-of", number, "--publish", "--yes")
+        assert status == 0, said
+        after = re.search(r"published: \S+/records/(\d+)", said)[1]
+        record = requests.get(f"{address}/api/records/{after}").json()
+        assert after != number and record["metadata"]["version"] == "1.1.0"
+        assert {file["key"] for file in record["files"]} == SENT - {deposit.name} | {other.name}
+
+
+def test_it_stays_a_draft_that_another_call_publishes_without_sending_it_twice(server, deposit):
+    status, said = upload(deposit.parent / NAME, "--url", server.address, "--yes")  # the folder
+    assert status == 0 and f"{server.address}/deposit/77" in said and "10.5072/zenodo.77 (reserved)" in said
+    assert "its checksum is right" in said and not server.published
+    assert server.files == {name: FILES[name] for name in SENT - {deposit.name}} | {deposit.name: deposit.read_bytes()}
+    assert server.metadata == METADATA
+    assert {token for _, _, token in server.requests} == {f"Bearer {TOKEN}"}
+    del server.requests[:]
+    server.files["README.md"] = b"of another version"
+    server.files["photo.jpg"] = b"of the author's"
+    status, said = upload(deposit, "--url", server.address, "--draft", "10.5072/zenodo.77", "--publish", "--yes")
+    assert status == 0 and server.published and f"{deposit.name}: is there already" in said
+    assert "The draft also has other files, which stay there: photo.jpg" in said
+    sent = [path for method, path, _ in server.requests if method == "PUT" and "/files/" in path]
+    assert sent == ["/api/files/b-77/README.md"] and server.files["README.md"] == FILES["README.md"]
+    assert set(server.files) == SENT | {"photo.jpg"}
+    status, said = upload(deposit, "--url", server.address, "--draft", "77", "--yes")
+    assert status == 1 and "77 is published already" in said and "--new-version-of 77" in said
+
+
+# Consent.
+
+
+def test_nothing_is_sent_without_consent(server, deposit):
+    status, said = upload(deposit, "--url", server.address, "--publish")
+    assert status == 2 and "needed: --yes, or a terminal" in said
+    for told in ("A campaign", "1.0.0", "Carberry, Josiah; The team", "cc-by-4.0", "contact", server.address, *SENT):
+        assert told in said
+    assert f"({deposit.stat().st_size:,} bytes)" in said
+    assert server.requests == []
+
+
+@pytest.mark.parametrize("answers, requests_made", [("n\n", 0), ("y\nn\n", 5)])
+def test_a_declined_question(server, deposit, monkeypatch, capfd, answers, requests_made):
+    """In a terminal: of the questions, the first is about sending, the second about publishing."""
+    monkeypatch.setenv("ZENODO_TOKEN", TOKEN)
+    ours, theirs = pty.openpty()
+    os.write(ours, answers.encode())
+    with os.fdopen(theirs) as terminal, monkeypatch.context() as context, pytest.raises(SystemExit) as ended:
+        context.setattr(sys, "stdin", terminal)
+        app(["upload", str(deposit), "--url", server.address, "--publish"])
+    os.close(ours)
+    said = "".join(capfd.readouterr())
+    assert "Send it? [y/N]" in said and TOKEN not in said
+    assert len(server.requests) == requests_made, server.requests
+    assert not server.published
+    if requests_made:
+        assert ended.value.code == 0 and "cannot be deleted" in said and "It is a draft" in said
+    else:
+        assert ended.value.code == 1 and "Nothing was sent." in said
+
+
+def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit, tmp_path):
+    def refused(*arguments, **how):
+        status, said = upload(*arguments, "--yes", **how)
+        assert status == 2, said
+        return said
+
+    url = ("--url", server.address)
+    assert "ZENODO_TOKEN is not set" in refused(deposit, *url, token="")
+    assert "is not a token" in refused(deposit, *url, token="two words")
+    assert "no such file" in refused(tmp_path / "none.zip", *url)
+    assert "one of them" in refused(deposit, "--sandbox", *url)
+    assert "one of them" in refused(deposit, "--draft", "1", "--new-version-of", "2", *url)
+    assert "is not the number of a record" in refused(deposit, "--draft", "mine", *url)
+    assert "over http" in refused(deposit, "--url", "http://zenodo.org")
+    (tmp_path / "reserved").mkdir()
+    reserved = make_deposit(tmp_path / "reserved", doi="10.5281/zenodo.5")
+    assert "needed: --draft 5" in refused(reserved, *url)
+    assert "needed: --draft 5" in refused(reserved, "--draft", "77", *url)
+    (tmp_path / NAME / "SHA256SUMS").write_text("")
+    assert "damaged" in refused(tmp_path / NAME, *url)
+    with zipfile.ZipFile(deposit, "a") as archive:
+        archive.writestr(f"{NAME}/README.md.orig", "one too many")
+    assert "damaged, and nothing is sent" in refused(deposit, *url)
+    deposit.unlink()
+    assert "no mine-1.0.0.zip beside it" in refused(tmp_path / NAME, *url)
+    assert server.requests == []
+
+
+def test_addresses():
+    assert server_address("https://zenodo.org/") == "https://zenodo.org"
+    assert server_address("sandbox.zenodo.org/api") == "https://sandbox.zenodo.org"
+    assert server_address("http://127.0.0.1:80") == "http://127.0.0.1:80"
+    assert server_address("http://[::1]:8000") == "http://[::1]:8000"
+    for wrong in ("http://zenodo.org", "http://127.0.0.1.example.org", "ftp://zenodo.org", "https://zenodo.org/records/1",
+                  "https://", "https://me:secret@zenodo.org", ""):  # fmt: skip
+        with pytest.raises(ValueError, match="allowed"):
+            server_address(wrong)
+
+
+# What servers may do.
+
+VALIDATION = {
+    "message": "Validation error.",
+    "errors": [
+        {"field": "metadata.creators", "message": "Missing data for required field."},
+        {"field": "metadata.title", "messages": ["Too short.", "Too dull."]},
+    ],
+}
+
+
+ELSEWHERE = "https://elsewhere.org/"
+
+
+@pytest.mark.parametrize(
+    "failure, told",
+    [
+        (("POST", "depositions", refuse(401, {"message": "Unauthorized"})), "not know the token (401: Unauthorized)"),
+        (("POST", "depositions", refuse(403, {"message": f"no, {TOKEN}"})), "deposit:write and deposit:actions"),
+        (("POST", "depositions", refuse(302, Location=ELSEWHERE)), f"sends us on to {ELSEWHERE}"),
+        (("POST", "depositions", refuse(200, {"id": 1, "links": {"bucket": ELSEWHERE}})), "another server"),
+        (("POST", "depositions", refuse(200, {})), "does not answer as Zenodo does"),
+        (("POST", "depositions", refuse(200, [1])), "does not answer as Zenodo does"),
+        (("POST", "depositions", refuse(200, {"id": 1, "links": None})), "does not answer as Zenodo does"),
+        (("POST", "depositions", refuse(200, {"id": 1, "links": {"bucket": 3}})), "to be sent to another server"),
+        (("POST", "depositions", refuse(400, {"errors": 1})), "refuses it (400)"),
+        (("PUT", "depositions", refuse(200, "done")), "does not answer as Zenodo does"),
+        (("POST", "depositions", refuse(500)), "has failed (500"),
+        (("POST", "depositions", break_off), "broken off the connection"),
+        (("PUT", "depositions", refuse(400, VALIDATION)), "metadata.creators: Missing data for required field.\n"),
+        (("PUT", "depositions", refuse(400, VALIDATION)), "metadata.title: Too short., Too dull."),
+        (("PUT", ".zip", refuse(413)), "too large"),
+        (("PUT", ".zip", refuse(201, {"checksum": "md5:" + 32 * "0"})), "has not arrived as it was sent"),
+    ],
+)  # fmt: skip
+def test_what_a_server_refuses_is_said_with_what_to_do(server, deposit, failure, told):
+    server.failures.append(failure)
+    status, said = upload(deposit, "--url", server.address, "--publish", "--yes")
+    assert status == 1 and told in said, said
+    assert not server.published
+    # Nothing that makes something is tried twice, and a draft that is left behind can be gone on with.
+    assert [method for method, _, _ in server.requests].count("POST") == 1
+    if failure[0] == "PUT":
+        assert f"{server.address}/deposit/77" in said
+        command = re.search(r"icha upload \S+ (--url \S+ --draft \S+)", said)[1]
+        assert upload(deposit, *command.split(), "--yes")[0] == 0
+        assert set(server.files) == SENT
+    else:
+        assert "--draft" not in said
+
+
+@pytest.mark.parametrize("links", [None, [], {"latest_draft": 7}, {"latest_draft": "http://["}])
+def test_a_draft_of_a_new_version_that_is_nowhere(links, server, deposit):
+    server.failures += [("POST", "newversion", refuse(201, {"links": links})), ("GET", "depositions", refuse(404))]
+    status, said = upload(deposit, "--url", server.address, "--new-version-of", "7", "--yes")
+    assert status == 1 and "Error: " in said, said
+
+
+def test_a_publication_of_which_the_server_says_little(server, deposit):
+    server.failures.append(("POST", "publish", refuse(202, {"links": None, "doi": ["x"]})))
+    status, said = upload(deposit, "--url", server.address, "--publish", "--yes")
+    assert status == 0 and f"published: {server.address}/records/77" in said and "10.5072/zenodo.77" in said
+
+
+def test_what_fails_for_the_moment_is_tried_again(server, deposit, monkeypatch):
+    monkeypatch.setattr(zenodo, "_PATIENCE", zenodo._PATIENCE.new(backoff_factor=0))
+    server.failures += [
+        ("POST", "depositions", refuse(429, Retry_After="0")),
+        ("PUT", ".zip", refuse(500)),
+        ("PUT", ".zip", break_off),
+        ("PUT", ".zip", refuse(503, Retry_After="0")),
+        ("PUT", "README", refuse(502)),
+        ("POST", "publish", refuse(503, {"message": "maintenance"})),
+    ]
+    status, said = upload(deposit, "--url", server.address, "--publish", "--yes")
+    assert status == 0, said
+    assert server.failures == [] and server.published
+    # Every time from its beginning.
+    assert server.files[deposit.name] == deposit.read_bytes()
+
+
+def test_a_file_that_is_removed_although_the_server_says_that_it_failed(server, deposit, monkeypatch):
+    monkeypatch.setattr(zenodo, "_PATIENCE", zenodo._PATIENCE.new(total=0))
+
+    def remove(handler):
+        del server.files["README.md"]
+        handler.answer(500)
+
+    server.files["README.md"] = b"of another version"
+    server.failures.append(("DELETE", "README", remove))
+    assert upload(deposit, "--url", server.address, "--draft", "77", "--yes")[0] == 0
+    assert server.files["README.md"] == FILES["README.md"]
+    server.files["README.md"] = b"of another version"
+    server.failures.append(("DELETE", "README", refuse(500)))
+    status, said = upload(deposit, "--url", server.address, "--draft", "77", "--yes")
+    assert status == 1 and "has failed (500" in said
+
+
+def test_it_does_not_try_for_ever(server, tmp_path):
+    server.failures += [("GET", "", refuse(503, {"message": "maintenance"}))] * 20
+    client = Zenodo(server.address, TOKEN, zenodo._PATIENCE.new(backoff_factor=0))
+    with pytest.raises(ZenodoError, match=r"is busy \(503: maintenance\)"):
+        client.draft("77")
+    assert len(server.requests) == 1 + zenodo._PATIENCE.total
+
+
+def test_waiting_grows_and_what_the_server_asks_for_is_respected():
+    patience = zenodo._PATIENCE
+    waits = []
+    for _ in range(patience.total):
+        patience = patience.increment(
+            "GET", "/", error=None, response=requests.packages.urllib3.HTTPResponse(status=503)
+        )
+        waits.append(patience.get_backoff_time())
+    assert waits == [0, 2, 4, 8, 16]
+    asked = requests.packages.urllib3.HTTPResponse(status=429, headers={"Retry-After": "60"})
+    assert patience.get_retry_after(asked) == 60
+
+
+def test_a_server_that_is_not_there(server, deposit):
+    server.shutdown()
+    server.server_close()
+    client = Zenodo(server.address, TOKEN, zenodo._PATIENCE.new(total=1))
+    with pytest.raises(ZenodoError, match="cannot be reached"):
+        client.create()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system does not tell how much memory was taken")
+@pytest.mark.slow
+def test_a_file_is_not_read_into_memory(server, tmp_path):
+    """What is sent is read in pieces: a file of 200 MB that takes no room on the disk, and not in memory either."""
+    large = tmp_path / "large.bin"
+    with large.open("wb") as file:
+        file.truncate(200_000_000)
+    received = []
+
+    def count(handler):
+        left = length = int(handler.headers["Content-Length"])
+        while left:
+            left -= len(handler.rfile.read(min(left, 1 << 20)))
+        received.append(length)
+        handler.answer(201, {"checksum": f"md5:{zenodo.md5_of(large)}"})
+
+    server.failures.append(("PUT", "large", count))
+    program = (
+        "import re, sys; from icha.deposit.zenodo import Zenodo, md5_of\n"
+        "server = Zenodo(sys.argv[1], 'token'); draft = server.create()\n"
+        "assert server.upload(draft, sys.argv[2], md5_of(sys.argv[2]))\n"
+        "print(re.search(r'VmHWM:\\s*(\\d+)', open('/proc/self/status').read())[1])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, server.address, str(large)], capture_output=True, text=True, check=True
+    )
+    assert received == [200_000_000]
+    assert int(done.stdout) < 150_000  # kB
+
+
+def test_no_netrc_takes_the_token_s_place(server, tmp_path, monkeypatch):
+    (tmp_path / "netrc").write_text("machine 127.0.0.1 login me password other\n")
+    monkeypatch.setenv("NETRC", str(Path(tmp_path / "netrc")))
+    Zenodo(server.address, TOKEN).create()
+    assert server.requests[0][2] == f"Bearer {TOKEN}"
