@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
 
-from icha.configuration.cases import loop_cases, solution_cases
+from icha.configuration.cases import (
+    loop_cases,
+    loop_settings,
+    solution_cases,
+    solution_settings,
+)
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.settings import loop_settings, solution_settings
 
 BAD = {
     # key, value, what the message must say of it
