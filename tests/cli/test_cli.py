@@ -21,10 +21,9 @@ from icha.analysis.checks import check_campaign, write_checks
 from icha.cli import app
 from icha.cli.live import LiveView, Watch, last_line, reason_of
 from icha.cli.project import campaigns
-from icha.configuration.cases import run_cases
+from icha.configuration.cases import run_cases, run_sha256
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
-from icha.configuration.settings import run_sha256
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
