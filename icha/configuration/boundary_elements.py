@@ -3,10 +3,7 @@
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    Field,
-)
+from pydantic import AfterValidator, Field
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
