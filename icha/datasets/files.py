@@ -12,7 +12,6 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Container, Hashable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 import netCDF4
 import numpy as np
@@ -23,9 +22,6 @@ from icha.datasets.variables.campaign import COMPLETE
 from icha.datasets.variables.run import CELLS
 from icha.datasets.variables.terms import INFINITE
 from icha.support.atomic_files import whole_file
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
