@@ -74,26 +74,6 @@ def summary(study: xr.Dataset) -> Table:
     return Table(head, rows)
 
 
-def rules(overlap: xr.Dataset, detachment: xr.Dataset) -> Table:
-    """The two rules side by side: pull-off and loss; without adhesion the loss over the largest work."""
-    head = ["h′rms", "Δγ, mJ/m²", "pull-off, Pa: overlap", "detachment", "loss, µJ/m²: overlap", "detachment"]
-    rows = []
-    for (slope, _, one), (_, _, other) in zip(_cells(overlap), _cells(detachment), strict=True):
-        adhesive = float(one["surface_energy"]) > 0
-        row = [f"{slope:g}", _energy(one)]
-        for name, form, scale in (("pull_off_pressure", "{:.3g}", 1.0), ("hysteresis_loss", "{:+.3g}", 1e6)):
-            for each in (one, other):
-                if adhesive:
-                    row.append(_mean(scale * each[name].values, form))
-                elif name == "pull_off_pressure":
-                    row.append("–")
-                else:
-                    part = 100 * each[name].values / each["work"].max("step").values
-                    row.append(f"{_mean(part, '{:+.3f}')} % of the work")
-        rows.append(row)
-    return Table(head, rows)
-
-
 def common_slope(studies: Sequence[xr.Dataset]) -> float:
     """The least rms slope that all studies have."""
     return min(set.intersection(*(set(study["rms_slope"].values.tolist()) for study in studies)))

@@ -56,17 +56,6 @@ def test_pull_off_and_loss_are_means_over_the_seeds(campaign):
     assert body[0][head.index("loss/Δγ")] == written(loss, "{:.4f}")
 
 
-def test_rules_are_side_by_side_and_nothing_is_lost_without_adhesion(campaign):
-    study = campaign["slopes"].to_dataset()
-    other = campaign["other"].to_dataset()
-    other["pull_off_pressure"] = 2 * other["pull_off_pressure"]
-    _, (sticky, bare) = hysteresis.rules(study, other)
-    assert sticky[3] == written(2 * of_seeds("pull_off_pressure", 0.0), "{:.3g}")
-    assert sticky[2] == written(of_seeds("pull_off_pressure", 0.0), "{:.3g}")
-    assert bare[2:4] == ["–", "–"] and all(cell.endswith("% of the work") for cell in bare[4:])
-    assert abs(float(bare[4].split(" ± ")[0])) < 1e-3
-
-
 def test_dependence_on_the_largest_load_is_fitted(campaign):
     studies = [campaign[name].to_dataset() for name in DEPTHS]
     assert hysteresis.common_slope(studies) == 1
@@ -82,31 +71,19 @@ def test_dependence_on_the_largest_load_is_fitted(campaign):
     assert pull[-1] == f"varies by {100 * (z.max() / z.min() - 1):.0f} %"
 
 
-def test_rules_are_beside_the_truth_and_the_nearer_one_is_named(campaign):
-    overlap, truth = (campaign[name].to_dataset() for name in ("slopes", "truth"))
-    # Pull-off is 1.25 of that under one rule and just that under the other; the loss 0.8, or 0.8/0.4 of the other's.
-    detachment = overlap.assign(
-        pull_off_pressure=1.25 * overlap["pull_off_pressure"], hysteresis_loss=0.4 * overlap["hysteresis_loss"]
-    )
-    head, (area, pull, loss) = rules.table(overlap, detachment, truth)
+def test_asperities_are_beside_the_truth(campaign):
+    study, truth = (campaign[name].to_dataset() for name in ("slopes", "truth"))
+    head, (area, pull, loss) = rules.table(study, truth)
     assert area[:2] == ["1", "50"] and pull[:2] == loss[:2] == ["", ""]
     own = 1.25 * of_seeds("pull_off_pressure", 0.0)
     assert pull[head.index("boundary elements")] == written(own, "{:.3g}")
-    assert area[-2:] == ["+0 ± 0", "+0 ± 0"]
-    assert pull[-2:] == ["-20 ± 0", "+0 ± 0"] and loss[-2:] == ["+25 ± 0", "-50 ± 0"]
-    assert rules.nearer_rule(overlap, detachment, truth) == (
-        "in pull-off `detachment` is nearer in 2 of 2 cases; in loss `overlap` is nearer in 2 of 2 cases"
-    )
-    assert rules.nearer_rule(overlap, overlap, truth) == (
-        "in pull-off both are equally near in 2 of 2 cases; in loss both are equally near in 2 of 2 cases"
-    )
+    assert (area[-1], pull[-1], loss[-1]) == ("+0 ± 0", "-20 ± 0", "+25 ± 0")
 
 
 def test_the_page_can_be_written(campaign):
     studies = {name: study.to_dataset() for name, study in campaign.children.items()}
-    studies |= {"detachment": studies["other"], "load_control": studies["other"]}
+    studies |= {"load_control": studies["other"]}
     loads = [studies[name] for name in DEPTHS]
     text = render("hysteresis", campaign=campaign, studies=studies, load_studies=loads, command="make it")
-    assert "On this grid, in pull-off both are equally near in 2 of 2 cases" in text
     assert text.startswith("# Pull-off") and "`make it`" in text and "](images/fig13_loops.png)" in text
     assert "nan" not in text.lower() and "{" not in text
