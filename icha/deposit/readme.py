@@ -16,10 +16,9 @@ from icha.checks.findings import Check
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
 from icha.configuration.surfaces import SelfAffineSurface
+from icha.datasets.attributes import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
-from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.model_paper import MODEL_PAPER
-from icha.datasets.places import slopes_of
+from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.deposit.attributes import acknowledgement
 from icha.deposit.citation import paragraphs, web_address
@@ -27,7 +26,7 @@ from icha.deposit.deposit_files import COMPUTED
 from icha.deposit.dictionary import Entry
 from icha.deposit.licences import Licence
 from icha.planning.costs import Cost
-from icha.planning.software import further_software
+from icha.planning.needs import further_software
 from icha.support import in_words
 
 _TEMPLATE = "README.md.jinja"
