@@ -21,8 +21,6 @@ from icha.configuration.boundary_elements import (
     BesideStudy,
     BoundaryElementLoops,
     BoundaryElements,
-    ErrorSources,
-    OneAsperity,
 )
 from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
@@ -39,7 +37,7 @@ from icha.support.values import (
 )
 
 # Sections of entries that belong to a study.
-BESIDE_STUDIES = ("finite_range", "boundary_element_loops", "error_sources")
+BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
 # Each of these looks at all runs of its study.
 _FEW = Field(max_length=100)
 # Cells per shortest wavelength: with fewer, boundary elements are refused and asperities warned of; those to recommend.
@@ -103,12 +101,6 @@ class Campaign(Section):
         default={},
         description="Boundary elements in loading and unloading by name, to compare with the runs of a "
         "study that unloads.",
-    )
-    error_sources: Annotated[dict[Name, ErrorSources], _FEW] = Field(
-        default={}, description="Studies of the sources of the model's error, by name."
-    )
-    one_asperity: OneAsperity | None = Field(
-        default=None, description="One asperity by the model and by boundary elements."
     )
     measurements: Annotated[dict[Name, Measurement], _FEW] = Field(
         default={}, description="Measurements by name, drawn over figure 5. None come with ICHA."

@@ -168,10 +168,10 @@ WRONG = {
     "solutions together": (
         {
             "studies.one.seeds": "1..10000",
-            "error_sources": {f"b{i}": {"study": "one", "reduced_pressures": [0.01, 0.02]} for i in range(3)},
+            "finite_range": {f"b{i}": {"study": "one", "reduced_pressures": [0.01, 0.02]} for i in range(3)},
         },
         None,
-        "error_sources: ask for 120000 solutions together; allowed: 100000 at most",
+        "finite_range: ask for 120000 solutions together; allowed: 100000 at most",
     ),
     "entries beside a study": (
         "finite_range",

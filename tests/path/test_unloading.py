@@ -47,8 +47,8 @@ from icha.path.follow import follow
 from icha.path.limits import MAX_REDUCED_PRESSURE
 from icha.path.resolution import Account, Stride, resolved
 from icha.path.targets import LOAD_CONTROL
-from icha.references.one_asperity import paraboloid
 from icha.surfaces.summits import find_summits
+from validation.surfaces import paraboloid
 
 # --- one asperity -------------------------------------------------------------------------------------------
 
