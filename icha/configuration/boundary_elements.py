@@ -10,6 +10,7 @@ from pydantic import (
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
+from icha.configuration.studies import MEASURED
 from icha.contact.models import ASPERITIES
 from icha.path.limits import STEP
 from icha.path.states import ReducedPressure
@@ -67,17 +68,19 @@ class BesideStudy(Section):
                 if value not in known:
                     yield (key, index), value, f"is not in study {self.study!r}; allowed: {listed(there)}"
         contacts = campaign.solved(self)
-        if not contacts:
+        if not contacts and MEASURED not in study.rms_slopes:
             yield (), self.study, "has none of the chosen combinations; allowed: combinations that the study has"
         materials: dict[str, dict[str, None]] = {}
         for each in contacts:
             materials.setdefault(each.surface, {})[each.material] = None
         for name in materials:
-            if campaign.boundary(name) != "periodic":
+            if campaign.is_free(name):
                 reason = (
                     "has a surface without periods; allowed: studies of periodic surfaces, as boundary elements are"
                 )
                 yield ("study",), self.study, f"{reason} ({name!r} is not)"
+                continue
+            if campaign.grid(name) is None:
                 continue
             yield from self._unresolved(campaign, name, materials[name])
             nodes = campaign.grid(name) * self.refinement

@@ -278,9 +278,10 @@ class Study(Section):
 
     def _load_problems(self):
         """Loads that a slope, the smallest for one, makes too large for the model."""
-        if not self.rms_slopes:
+        slopes = [slope for slope in self.rms_slopes if slope != MEASURED]
+        if not slopes:
             return
-        slope = min(self.rms_slopes)
+        slope = min(slopes)
         kept = [] if self.snapshots == EVERY_STOP else self.snapshots
         for key, states in (("snapshots", kept), ("turning_points", self.turning_points)):
             for index, state in enumerate(states or []):
