@@ -242,13 +242,6 @@ class Study(Section):
         description="What is imposed: the mean separation or the load. Under load control the state jumps where the "
         "curve turns back, and all targets and turning points must be loads.",
     )
-    united_until: Literal["overlap", "detachment"] = Field(
-        default="overlap",
-        description="How long coalesced spots stay united on the way back: until the two spots that they were made of "
-        "would no longer overlap (`overlap`), or until they detach as a whole and fall back into their "
-        "asperities (`detachment`). Only for the model `asperities`; patches of boundary elements split by "
-        "themselves.",
-    )
     max_step: number(STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
     )
@@ -262,18 +255,15 @@ class Study(Section):
             return self.targets.states
         return [snapshot.target for snapshot in self.snapshots]
 
-    def path_settings(self, snapshots: list[tuple[str, float]] | None, model: str = ASPERITIES) -> dict:
-        """Arguments of the path of a model's runs (`icha.Path`).
-
-        Those that are left at their defaults are left out, and those that mean nothing to the model.
-        """
+    def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
+        """Arguments of the path of the runs (`icha.Path`) but for those that are left at their defaults."""
         settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
         if self.unload or self.turning_points:
             settings |= {
                 "unload": self.unload,
                 "turning_points": [point.target for point in self.turning_points],
                 "control": self.control,
-            } | ({"united_until": self.united_until} if model == ASPERITIES else {})
+            }
         elif self.control != "separation":
             settings["control"] = self.control
         return settings
