@@ -65,7 +65,7 @@ class Executor(LocalExecutor):
         if not script or job.threads != 1 or deployed or not self._server_runs():
             return super().run_single_job(job)
         rule, input_, output, params, wildcards, threads, resources, log, benchmark, *_ = self.job_args_and_prepare(job)
-        file = Path(self.workflow.main_snakefile).parent / "workflow/scripts" / PurePath(script).name
+        file = Path(os.path.normpath(Path(str(job.rule.basedir)) / script))
         told = Snakemake(
             input_, output, params, wildcards, threads, resources, log, {}, rule.name, None, str(file.parent)
         )
