@@ -14,8 +14,8 @@ from icha.configuration.settings import (
     run_settings,
 )
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.planning.needs import further_software
 from icha.planning.results import campaign_files
-from icha.planning.software import further_software
 from icha.references.literature import literature
 
 SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])

@@ -2,7 +2,7 @@
 # of a run, one load each or both ways; variants between the model and them; one asperity, where the answer is known.
 
 from icha.configuration.settings import adhesive_contacts, loop_settings, solution_settings, source_settings
-from icha.planning.resources import solver_memory
+from icha.planning.needs import solver_memory
 
 
 rule reference:

@@ -3,7 +3,7 @@
 from icha.configuration.settings import run_settings
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.labels import model_folder
-from icha.planning.resources import run_memory, run_minutes, run_threads
+from icha.planning.needs import run_memory, run_minutes, run_threads
 
 
 wildcard_constraints:
