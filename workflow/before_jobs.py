@@ -156,13 +156,8 @@ class Campaign:
         file = f"{self.results}/{path}"
         aside = ""
         if not self.dry_run:
-            try:
+            with _writing(f"{file} is not what was written, by its checksum, and cannot be set aside: its folder"):
                 aside = f" (what was there is {checksums.set_aside(self.results, path).name} now)"
-            except OSError as error:
-                raise SystemExit(
-                    f"{file} is not what was written, by its checksum, and cannot be set aside: {error.strerror}. "
-                    f"Make {os.path.dirname(file)} writable, or copy the results elsewhere."
-                ) from None
         _remark(f"{why}, to be made again: {file}{aside}")
 
     def begin(self, missing: str | None = None) -> None:

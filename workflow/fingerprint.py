@@ -146,14 +146,14 @@ def _syntax_of(file: Path) -> _Syntax:
         with contextlib.suppress(OSError, ValueError):
             _syntaxes.update(json.loads(_KEPT.read_text(encoding="ascii")))
     if sha256 not in _syntaxes:
-        atexit.unregister(_keep)
-        atexit.register(_keep)
+        atexit.unregister(keep)
+        atexit.register(keep)
         _syntaxes[sha256] = list(_read(ast.parse(text, file.name)))
     return _Syntax(*_syntaxes[sha256])
 
 
-def _keep() -> None:
-    # Where nothing can be written it is read every time.
+def keep() -> None:
+    """Keep what the modules say for the next process; where nothing can be written, that reads them again."""
     with contextlib.suppress(OSError), whole_file(_KEPT, lasting=False) as temporary:
         temporary.write_text(json.dumps(_syntaxes), encoding="ascii")
 
