@@ -151,6 +151,15 @@ def smoke(tmp_path_factory):
 
 
 @pytest.fixture
+def before_jobs(monkeypatch):
+    """The module of the workflow."""
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import before_jobs
+
+    return before_jobs
+
+
+@pytest.fixture
 def project(smoke, tmp_path):
     """A finished campaign of one's own."""
     return shutil.copytree(smoke, tmp_path / "project")

@@ -93,7 +93,7 @@ class Campaign:
         self._origin = Path(file).resolve(), Path(workflow)
         if reason := belongs_to_another(Path(results), name, *self._origin):
             raise SystemExit(f"{reason} Nothing was computed.")
-        self._other = None if dry_run else _hold_lock(f".snakemake/{Path(results).name}.lock")
+        self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
         not_whole = checksums.damaged(results)
         unknown = dict(_of_unknown_origin(results))
         if not_whole or unknown:
@@ -272,10 +272,10 @@ def _is_record(file: Path) -> bool:
 
 
 # Open as long as this process lives: the lock ends with it, however it ends.
-_locks = []
+locks = []
 
 
-def _hold_lock(path: str) -> str | None:
+def hold_lock(path: str) -> str | None:
     """Hold the lock `path` until this process ends; return the process that holds it if that is another one.
 
     Snakemake's own lock is a file, which stays behind when the program is killed; every later call then asks for an
@@ -294,7 +294,7 @@ def _hold_lock(path: str) -> str | None:
         return file.read().strip() or "?"
     except OSError:
         return None  # a file system without locks: nothing to hold
-    _locks.append(file)
+    locks.append(file)
     with contextlib.suppress(OSError):  # a full disk
         file.truncate(0)
         file.write(f"{os.getpid()}\n")

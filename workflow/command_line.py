@@ -23,9 +23,7 @@ def campaign_configuration(workflow, root: str) -> Configuration:
         if len(files) > 1:
             names = ", ".join(map(str, files))
             raise ConfigurationError(f"--configfile: {names}; allowed: one file, for one campaign is one file")
-        configuration = load_configuration(
-            files[0] if files else _as_given(Path(root, DEFAULT)), dict(settings.config)
-        )
+        configuration = load_configuration(files[0] if files else _as_given(Path(root, DEFAULT)), dict(settings.config))
     except ConfigurationError as error:
         raise SystemExit(f"The configuration cannot be run:\n{printable_lines(error)}") from None
     for warning in configuration.warnings:
