@@ -56,7 +56,7 @@ def describe(
 def _tell_of_scans(campaign, plot: Path | None) -> None:
     """Tell of the measured surfaces that are pressed, and draw them if asked."""
     from icha.configuration.cases import run_cases
-    from icha.configuration.measured_surfaces import MeasuredSurface
+    from icha.configuration.surfaces import MeasuredSurface
 
     pressed = {case.surface: campaign.surfaces[case.surface] for case in run_cases(campaign)}
     measured = {name: section for name, section in pressed.items() if isinstance(section, MeasuredSurface)}

@@ -208,7 +208,7 @@ def prepare(folder: Path, deposit: Found, *, own_source: bool) -> tuple[Path, Pa
 
     With its own source the project is that; else it is nothing but data.
     """
-    from icha.configuration.named_files import FOLDER as INPUTS
+    from icha.configuration.load import INPUTS
 
     project, original = folder / (PROJECT if own_source else _DATA), deposit.path
     if not deposit.path.is_dir():

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.settings import run_settings, run_sha256
+from icha.configuration.cases import run_settings, run_sha256
 from icha.contact.models import ASPERITIES
 from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result

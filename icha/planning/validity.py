@@ -10,9 +10,8 @@ from icha.asperity.material import WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
-from icha.configuration.full_contact import full_contact_energy
-from icha.configuration.measured_surfaces import MeasuredSurface
-from icha.configuration.surfaces import SelfAffineSurface
+from icha.configuration.plausibility import full_contact_energy
+from icha.configuration.surfaces import MeasuredSurface, SelfAffineSurface
 from icha.contact.models import ASPERITIES
 from icha.surfaces.moments import (
     SpectralMoments,

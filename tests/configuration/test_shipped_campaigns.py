@@ -6,13 +6,11 @@ from demo_configuration import REPOSITORY
 
 from icha.configuration.cases import (
     run_cases,
+    run_settings,
     solution_cases,
     surface_cases,
 )
 from icha.configuration.load import load_configuration
-from icha.configuration.settings import (
-    run_settings,
-)
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.planning.needs import further_software
 from icha.planning.results import campaign_files

@@ -16,8 +16,8 @@ import yaml
 from conftest import FIGURES, REPOSITORY, SMOKE, modules_of, snakemake, snakemake_command
 from traces import traces
 
+from icha.configuration.cases import campaign_sha256
 from icha.configuration.load import load_configuration
-from icha.configuration.settings import campaign_sha256
 from icha.planning.needs import missing_software
 from icha.planning.results import campaign_files
 

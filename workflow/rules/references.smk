@@ -1,7 +1,7 @@
 # What runs are compared with: what theories say of a surface, and published points; boundary elements on the topography
 # of a run, one load each or both ways; variants between the model and them; one asperity, where the answer is known.
 
-from icha.configuration.settings import adhesive_contacts, loop_settings, solution_settings, source_settings
+from icha.configuration.cases import adhesive_contacts, loop_settings, solution_settings, source_settings
 from icha.planning.needs import solver_memory
 
 

@@ -1,6 +1,6 @@
 # Topographies at rms slope 1, shared by all slopes and materials.
 
-from icha.configuration.settings import surface_settings
+from icha.configuration.cases import surface_settings
 from icha.planning.needs import surface_memory, surface_threads
 
 
