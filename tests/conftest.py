@@ -89,6 +89,7 @@ def _call(project, arguments, environment, said):
     os.environ.update(environment)
     sys.argv = arguments
     sys.path[:0] = modules_of(project).split(os.pathsep)
+    icha.__file__ = icha.__spec__.origin = str(project / "icha/__init__.py")
     icha.__path__[:] = icha.__spec__.submodule_search_locations[:] = [str(project / "icha")]
     for file in (REPOSITORY / "workflow").glob("*.py"):
         sys.modules.pop(file.stem, None)

@@ -125,7 +125,8 @@ def test_a_statement_runs_what_its_module_is_part_of(path, rules, some, own, edi
         ("2 mJ/m^2", "3 mJ/m^2", {"run": 3 + 1, "reference": 1}, {"surface", "boundary_elements"}),
         ("seeds: [1, 2]", "seeds: [1, 2, 3]", {"surface": 1, "run": 3 + 3, "boundary_elements": 3}, set()),
         ("refinement: 2", "refinement: 3", {"boundary_elements": 4}, {"run"}),
-        ("fig1_jkr: {}", "fig1_jkr: {tabor_parameter: 4}", {"configuration": 1, "figure": 1, "report_page": 1}, {"run"}),
+        ("fig1_jkr: {}", "fig1_jkr: {tabor_parameter: 4}", {"configuration": 1, "figure": 1, "report_page": 1},
+         {"run"}),
     ],
 )  # fmt: skip
 def test_a_value_runs_what_it_concerns(old, new, some, without, own, edit):
@@ -158,9 +159,14 @@ def fingerprint(monkeypatch):
     return fingerprint
 
 
-@pytest.mark.parametrize(
-    ("module", "scripts"),
-    {
+def test_scripts_whose_fingerprint_a_module_is_part_of(fingerprint):
+    # A run imports its model by name.
+    told = {"run_sweep": [f"icha.models.{name}" for name in MODELS]}
+    files = {
+        file.stem: fingerprint.files_of(file, *told.get(file.stem, ()))
+        for file in (REPOSITORY / "workflow/scripts").glob("*.py")
+    }
+    for module, scripts in {
         "boundary_elements/contact": {"run_sweep"},
         "equilibrium/equilibrium": {"run_sweep"},
         "asperity/jkr": {"run_sweep", "make_references"},
@@ -171,17 +177,8 @@ def fingerprint(monkeypatch):
         "surfaces/spectrum": {"make_surface", "make_references"},
         "configuration/campaign": {"publish"},
         "report/report": {"make_report"},
-    }.items(),
-)
-def test_scripts_whose_fingerprint_a_module_is_part_of(module, scripts, fingerprint):
-    # A run imports its model by name.
-    told = {"run_sweep": [f"icha.models.{name}" for name in MODELS]}
-    having = {
-        file.stem
-        for file in (REPOSITORY / "workflow/scripts").glob("*.py")
-        if f"icha/{module}.py" in fingerprint.files_of(file, *told.get(file.stem, ()))
-    }
-    assert having == scripts
+    }.items():
+        assert {script for script, found in files.items() if f"icha/{module}.py" in found} == scripts, module
 
 
 def test_models_of_contact_know_nothing_of_each_other_and_nobody_of_what_surrounds_scripts(fingerprint):
