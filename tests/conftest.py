@@ -1,5 +1,6 @@
 """The smoke campaign, run once for real, for all tests that look at the workflow."""
 
+import contextlib
 import fcntl
 import multiprocessing
 import os
@@ -8,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
@@ -149,6 +151,25 @@ def smoke(tmp_path_factory):
             run = snakemake(project, "all", "references", "publish")
             assert run.returncode == 0, run.stdout
     return project
+
+
+def wait_for(what, seconds=120):
+    """Wait until something is true; files that are not there yet are no error."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        with contextlib.suppress(FileNotFoundError):
+            if what():
+                return
+        time.sleep(0.02)
+    raise AssertionError("in vain")
+
+
+def is_alive(process):
+    """Whether a process runs: one that has ended and that nobody asked for its status does not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 @pytest.fixture
