@@ -3,13 +3,11 @@
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    Field,
-)
+from pydantic import AfterValidator, Field
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
+from icha.configuration.studies import MEASURED
 from icha.contact.models import ASPERITIES
 from icha.path.limits import STEP
 from icha.path.states import ReducedPressure
@@ -31,19 +29,19 @@ from icha.support.values import (
     unknown,
 )
 
+_Labels = list_of_names("Some of the study's.", Label)
+
 
 class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
     study: Name = Field(description="Name of the study on whose topographies they are solved.")
-    surfaces: list_of_names("Surfaces, from those of the study. Left out: all.", Label) | None = Field(
-        default=None, description="Surfaces, from those of the study. Left out: all."
-    )
+    surfaces: _Labels | None = Field(default=None, description="Surfaces, from those of the study. Left out: all.")
     seeds: Seeds | None = Field(default=None, description="Seeds, from those of the study. Left out: all.")
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
         default=None, description="Rms slopes, from those of the study. Left out: all."
     )
-    materials: list_of_names("Materials, from those of the study. Left out: all.", Label) | None = Field(
+    materials: _Labels | None = Field(
         default=None,
         description="Materials, from those of the study. Left out: all. With adhesion the grid must resolve their "
         "`interaction_range`.",
@@ -67,17 +65,19 @@ class BesideStudy(Section):
                 if value not in known:
                     yield (key, index), value, f"is not in study {self.study!r}; allowed: {listed(there)}"
         contacts = campaign.solved(self)
-        if not contacts:
+        if not contacts and MEASURED not in study.rms_slopes:
             yield (), self.study, "has none of the chosen combinations; allowed: combinations that the study has"
         materials: dict[str, dict[str, None]] = {}
         for each in contacts:
             materials.setdefault(each.surface, {})[each.material] = None
         for name in materials:
-            if campaign.boundary(name) != "periodic":
+            if campaign.is_free(name):
                 reason = (
                     "has a surface without periods; allowed: studies of periodic surfaces, as boundary elements are"
                 )
                 yield ("study",), self.study, f"{reason} ({name!r} is not)"
+                continue
+            if campaign.grid(name) is None:
                 continue
             yield from self._unresolved(campaign, name, materials[name])
             nodes = campaign.grid(name) * self.refinement

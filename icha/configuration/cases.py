@@ -62,7 +62,7 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
     """
     return {
         "material": campaign.materials[case.material].model_dump(),
-        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study), case.model),
+        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
         "rms_slope": case.rms_slope,
         "seed": case.seed,
     } | ({} if case.model == ASPERITIES else {"model": case.model})

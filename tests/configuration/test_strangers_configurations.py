@@ -279,7 +279,7 @@ def test_scans_of_absurd_units_and_sizes_are_refused(unit, size, load):
     if (unit, size) == ("nm", "64 um"):
         assert load(changes).campaign.period("rough") == pytest.approx(64e-6)
         return
-    with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.(height_unit|size|path): .*; allowed: "):
+    with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.(height_unit|size|path)\S*: .*; allowed: "):
         load(changes)
 
 
