@@ -33,8 +33,7 @@ help:
 	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
 	@echo "make docs    build the documentation as a site in docs/_build/html; broken links within it are errors"
 	@echo "make linkcheck  check the documentation's links to other sites"
-	@echo "make benchmarks  measure ICHA and boundary-element codes (about four hours, and as many for campaign cmc_truth; OPTIONS='--parts start'); docs/benchmarks.md"
-	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
+	@echo "make benchmarks  measure ICHA and boundary-element codes (four hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make short-range  hold boundary elements in the limit of short range against what is known (ten minutes); docs/short_range.md"
 	@echo "make error-sources  solve variants between the model and boundary elements (half an hour); docs/error_sources.md"
 	@echo "make faults  kill, damage and starve a small campaign (an hour or two, as root); docs/faults.md"
@@ -143,14 +142,10 @@ linkcheck: environment
 
 benchmarks: tamaas .venv-benchmarks/.installed
 	python benchmarks/run.py $(OPTIONS)
-	python benchmarks/page.py
-
-benchmarks-page: environment
-	python benchmarks/page.py
+	python -m benchmarks.tables
 
 faults: tamaas
-	python -m benchmarks.faults $(OPTIONS)
-	python -m benchmarks.faults.page
+	python -m validation.faults $(OPTIONS)
 
 # The validators have an environment of their own, for some of them need an old jsonschema.
 .venv-validators/.installed: .venv-tools/bin/uv tests/validators/requirements.txt
