@@ -187,21 +187,10 @@ ROUNDING = 1e-9
 
 def quantity(rule: Real, example: str):
     """Type of a value that is written with its unit and kept as a float in that of `rule`."""
-    allowed = f"{PHYSICAL_NAMES[rule.unit]} with its unit"
     bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
-    allowed += f", {bounds}, such as {example!r}"
-
-    def read(value: Any) -> float:
-        try:
-            result = to_si(value, rule.unit)
-        except ValueError as error:
-            raise ValueError(f"{error}; allowed: {allowed}") from None
-        if not rule.holds(result):
-            raise ValueError(f"is out of range; allowed: {allowed}")
-        return result
-
+    allowed = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), Unit(rule.unit)]
+    return _float(lambda value: to_si(value, rule.unit), rule, allowed, schema, Unit(rule.unit))
 
 
 @dataclass(frozen=True)
@@ -213,19 +202,24 @@ class Unit:
 
 def number(rule: Real):
     """Type of a pure number; `1e-3`, which YAML takes for text, is one."""
+    bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
+    schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
+    return _float(to_number, rule, rule.allowed, schema)
+
+
+def _float(convert, rule, allowed, schema, *metadata):
+    """Type of a float that `convert` reads and that keeps to a rule; refused with what is allowed."""
 
     def read(value: Any) -> float:
         try:
-            result = to_number(value)
+            result = convert(value)
         except ValueError as error:
-            raise ValueError(f"{error}; allowed: {rule.allowed}") from None
+            raise ValueError(f"{error}; allowed: {allowed}") from None
         if not rule.holds(result):
-            raise ValueError(f"is out of range; allowed: {rule.allowed}")
+            raise ValueError(f"is out of range; allowed: {allowed}")
         return result
 
-    bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
-    schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
+    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), *metadata]
 
 
 def integer(rule: Integer):
