@@ -56,6 +56,24 @@ _SUGGESTED = {
 }
 
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
+# Names are those of folders and files, too, which commands would take for options if they began with a hyphen.
+NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
+# Letters of a name, and of one with the values that a study varies: a file's name with its ending has up to 255.
+_LONGEST_NAME, LONGEST_LABEL = 80, 200
+# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
+ROUNDING = 1e-9
+# Names that messages list at most.
+_MOST_LISTED = 30
+# Location in a configuration, value, and what is wrong with it and allowed.
+Problem = tuple[tuple, Any, str]
+# In the place of a value that is not there, in problems.
+NOTHING = object()
+Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGEST_NAME)]
+# A name, or that of a variant made by a study's `vary`.
+Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
+_RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
+# More are a slip of the pen.
+_MOST_SEEDS = 10**5
 
 
 @cache
@@ -177,14 +195,6 @@ def finite(value) -> float:
     return value
 
 
-# Names are those of folders and files, too, which commands would take for options if they began with a hyphen.
-NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
-# Letters of a name, and of one with the values that a study varies: a file's name with its ending has up to 255.
-_LONGEST_NAME, LONGEST_LABEL = 80, 200
-# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
-ROUNDING = 1e-9
-
-
 def quantity(rule: Real, example: str):
     """Type of a value that is written with its unit and kept as a float in that of `rule`."""
     bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
@@ -277,10 +287,6 @@ def exactly_one(section):
     return section
 
 
-# Names that messages list at most.
-_MOST_LISTED = 30
-
-
 def listed(names: Iterable) -> str:
     """Names as a message lists them: `a, b, c`, or the first ones and how many more there are."""
     names = list(names)
@@ -288,21 +294,10 @@ def listed(names: Iterable) -> str:
     return ", ".join(map(str, names[:_MOST_LISTED])) + more
 
 
-# Location in a configuration, value, and what is wrong with it and allowed.
-Problem = tuple[tuple, Any, str]
-# In the place of a value that is not there, in problems.
-NOTHING = object()
-
-
 def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
     """The problem of a name that is none of some section's, if it is one."""
     if name not in names:
         yield location, name, f"is not defined; allowed: {listed(names) or 'none, for there is none'}"
-
-
-Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGEST_NAME)]
-# A name, or that of a variant made by a study's `vary`.
-Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
 
 
 def _without_controls(value: str) -> str:
@@ -347,11 +342,6 @@ class Section(BaseModel):
     """A part of the configuration: immutable, and without room for keys that nobody reads."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-_RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
-# More are a slip of the pen.
-_MOST_SEEDS = 10**5
 
 
 def _seeds(value: Any) -> Any:
