@@ -369,7 +369,7 @@ def test_of_several_arrays_one_must_be_named(tmp_path, name, write):
         scan(path, **LINES)
     read = scan(path, data="Z", **LINES)
     assert_read(read)
-    assert read.data == "Z" and "data Z of several" in read.description
+    assert read.data == "Z" and "data Z of several" in read.steps[0]
     # Of a single map among numbers nothing is asked.
     write(path, Z=HEIGHTS, a=np.ones((1, 1)))
     read = scan(path, **LINES)
