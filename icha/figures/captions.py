@@ -1,9 +1,12 @@
-"""What captions say of the runs that a figure lacks or draws apart, counted in the campaign dataset."""
+"""Captions of the figures: their text, and the runs that a figure lacks or draws apart, counted in the dataset."""
 
 from __future__ import annotations
 
+import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +16,17 @@ from icha.datasets.labels import LABELS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+@cache
+def _texts() -> dict[str, str]:
+    file = Path(__file__).with_name("captions.toml")
+    return {name: " ".join(text.split()) for name, text in tomllib.loads(file.read_text(encoding="utf-8")).items()}
+
+
+def caption_of(name: str) -> str:
+    """Return what a figure shows, for those who look at it."""
+    return _texts()[name].format_map(_texts())
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:

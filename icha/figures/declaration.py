@@ -70,7 +70,6 @@ class Declaration:
     Parameters
     ----------
     description : what it shows, in a line, for those who write configurations.
-    caption : what it shows, for those who look at it; printed in the report.
     options : the model of its section; its first line of documentation is part of the schema.
     inputs : the files of its arguments. Results are read; of other files the paths are handed over.
     arguments : arguments that the rest of the configuration gives, beside those of the options.
@@ -78,7 +77,6 @@ class Declaration:
     """
 
     description: str
-    caption: str
     options: type[FigureOptions]
     inputs: Callable[[Campaign, Any, ResultFiles], Inputs] = dataset_only
     arguments: Callable[[Campaign, Any], dict[str, Any]] = lambda campaign, options: {}

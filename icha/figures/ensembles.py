@@ -16,18 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.container import ErrorbarContainer
     from matplotlib.lines import Line2D
 
-# What captions say of them.
-LINES_OF_SEEDS = (
-    "Where there are several seeds, lines are means over them at common loads. With five seeds or more they have the "
-    "95 % confidence band of the mean (Student's t, of the logarithm on a logarithmic axis). With fewer, such a band "
-    "would be wider than the scatter, and pale thin lines show the single seeds instead."
-)
-POINTS_OF_SEEDS = (
-    "Points are means over the seeds. With five seeds or more, bars are 95 % confidence intervals of the mean "
-    "(Student's t; of the logarithm, and therefore not symmetric, where a quantity is positive). With fewer, such bars "
-    "would be longer than the scatter, and pale dots show the single seeds instead."
-)
-
 # A mean has about so many markers.
 _MEAN_MARKERS = 8
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}

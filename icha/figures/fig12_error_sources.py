@@ -12,7 +12,7 @@ from icha.datasets import results
 from icha.datasets.labels import ContactLabels
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs
-from icha.figures.ensembles import POINTS_OF_SEEDS, draw_points, points_handles
+from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.style import (
     BLACK,
@@ -78,19 +78,6 @@ def inputs(campaign: Campaign, options: SourcesFigure, files: results.ResultFile
 
 DECLARATION = Declaration(
     description="Steps from the model to boundary elements, each of which changes one thing.",
-    caption=(
-        "Sources of the model's error: between interacting asperities (ICHA) and boundary elements (BEM) one thing is "
-        "changed at a time, on the same topographies, without adhesion. Panels (a) and (b) show contact area and mean "
-        "separation over those of boundary elements on the true topography, against the reduced pressure F/(E* h'rms "
-        "A0). The curves named paraboloids are boundary elements on the upper envelope of the paraboloids of the "
-        "summits instead of the topography. Panel (c) shows what every step from boundary elements to the model adds "
-        "to the logarithm of the area; the steps add up to the black line. Panel (d) is for spots of one summit: it "
-        "shows the area of the patch over Hertz's area at the force of the patch itself, against the radius a of the "
-        "patch times the wave number q = (mean q^4 / mean q^2)^(1/2) of the surface. Its solid line joins medians, "
-        "its dashed line medians of what the fourth-order terms of the summits alone give; a few points lie above the "
-        f"frame. In panels (a) and (b) points of one load are drawn a little apart. {POINTS_OF_SEEDS} Panel (c) has "
-        "the means."
-    ),
     options=SourcesFigure,
     inputs=inputs,
 )

@@ -59,23 +59,6 @@ def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles)
 
 DECLARATION = Declaration(
     description="Pressure against mean separation and contact area against load, in loading and unloading.",
-    caption=(
-        "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over "
-        "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed), by "
-        "interacting asperities. Of a study with several surfaces one is drawn, which stands above panel (a). Tension "
-        "is negative. Symbols with a black edge mark pull-off, the largest tension on the last way back, if there is "
-        "any. Where slopes share a panel, symbols without an edge mark where the first "
-        "way in ends. Insets enlarge the region around zero load where the tension is small compared with the largest "
-        "load. The energy lost per nominal area is the area between the two ways in the plot of pressure against mean "
-        "separation. Where several seeds are drawn, the lines are means at common displacements from the turning "
-        "point, and the marks are means over the seeds. With five seeds or more, the lines have the 95 % confidence "
-        "band of the mean (Student's t). With fewer, pale thin lines show the single seeds. Steps are jumps of one "
-        "spot or of several. Crosses, upright on the way in and oblique on the way back, if there are any, are "
-        "boundary elements at some of their states, of the same topography and half-space. They are those in the "
-        "limit of a short range of attraction or, as crosses with three arms where the legend says so, those by an "
-        "independent code at the finite range of the material, with the area corrected by the perimeter of the "
-        "contact."
-    ),
     options=LoopsFigure,
     inputs=inputs,
 )

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration
-from icha.figures.ensembles import POINTS_OF_SEEDS, points_handles
+from icha.figures.ensembles import points_handles
 from icha.figures.hysteresis import (
     Lines,
     averages,
@@ -65,16 +65,6 @@ class PullOffFigure(StudyFigure):
 
 DECLARATION = Declaration(
     description="Pull-off against rms slope, and against the largest load.",
-    caption=(
-        "Pull-off, the largest tension on the way back to complete separation, against the rms slope (a) and, where "
-        "studies with several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached "
-        "before (b). It is drawn as nominal pressure, or divided by the strength of the interface (the largest "
-        "attraction of the Lennard-Jones traction), or divided by the tension of all summits that pull their most, "
-        "3/2 pi Δγ R, at once; the axis says which. All runs are by the model that is named above the panel: of a "
-        f"study with both models those by interacting asperities alone. {POINTS_OF_SEEDS} Without adhesion (open "
-        "markers) there is no pull-off. Where the values span decades, the axis is logarithmic down to the decade of "
-        "the smallest value, and linear from there to zero. Runs that were not separated completely are left out."
-    ),
     options=PullOffFigure,
 )
 

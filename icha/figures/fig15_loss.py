@@ -10,7 +10,7 @@ from pydantic import Field
 
 from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration, FigureOptions
-from icha.figures.ensembles import POINTS_OF_SEEDS, points_handles
+from icha.figures.ensembles import points_handles
 from icha.figures.hysteresis import Lines, averages, detached_runs_of, draw_averages, say_which_model, several
 from icha.figures.legends import legend_below
 from icha.figures.options import studies_problems
@@ -43,21 +43,6 @@ class LossFigure(FigureOptions):
 
 DECLARATION = Declaration(
     description="Energy lost in a loop against contact area, and its parts.",
-    caption=(
-        "Panel (a) shows the hysteresis loss, which is the energy per nominal area that is dissipated on a path from "
-        "first contact to the largest load and back to separation, against the largest contact area on the path over "
-        "the nominal area. All runs are by the model that is named above the panel: of a study with both models those "
-        f"by interacting asperities alone. {POINTS_OF_SEEDS} Lines are least-squares fits of a straight line to the "
-        "points that differ only in their largest load, if there are at least three. The legend gives its coefficient "
-        "of determination r² and the exponent of a power law through the same points, which is 1 where the loss is "
-        "proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found a linear growth). The axes "
-        "are logarithmic where both quantities span decades. Runs without adhesion have no value where the loss is "
-        "divided by the surface energy, and are left out there. Panel (b) shows what the loss consists of at the "
-        "largest load of every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and their "
-        "undoing (a property of the model, of either sign), jumps at controlled load, and the rest, which no event "
-        "explains. The parts are divided by the sum of their magnitudes; those below zero are gains. Bars carry the "
-        "markers of (a). Runs that were not separated completely are left out."
-    ),
     options=LossFigure,
 )
 

@@ -51,16 +51,6 @@ def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFile
 
 DECLARATION = Declaration(
     description="Where and when spots of one run snap into and out of contact.",
-    caption=(
-        "Events of one run by interacting asperities. Panel (a) shows where spots formed on the first way in and "
-        "where they broke on the last way back, over the topography of one period (the highest parts are white). With "
-        "adhesion, a spot forms by a jump into contact and breaks by a jump off. Without adhesion, it forms and "
-        "breaks where the surfaces touch, without a jump. Unions of two spots, and united spots that fell back into "
-        "their asperities, are marked at the centre of the united spot. The numbers in the legend count the marks. "
-        "Panel (b) shows how many such events there have been on the way in (solid, from the right) and on the way "
-        "back (dashed, from the left), against the mean separation, for every kind that occurred there, in the "
-        "colours of the marks; the curves of unions and of their undoing are thin."
-    ),
     options=SnapMapFigure,
     inputs=inputs,
     holds_topography=True,

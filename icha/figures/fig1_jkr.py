@@ -29,14 +29,6 @@ def no_inputs(campaign: Campaign, options: JKRFigure, files: ResultFiles) -> Inp
 
 DECLARATION = Declaration(
     description="Force and radius of one asperity against approach.",
-    caption=(
-        "Force F (a) and contact radius a (b) of one asperity against its approach δ, by the theory of Johnson, "
-        "Kendall and Roberts. On loading (solid) the asperity snaps into contact at A, where the gap falls to Wu's "
-        "jump-in distance. This distance alone depends on the Tabor parameter μ, which is given above panel (b): it "
-        "is an example, 3 unless the configuration gives another, and not that of the campaign's materials. On "
-        "unloading (dashed) the asperity follows the stable branch to C, the jump-off point, and detaches. B is the "
-        "pull-off point under load control. The dotted line is the unstable branch. Negative forces are tensile."
-    ),
     options=JKRFigure,
     inputs=no_inputs,
 )

@@ -24,7 +24,7 @@ from icha.figures.curves import (
     whose_theories,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, mark_fewer
+from icha.figures.ensembles import draw_members, mark_fewer
 from icha.figures.options import StudyFigure, finite_range_error
 from icha.figures.palette import FINITE_RANGE_MARKERS
 from icha.figures.select import asked_of_entry, finite_range_errors
@@ -45,25 +45,6 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 
 DECLARATION = Declaration(
     description="Contact area and mean separation against load, with theories, and what the logarithmic axes hide.",
-    caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean "
-        "gap) against the reduced pressure F/(E* h'rms A0), on double logarithmic axes. Closed and open shapes are "
-        "interacting asperities, one for each stop of the loading path; open ones are without adhesion. "
-        f"{LINES_OF_SEEDS} Upright crosses, if there are any, are boundary elements in the limit of a short range of "
-        "attraction, on the same topographies (means over their seeds), in the colour of the material. Crosses with "
-        "three arms, if there are any, are boundary elements by an independent code at the finite interaction range "
-        "of the material; their area is corrected by the perimeter of the contact. At ranges that a grid resolves "
-        "they show practically no hysteresis; with adhesion they therefore bound the result in the limit of short "
-        "ranges (JKR), but do not determine it. The lower panels show in per cent by how much the asperities differ "
-        "from boundary elements at the same load, interpolated between the stops of these; where there are none, from "
-        "the adhesionless theories of Persson (area) and of Yang and Persson (separation), as the label of the axis "
-        "says. Thin dashed lines, if there are any, show unloading as long as the load is compressive. Lines without "
-        "markers are these theories, the linear law of Bush, Gibson and Thomas where few summits touch, and the "
-        "theories of separate summits of Greenwood and Williamson (no adhesion) and of Fuller and Tabor (with "
-        "adhesion, in the colour of the material). The theories use the spectral moments of the surface, or of the "
-        "first one if there are several. Oblique crosses, if there are any, are published results of adhesionless "
-        "Green's function molecular dynamics (GFMD) of surfaces with this spectrum."
-    ),
     options=StudyFigure,
     inputs=inputs,
 )

@@ -12,7 +12,7 @@ from icha.datasets.places import place_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import material_looks, model_name, plausible, say_which_snapshots
 from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, lines_handles
+from icha.figures.ensembles import draw_members, lines_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import SnapshotFigure, finite_range_error
 from icha.figures.palette import BESIDE_LINE, MODEL_MARKERS, model_handle
@@ -31,21 +31,6 @@ def inputs(campaign: Campaign, options: SnapshotFigure, files: results.ResultFil
 
 DECLARATION = Declaration(
     description="Distributions of gap and pressure of every material, on the study's first surface.",
-    caption=(
-        "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure "
-        "p (b), at the load given in the figure. Solid lines with circles are interacting asperities; open circles "
-        f"are without adhesion. {LINES_OF_SEEDS} Gaps are in units of the rms height, pressures in units of E* h'rms. "
-        "Only contact carries pressure, so the integral of (b) is A/A0. That of (a) is 1 - A/A0 minus the overlap "
-        "fraction, which is the part of the nominal area outside the spots where the computed gap is negative. "
-        "Adhesion gives the tensile tail at negative pressures. Dashed lines with crosses, if there are any, are "
-        "boundary elements in the limit of a short range of attraction, on the same topographies (means over the "
-        "seeds that have them), in the colour of the material; their gaps are those out of contact, their pressures "
-        "those in contact. Next to an edge of contact, where the tension is singular, theirs is the mean of a cell, so "
-        "that their tensile tail ends there, in a peak. Where the legend says so, they are instead boundary elements "
-        "by an independent code at the finite interaction range of the material. At ranges that a grid resolves these "
-        "show practically no hysteresis; with adhesion they therefore bound the result in the limit of short ranges "
-        "(JKR), but do not determine it. The black line is Persson's theory of adhesionless contact."
-    ),
     options=SnapshotFigure,
     inputs=inputs,
 )

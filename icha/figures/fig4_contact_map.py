@@ -63,19 +63,6 @@ def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | 
 
 DECLARATION = Declaration(
     description="Contact spots over the topography.",
-    caption=(
-        "Contact spots by interacting asperities (red circles, in true size and position) over the topography, whose "
-        "highest parts are yellow. The map shows one period of a periodic surface, where circles that cross a border "
-        "continue at the opposite one, or the whole of a free square, where they may extend beyond its edges. The "
-        "load is given above the map. The framed part around the largest spot is enlarged. Where there are boundary "
-        "elements of the same topography and state, panel (b) shows their contact beside that of the asperities, "
-        "panel (c) its edge (black) with the enlarged circles, and panel (d) where both are in contact and where only "
-        "one of them is. The overlap is the area in contact in both divided by the area in contact in at least one. "
-        "The boundary elements are those in the limit of a short range of attraction or, where map (b) says so, those "
-        "by an independent code at the finite interaction range of the material. The area of the latter is corrected "
-        "by the perimeter of the contact. At ranges that a grid resolves they show practically no hysteresis; with "
-        "adhesion they therefore bound the result in the limit of short ranges (JKR), but do not determine it."
-    ),
     options=MapFigure,
     inputs=inputs,
     holds_topography=True,

@@ -18,7 +18,7 @@ from icha.figures.curves import (
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import LINES_OF_SEEDS, lines_handles
+from icha.figures.ensembles import lines_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import TruthFigure
 from icha.figures.style import (
@@ -73,17 +73,6 @@ def _load_unit(campaign, measurement) -> float:
 
 DECLARATION = Declaration(
     description="Contact area against load for all slopes and materials, with measurements.",
-    caption=(
-        "Real contact area over nominal area against the reduced pressure F/(E* h'rms A0) (a) and against F/(E* A0) "
-        "(b), for several surfaces and rms slopes (shape of the markers) and materials (colour and size). All shapes "
-        f"are open, so that none hides another, and are interacting asperities. {LINES_OF_SEEDS} Without adhesion, "
-        "the curves of one topography that is scaled to different slopes are one curve in (a). What adhesion adds "
-        "depends on the material and grows as the slope falls. In (b) the curves are ordered by slope: at a given "
-        "load the area falls as the slope rises. Upright crosses, if there are any, are boundary elements in the "
-        "limit of a short range of attraction, on the same topographies (means over their seeds), in the colour of the "
-        "material. Thin dashed lines, if there are any, show unloading as long as the load is compressive. "
-        "Measurements, if there are any, are drawn as lines."
-    ),
     options=TruthFigure,
     inputs=inputs,
     arguments=arguments,

@@ -50,12 +50,6 @@ DECLARATION = Declaration(
         "Contact spots of all slopes at the same load and at the same area. The study needs snapshots of kinds "
         "relative_load and area_fraction."
     ),
-    caption=(
-        "Contact spots, by interacting asperities, of one topography that is scaled to several rms slopes, at the "
-        "same load F/(E* A0) (a) and at the same area A/A0 (b), in their true size. At a given load the steeper "
-        "surface has less contact, and its spots, drawn on top, lie within those of the flatter ones. At a given area "
-        "the spots nearly coincide, so that every slope fills a sector of its own there."
-    ),
     options=SlopesFigure,
 )
 

@@ -17,7 +17,6 @@ from icha.figures.curves import (
     whose_theories,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import LINES_OF_SEEDS
 from icha.figures.options import StudyFigure
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
@@ -35,18 +34,6 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 
 DECLARATION = Declaration(
     description="Contact stiffness against load, with theory.",
-    caption=(
-        "Contact stiffness K = -dp/du, the derivative of the nominal pressure p with respect to the mean separation "
-        "u, against the reduced pressure F/(E* h'rms A0). It is in units of E* h'rms/h_rms (a) and of p/h_rms (b), "
-        "where the law K = p/u0 is a constant. Closed and open shapes are interacting asperities, whose stiffness is "
-        "that of the tangent of the equilibrium with the present spots; open ones are without adhesion. "
-        f"{LINES_OF_SEEDS} Upright crosses, if there are any, are boundary elements in the limit of a short range of "
-        "attraction, on the same topographies (means over their seeds), in the colour of the material; their stiffness "
-        "is that of the tangent along which the edges of contact move. States under tension or with negative stiffness "
-        "cannot be shown on these axes. The line is the derivative of the adhesionless separation of Yang and Persson "
-        "for an infinite surface. On a finite surface, the stiffness at small loads lies above the proportional law, "
-        "since only its highest parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
-    ),
     options=StudyFigure,
     inputs=inputs,
 )

@@ -10,7 +10,7 @@ import numpy as np
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import material_looks, model_name, say_which_snapshots
 from icha.figures.declaration import Declaration
-from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, lines_handles
+from icha.figures.ensembles import draw_members, lines_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import SnapshotFigure
 from icha.figures.palette import BESIDE_LINE, MODEL_MARKERS, model_handle
@@ -24,15 +24,6 @@ if TYPE_CHECKING:
 
 DECLARATION = Declaration(
     description="Sizes of the contact patches of every material, on the study's first surface.",
-    caption=(
-        "Sizes of the contact patches, which are the areas A of the spots (united spots count as one), at the load "
-        "given in the figure, by interacting asperities; open markers are without adhesion. Panel (a) shows the "
-        "number density n(A) per area of a patch and per nominal area, where bins with few patches are joined. Panel "
-        f"(b) shows the number of patches larger than A per nominal area, down to the largest patch. {LINES_OF_SEEDS} "
-        "Dashed lines, with crosses in (a), if there are any, are boundary elements in the limit of a short range of "
-        "attraction, on the same topographies (means over the seeds that have them), in the colour of the material; "
-        "their patches are regions of cells in contact that share edges."
-    ),
     options=SnapshotFigure,
 )
 

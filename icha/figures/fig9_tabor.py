@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.figures.curves import AREA_LABEL, gap_label
 from icha.figures.declaration import Campaign, Declaration
-from icha.figures.ensembles import POINTS_OF_SEEDS, draw_points, points_handles
+from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.options import SnapshotFigure
 from icha.figures.palette import PLACE_MARKERS, material_colours, pale_look, place_markers
@@ -39,15 +39,6 @@ DECLARATION = Declaration(
     description=(
         "Contact area and mean separation against the Tabor parameter. The study needs materials with adhesion that "
         "differ in their `interaction_range`."
-    ),
-    caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean "
-        "gap), by interacting asperities at the load given in the figure, against the Tabor parameter of the surface, "
-        "which is (R_c Δγ²/E*²)^(1/3) over the range of attraction, with R_c = 1/rms curvature. Runs that differ only "
-        "in the range are joined by a line: at a given surface energy a longer range (smaller Tabor parameter) lets "
-        "asperities jump into contact from farther away. They have the colour of the first of their materials. "
-        f"{POINTS_OF_SEEDS} Dashed lines are without adhesion. A shaded region, if there is one, has Tabor parameters "
-        "for which the jump-in distance is not verified."
     ),
     options=TaborFigure,
 )
