@@ -15,8 +15,8 @@ from campaign_lock import hold_lock
 from snakemake.logging import logger
 from snakemake_records import METADATA, file_of, mark_incomplete, record_of
 
+from icha.deposit.environment import note_versions
 from icha.planning.belonging import belongs_to_another, claim
-from icha.publication.environment import note_versions
 from icha.support import checksums
 from icha.support.atomic_files import is_left_over, why_not_writable
 from icha.support.ownership import Superseded, take_over, while_owned

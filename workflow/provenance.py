@@ -9,8 +9,8 @@ from typing import Any
 
 from snakemake_records import record_of
 
-from icha.publication.crate import Job
-from icha.publication.deposit_files import SOURCE
+from icha.deposit.crate import Job
+from icha.deposit.deposit_files import SOURCE
 
 SCRIPTS = "workflow/scripts"
 

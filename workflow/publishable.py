@@ -4,9 +4,9 @@ from pathlib import Path
 
 from icha.configuration.load import Configuration
 from icha.configuration.publication import needed
-from icha.publication.environment import refuse_other_environment, refuse_results_of_another_environment
-from icha.publication.licences import licence_problem
-from icha.publication.source import Source, program_source
+from icha.deposit.environment import refuse_other_environment, refuse_results_of_another_environment
+from icha.deposit.licences import licence_problem
+from icha.deposit.source import Source, program_source
 
 
 def publishable_source(configuration: Configuration, project: str, results: str) -> Source:

@@ -13,8 +13,8 @@ _MOST_FLAWS = 100
 
 def flaws_of(deposit: Path, *, large: bool) -> list[str]:
     """What is wrong with a deposit that is there, folder or zip, a line each; no line if it is whole."""
-    from icha.publication.deposit_files import verify_deposit
-    from icha.publication.strangers_files import LIMITS, NO_LIMITS
+    from icha.deposit.deposit_files import verify_deposit
+    from icha.deposit.strangers_files import LIMITS, NO_LIMITS
 
     if not deposit.exists():
         raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")

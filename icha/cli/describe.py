@@ -89,12 +89,12 @@ def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: 
     """
     from rich.console import Console
 
+    from icha.deposit.licences import licence_problem
     from icha.planning.belonging import belongs_to_another
     from icha.planning.needs import wanting
     from icha.planning.plan import plan
     from icha.planning.software import missing_software
     from icha.planning.validity import expected_validity
-    from icha.publication.licences import licence_problem
     from icha.support.checksums import damaged
 
     results = home / "results" / campaign.name

@@ -14,7 +14,7 @@ from icha.cli.options import Anyway, Cores, Large
 from icha.cli.project import FAILED, Mistake, shown
 from icha.cli.rerun_programs import fail, run_installed, run_own_source, stopped_by_signals
 from icha.cli.terminal import say
-from icha.publication.strangers_files import Found
+from icha.deposit.strangers_files import Found
 from icha.support import in_words
 from icha.support.in_words import counted
 from icha.support.printable import printable
@@ -80,7 +80,7 @@ def reproduce(
     Exit status: 0 if all is identical or within tolerance, 1 if not, or if computing fails or is stopped, 2 if the
     deposit is damaged or not there, or nothing is computed for another reason.
     """
-    from icha.publication.deposit_files import whole_deposit
+    from icha.deposit.deposit_files import whole_deposit
 
     if not own_source and (environment or isolation):
         given = "--environment" if environment else "--isolation"
@@ -103,7 +103,7 @@ def reproduce(
     else:
         say(f"what was computed again: {shown(made)}")
     if json:
-        from icha.publication.rerun_comparison import write_json
+        from icha.deposit.rerun_comparison import write_json
 
         write_json(comparison, json)
     if not good:
@@ -121,7 +121,7 @@ class _Rerun(NamedTuple):
 
 def _agreed(deposit: Found, only, own_source: bool, environment, isolation, folder: Path | None, yes: bool) -> _Rerun:
     """What is asked for of a deposit that is whole, after telling of it and asking."""
-    from icha.publication.rerun import LOCK, OWN_SOURCE, PYPROJECT, Refused, asked_runs, campaign_of
+    from icha.deposit.rerun import LOCK, OWN_SOURCE, PYPROJECT, Refused, asked_runs, campaign_of
 
     place = shown(folder) if folder else "a temporary folder"
     try:
@@ -141,7 +141,7 @@ def _agreed(deposit: Found, only, own_source: bool, environment, isolation, fold
 
 def _isolation(asked: str | None, environment: str | None, yes: bool) -> str:
     """The program that isolates: the one that is asked for, or `bwrap` where it works."""
-    from icha.publication.isolation import BWRAP, CONTAINERS, NO_ISOLATION, works
+    from icha.deposit.isolation import BWRAP, CONTAINERS, NO_ISOLATION, works
 
     if asked == NO_ISOLATION:
         return NO_ISOLATION
@@ -161,8 +161,8 @@ def _isolation(asked: str | None, environment: str | None, yes: bool) -> str:
 
 def _tell_what_it_says(deposit: Found) -> None:
     """Print what the deposit is, and what it says of itself."""
-    from icha.publication.deposit_files import ZENODO
-    from icha.publication.statement import metadata_of, statement
+    from icha.deposit.deposit_files import ZENODO
+    from icha.deposit.statement import metadata_of, statement
 
     sizes, said = deposit.sizes, {}
     if ZENODO in sizes:
@@ -178,7 +178,7 @@ def _tell_what_it_says(deposit: Found) -> None:
 
 def _tell_of_installed(deposit: Found, place) -> None:
     """Print that the installed program is run; `Mistake` if it is not the one that made the deposit."""
-    from icha.publication.rerun import changed_files, unlike_installed
+    from icha.deposit.rerun import changed_files, unlike_installed
 
     if wrong := unlike_installed(deposit):
         raise Mistake(
@@ -194,8 +194,8 @@ def _tell_of_installed(deposit: Found, place) -> None:
 
 def _tell_of_own_source(environment: str, isolation: str, place) -> None:
     """Print that the deposit's own program is run, what it can touch, and what is better."""
-    from icha.publication.isolation import BWRAP, CONTAINERS, NO_ISOLATION, works
-    from icha.publication.rerun import PROJECT, surroundings
+    from icha.deposit.isolation import BWRAP, CONTAINERS, NO_ISOLATION, works
+    from icha.deposit.rerun import PROJECT, surroundings
 
     first = "" if environment == "here" else "its `make environment`, and then "
     say(f"is run:     the program in the deposit: {first}its `icha run`")
@@ -212,7 +212,7 @@ def _tell_of_own_source(environment: str, isolation: str, place) -> None:
 
 def _computed_again(rerun: _Rerun, folder: Path, cores: str | None, anyway: bool):
     """The folder with the results, their comparison with the deposit's, and the exit status of the campaign."""
-    from icha.publication.rerun import Refused, begin, prepare, refuse_wrong_configuration
+    from icha.deposit.rerun import Refused, begin, prepare, refuse_wrong_configuration
 
     goes_on = f"the same command with --folder {shown(folder)} goes on from here"
     name = rerun.campaign["name"]
@@ -239,8 +239,8 @@ def _computed_again(rerun: _Rerun, folder: Path, cores: str | None, anyway: bool
 
 
 def _compared(original: Path, made: Path, runs: list[str], sizes):
-    from icha.publication.rerun import surface_of
-    from icha.publication.rerun_comparison import compare_folders
+    from icha.deposit.rerun import surface_of
+    from icha.deposit.rerun_comparison import compare_folders
 
     paths = None
     if runs:
@@ -250,7 +250,7 @@ def _compared(original: Path, made: Path, runs: list[str], sizes):
 
 def _tell(comparison, status: int) -> bool:
     """Print the comparison; return whether all is reproduced."""
-    from icha.publication.rerun_comparison import DIFFERENT, IDENTICAL, TOLERANCE, table
+    from icha.deposit.rerun_comparison import DIFFERENT, IDENTICAL, TOLERANCE, table
 
     say(f"\nthe deposit, and what was computed again:\n\n{table(comparison)}\n")
     files = counted(len(comparison.files), "file")

@@ -47,7 +47,7 @@ def run_installed(project: Path, asked: list[str]) -> int:
     asked : arguments of its `icha run` after the configuration, targets and options.
     """
     from icha.datasets.results import CONFIGURATION
-    from icha.publication.rerun import surroundings
+    from icha.deposit.rerun import surroundings
     from icha.support.program import own_workflow
 
     program = [sys.executable, "-P", "-c", "from icha.cli import main; main()"]
@@ -63,8 +63,8 @@ def run_own_source(project: Path, deposit, campaign, asked: list[str], environme
     Of its copy in the project, which it may change as it likes, nothing is read here. `asked` as above.
     """
     from icha.datasets.results import CONFIGURATION
-    from icha.publication.isolation import CONTAINERS, NO_ISOLATION, isolated, make_home
-    from icha.publication.rerun import environment_target, surroundings, unlike_lock
+    from icha.deposit.isolation import CONTAINERS, NO_ISOLATION, isolated, make_home
+    from icha.deposit.rerun import environment_target, surroundings, unlike_lock
 
     variables = make_home(isolation, project, surroundings())
     if environment == "here":

@@ -57,7 +57,7 @@ def upload(
 
     Exit status: 0 if everything was sent, 1 if not, 2 if it cannot be sent.
     """
-    from icha.publication.zenodo import SANDBOX, ZENODO, server_address
+    from icha.deposit.zenodo import SANDBOX, ZENODO, server_address
 
     if sandbox and url:
         raise Mistake("--sandbox and --url name two servers; allowed: only one of them")
@@ -103,7 +103,7 @@ def _token(address: str) -> str:
 
 def _archive(deposit: Path, large: bool) -> Path:
     """The zip of a deposit, verified."""
-    from icha.publication.deposit_files import CHECKSUMS, read_file, whole_deposit
+    from icha.deposit.deposit_files import CHECKSUMS, read_file, whole_deposit
 
     archive = deposit
     if deposit.is_dir():
@@ -122,8 +122,8 @@ def _archive(deposit: Path, large: bool) -> Path:
 
 def _contents(archive: Path, folder: Path) -> tuple[list[Path], dict]:
     """The files that are sent, and the metadata for Zenodo."""
-    from icha.publication.deposit_files import CRATE, README, ZENODO, copy_file, whole_deposit
-    from icha.publication.statement import metadata_of
+    from icha.deposit.deposit_files import CRATE, README, ZENODO, copy_file, whole_deposit
+    from icha.deposit.statement import metadata_of
 
     beside = README, CRATE
     with whole_deposit(archive) as found:
@@ -149,7 +149,7 @@ def _refuse_foreign_doi(metadata: dict, draft: str | None) -> None:
 
 
 def _summary(metadata: dict, files: list[Path], where: str) -> str:
-    from icha.publication.statement import names, statement
+    from icha.deposit.statement import names, statement
 
     sizes = [(path, path.stat().st_size) for path in files]
     rows = [
@@ -162,7 +162,7 @@ def _summary(metadata: dict, files: list[Path], where: str) -> str:
 
 
 def _send(archive, files, metadata, address, token, number, new_version_of, publish, yes) -> None:
-    from icha.publication.zenodo import ZENODO, Zenodo, ZenodoError, md5_of
+    from icha.deposit.zenodo import ZENODO, Zenodo, ZenodoError, md5_of
 
     server, draft = Zenodo(address, token), None
     try:

@@ -24,7 +24,7 @@ def verify(
 
     Exit status: 0 if it is whole, 1 if not (the first hundred flaws are printed), 2 if there is no such file or folder.
     """
-    from icha.publication.deposit_files import whole_deposit
+    from icha.deposit.deposit_files import whole_deposit
 
     if problems := flaws_of(deposit, large=large):
         say(listed(problems))

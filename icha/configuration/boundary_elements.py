@@ -102,9 +102,7 @@ class BesideStudy(Section):
 
 Loads = Annotated[
     stops(ReducedPressure, increasing),
-    Field(
-        description="Loads p/(E* h'rms), increasing. Those of `boundary_elements` become snapshots of the study's runs."
-    ),
+    Field(description="Loads p/(E* h'rms), increasing. Those of `finite_range` become snapshots of the study's runs."),
 ]
 Refinement = Annotated[
     integer(REFINEMENT),

@@ -42,7 +42,7 @@ from icha.support.values import (
 )
 
 # Sections of entries that belong to a study.
-BESIDE_STUDIES = ("boundary_elements", "boundary_element_loops", "error_sources")
+BESIDE_STUDIES = ("finite_range", "boundary_element_loops", "error_sources")
 # Each of these looks at all runs of its study.
 _FEW = Field(max_length=100)
 # Cells per shortest wavelength: with fewer, boundary elements are refused and asperities warned of; those to recommend.
@@ -99,7 +99,7 @@ class Campaign(Section):
     )
     materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)] = Field(description="Materials by name.")
     studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
-    boundary_elements: Annotated[dict[Name, BoundaryElements], _FEW] = Field(
+    finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = Field(
         default={}, description="Boundary-element solutions by name, compared with the runs of a study."
     )
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = Field(
@@ -199,7 +199,7 @@ class Campaign(Section):
 
         The loads of the study's boundary elements are among them.
         """
-        loads = sorted({p for e in self.boundary_elements.values() if e.study == study for p in e.reduced_pressures})
+        loads = sorted({p for e in self.finite_range.values() if e.study == study for p in e.reduced_pressures})
         if self.studies[study].snapshots is None and not loads:
             return None
         own = self.studies[study].own_snapshots
@@ -231,10 +231,10 @@ class Campaign(Section):
         for section in (*BESIDE_STUDIES, "measurements"):
             for label, entry in getattr(self, section).items():
                 yield from _within((section, label), entry.problems(self))
-        for label in self.boundary_elements:
+        for label in self.finite_range:
             if label in self.studies and self.compares_models(label):
                 reason = "is the name of a study that has boundary elements of its own; allowed: another name"
-                yield ("boundary_elements", label), label, reason
+                yield ("finite_range", label), label, reason
         yield from _within(("publication",), self.publication.problems(self))
         for label, figure in self.figures.drawn().items():
             yield from _within(("figures", label), figure.problems(self))

@@ -25,7 +25,7 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
     """All boundary-element solutions of a campaign, entry by entry."""
     return [
         SolutionLabels(label, entry.study, *contact, pressure)
-        for label, entry in campaign.boundary_elements.items()
+        for label, entry in campaign.finite_range.items()
         for contact, pressure in itertools.product(campaign.solved(entry), entry.reduced_pressures)
     ]
 

@@ -14,6 +14,11 @@ from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 # Of what is wrong with a configuration so much is told at once.
 MOST_TOLD = 50
+# Keys of older versions, by the model of their section: why each is refused, and what is allowed in its place.
+_FORMER_KEYS = {
+    ("Campaign", "boundary_elements"): "is now `finite_range`; allowed: the same section by that name (`models: "
+    "[boundary_elements]` of a study keeps its name)",
+}
 
 
 class ConfigurationError(ValueError):
@@ -47,6 +52,8 @@ def problem_of(details: Mapping, content: Mapping) -> Problem:
         return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
     if kind == "extra_forbidden":
         section = _section_at(location[:-1], content)
+        if section and (former := _FORMER_KEYS.get((section.__name__, location[-1]))):
+            return location, NOTHING, former
         allowed = sorted(section.model_fields) if section else []
         near = difflib.get_close_matches(str(location[-1]), allowed, 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""

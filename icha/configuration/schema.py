@@ -62,7 +62,7 @@ _HEADINGS = {
     "Targets": "`studies.<name>.targets`",
     "Snapshot": "`studies.<name>.snapshots`, each",
     "TurningPoint": "`studies.<name>.turning_points`, each",
-    "BoundaryElements": "`boundary_elements.<name>`",
+    "BoundaryElements": "`finite_range.<name>`",
     "BoundaryElementLoops": "`boundary_element_loops.<name>`",
     "ErrorSources": "`error_sources.<name>`",
     "OneAsperity": "`one_asperity`",

@@ -38,7 +38,7 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
 
 def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
     """Everything but the topography that determines a boundary-element solution, in SI units."""
-    entry = campaign.boundary_elements[case.entry]
+    entry = campaign.finite_range[case.entry]
     return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
 
 

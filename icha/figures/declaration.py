@@ -20,7 +20,7 @@ class Campaign(Protocol):
 
     studies: Mapping[str, Any]
     materials: Mapping[str, Any]
-    boundary_elements: Mapping[str, Any]
+    finite_range: Mapping[str, Any]
     boundary_element_loops: Mapping[str, Any]
     error_sources: Mapping[str, Any]
     measurements: Mapping[str, Any]

@@ -11,7 +11,7 @@ from icha.figures.options import ComparedFigure, campaign_and_model_error
 DECLARATION = Declaration(
     description=(
         "Relative error of contact area and mean separation against boundary elements. The study needs both `models`, "
-        "or an entry of `boundary_elements`."
+        "or an entry of `finite_range`."
     ),
     options=ComparedFigure,
     inputs=campaign_and_model_error,

@@ -11,7 +11,7 @@ from icha.figures.options import ComparedFigure, campaign_and_model_error
 DECLARATION = Declaration(
     description=(
         "Distance of the distributions of pressure and gap, and of the contact map, from those of boundary elements. "
-        "The study needs both `models`, or an entry of `boundary_elements`."
+        "The study needs both `models`, or an entry of `finite_range`."
     ),
     options=ComparedFigure,
     inputs=campaign_and_model_error,

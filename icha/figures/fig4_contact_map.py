@@ -49,7 +49,7 @@ def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | 
     else:
         return None
     _, _, *contact = options.run(campaign)
-    finest_first = sorted(campaign.boundary_elements.items(), key=lambda each: -each[1].refinement)
+    finest_first = sorted(campaign.finite_range.items(), key=lambda each: -each[1].refinement)
     return next(
         (
             SolutionLabels(label, options.study, *contact, value)

@@ -141,7 +141,7 @@ class ComparedFigure(StudyFigure):
             else:
                 reason = (
                     "has no boundary elements beside it; allowed: a study with both `models` and reduced pressures "
-                    "for targets, or one that an entry of boundary_elements names"
+                    "for targets, or one that an entry of finite_range names"
                 )
             yield ("study",), self.study, reason
 
@@ -153,7 +153,7 @@ def is_compared(campaign: Campaign, study: str) -> bool:
 
 def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
     """Whether there are boundary elements at a finite range beside the runs of a study."""
-    return any(entry.study == study for entry in campaign.boundary_elements.values())
+    return any(entry.study == study for entry in campaign.finite_range.values())
 
 
 def finite_range_error(campaign: Campaign, study: str, files: results.ResultFiles) -> Inputs:

@@ -127,7 +127,7 @@ def _computed(campaign, results, files, of) -> Iterator[Item]:
         yield there("theories", path, costs.theories_cost(of))
     yield from beside(
         "boundary elements",
-        campaign.boundary_elements,
+        campaign.finite_range,
         files.solutions,
         costs.solution_cost,
         lambda entry, case: case.reduced_pressure,

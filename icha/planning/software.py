@@ -6,7 +6,7 @@ from icha.configuration.campaign import Campaign
 
 TAMAAS = "tamaas"
 # Sections of a campaign that ask for boundary elements at finite ranges.
-BY_TAMAAS = ("boundary_elements", "boundary_element_loops", "error_sources", "one_asperity")
+BY_TAMAAS = ("finite_range", "boundary_element_loops", "error_sources", "one_asperity")
 
 
 def further_software(campaign: Campaign) -> tuple[str, ...]:

@@ -151,14 +151,14 @@ def test_what_names_a_varied_surface_means_its_variants(load):
     changes = {
         **LONG_RANGE,
         "studies.one.vary": {"hurst": [0.5, 0.9]},
-        "boundary_elements": {"truth": TRUTH | {"surfaces": ["rough"], "rms_slopes": [1.0]}},
+        "finite_range": {"truth": TRUTH | {"surfaces": ["rough"], "rms_slopes": [1.0]}},
         "figures": {"fig4_contact_map": {"study": "one", "surface": "rough", "seed": 2}},
     }
     campaign = load(changes).campaign
     assert {case.surface for case in solution_cases(campaign)} == {"rough-hurst0.5", "rough-hurst0.9"}
     assert len(solution_cases(campaign)) == 2 * 2 * 2
     assert campaign.figures.fig4_contact_map.surface == "rough-hurst0.5"
-    used = load({**changes, "boundary_elements": {"truth": TRUTH | {"surfaces": ["rough-hurst0.9"]}}}).campaign
+    used = load({**changes, "finite_range": {"truth": TRUTH | {"surfaces": ["rough-hurst0.9"]}}}).campaign
     assert {case.surface for case in solution_cases(used)} == {"rough-hurst0.9"}
 
 

@@ -76,7 +76,7 @@ def test_the_figure_of_tabor_parameters_needs_adhesion(load):
 
 def test_the_map_is_compared_with_the_finest_solution_of_its_state(load):
     entries = {"coarse": TRUTH, "fine": TRUTH | {"refinement": 2, "seeds": [2]}}
-    changes = {**LONG_RANGE, "boundary_elements": entries}
+    changes = {**LONG_RANGE, "finite_range": entries}
 
     def solution(**figure):
         campaign = load({**changes, "figures": {"fig4_contact_map": {"study": "one", **figure}}}).campaign

@@ -35,8 +35,8 @@ BAD = {
     ),
     "nothing to compare with": (
         None,
-        ALONE | LONG_RANGE | {"boundary_elements": {"truth": TRUTH}},
-        "boundary_elements.truth.study: 'one' has no runs to compare with; allowed: a study with 'asperities' among",
+        ALONE | LONG_RANGE | {"finite_range": {"truth": TRUTH}},
+        "finite_range.truth.study: 'one' has no runs to compare with; allowed: a study with 'asperities' among",
     ),
 }
 

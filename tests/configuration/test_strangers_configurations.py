@@ -144,7 +144,7 @@ WRONG = {
     "stops of loads beside a study": (
         {
             "studies.one.seeds": "1..20000",
-            "boundary_elements": {"b": {"study": "one", "reduced_pressures": [1e-3 + 1e-6 * i for i in range(10_000)]}},
+            "finite_range": {"b": {"study": "one", "reduced_pressures": [1e-3 + 1e-6 * i for i in range(10_000)]}},
         },
         None,
         "stops of all its runs; allowed: 5000000 at most",
@@ -160,10 +160,10 @@ WRONG = {
     "solutions": (
         {
             "studies.one.seeds": "1..10000",
-            "boundary_elements": {"b": {"study": "one", "reduced_pressures": [1e-3 + 1e-6 * i for i in range(100)]}},
+            "finite_range": {"b": {"study": "one", "reduced_pressures": [1e-3 + 1e-6 * i for i in range(100)]}},
         },
         None,
-        "boundary_elements.b: asks for 2000000 solutions; allowed: 100000 at most",
+        "finite_range.b: asks for 2000000 solutions; allowed: 100000 at most",
     ),
     "solutions together": (
         {
@@ -174,7 +174,7 @@ WRONG = {
         "error_sources: ask for 120000 solutions together; allowed: 100000 at most",
     ),
     "entries beside a study": (
-        "boundary_elements",
+        "finite_range",
         {f"b{i}": {"study": "one", "reduced_pressures": [0.01]} for i in range(101)},
         "is too long; allowed: at most 100 entries",
     ),
@@ -248,7 +248,7 @@ def test_of_a_thousand_mistakes_the_first_are_told(load):
     lines = str(error.value).splitlines()
     assert len(lines) == MOST_TOLD + 1 and lines[-1].endswith("more is wrong, which is told once this is right")
     with pytest.raises(ConfigurationError) as error:
-        load({"boundary_elements": {"b": {"study": "one", "seeds": "3..9000", "reduced_pressures": [0.01]}}})
+        load({"finite_range": {"b": {"study": "one", "seeds": "3..9000", "reduced_pressures": [0.01]}}})
     assert len(str(error.value)) < 10_000
 
 
@@ -265,10 +265,10 @@ def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
         {
             "studies.one.seeds": "1..10000",
             "materials.soft.interaction_range": "120 nm",
-            "boundary_elements": {f"b{i}": beside for i in range(5)},
+            "finite_range": {f"b{i}": beside for i in range(5)},
         }
     )
-    assert len(many.campaign.solved(many.campaign.boundary_elements["b0"])) == 20_000
+    assert len(many.campaign.solved(many.campaign.finite_range["b0"])) == 20_000
 
 
 @pytest.mark.parametrize("unit", ["1e-300 m", "1e300 m", "yottam*yottam/m", "nm"])

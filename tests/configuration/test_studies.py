@@ -132,7 +132,7 @@ def test_every_stop_is_the_same_as_all_of_them_one_by_one(load):
 
 def test_loads_of_boundary_elements_are_added_to_every_stop(load):
     entry = {"truth": TRUTH}
-    campaign = load({**LONG_RANGE, "boundary_elements": entry, "studies.one.snapshots": "every_stop"}).campaign
+    campaign = load({**LONG_RANGE, "finite_range": entry, "studies.one.snapshots": "every_stop"}).campaign
     assert campaign.snapshots_of("one") == [("reduced_pressure", p) for p in (1e-3, 0.01, 0.003)]
 
 

@@ -62,7 +62,7 @@ def test_the_campaign_of_the_five_minutes_is_a_valid_one(campaign):
 
 
 def test_boundary_elements_can_be_added_to_it(campaign):
-    (text,), (more,) = blocks("yaml", "name: mine"), blocks("yaml", "boundary_elements:")
+    (text,), (more,) = blocks("yaml", "name: mine"), blocks("yaml", "finite_range:")
     cases = solution_cases(campaign(text + "\n" + more))
     assert len(cases) == 3 * 2 and {case.material for case in cases} == {"bare"}
 

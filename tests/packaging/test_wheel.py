@@ -14,8 +14,8 @@ from conftest import REPOSITORY
 
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import write_dataset
-from icha.publication.environment import constraints
-from icha.publication.rerun import surroundings
+from icha.deposit.environment import constraints
+from icha.deposit.rerun import surroundings
 
 pytestmark = pytest.mark.slow
 

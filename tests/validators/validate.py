@@ -279,8 +279,8 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
 
 def main() -> int:
     """Validate what the command line names."""
-    from icha.publication.deposit_files import verify_deposit
-    from icha.publication.strangers_files import LARGE, LIMITS, NO_LIMITS, looked_through, unpack
+    from icha.deposit.deposit_files import verify_deposit
+    from icha.deposit.strangers_files import LARGE, LIMITS, NO_LIMITS, looked_through, unpack
     from icha.support.hdf5 import refuse_traps
     from icha.support.printable import printable
 

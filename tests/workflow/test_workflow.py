@@ -371,7 +371,7 @@ def test_surface_files_and_measurements(smoke, tmp_path):
     study["snapshots"] = [{"area_fraction": 0.01}]
     study["materials"] = ["bare"]
     content["materials"] = {"bare": content["materials"]["pdms_soft"] | {"surface_energy": "0 J/m^2"}}
-    content["boundary_elements"] = {
+    content["finite_range"] = {
         "truth": {"study": "multi_slope", "materials": ["bare"], "reduced_pressures": [3e-3], "refinement": 2}
     }
     content["studies"] = {"multi_slope": study}

@@ -44,7 +44,7 @@ rule boundary_elements:
     conda:
         "../envs/icha.yaml"
     resources:
-        mem_mb=lambda wildcards: solver_memory(CAMPAIGN, wildcards.surface, CAMPAIGN.boundary_elements[wildcards.entry]),
+        mem_mb=lambda wildcards: solver_memory(CAMPAIGN, wildcards.surface, CAMPAIGN.finite_range[wildcards.entry]),
         runtime=240,
     params:
         settings=lambda wildcards: solution_settings(CAMPAIGN, held(FILES.solutions, results.SOLUTION, wildcards)),

@@ -13,11 +13,11 @@ def publish(archive, *, results, files, named_files, project):
     """
     # What is imported at the top is imported for every job of a campaign.
     from icha.configuration.load import load_configuration
+    from icha.deposit.consistency import refuse_mixed
+    from icha.deposit.deposit import make_deposit
+    from icha.deposit.environment import refuse_other_environment
+    from icha.deposit.source import program_source
     from icha.planning.plan import whole_cost
-    from icha.publication.consistency import refuse_mixed
-    from icha.publication.deposit import make_deposit
-    from icha.publication.environment import refuse_other_environment
-    from icha.publication.source import program_source
     from icha.support.checksums import asked_of
 
     # Beside the rules, which they belong to, and not beside the scripts.

@@ -17,15 +17,15 @@ from icha.analysis.checks import read_checks, refuse_unknown_failures
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
 from icha.datasets.files import read_campaign
+from icha.deposit.citation import citation_cff, datacite_metadata, zenodo_metadata
+from icha.deposit.crate import Job, write_crate
+from icha.deposit.deposit_files import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of
+from icha.deposit.dictionary import data_dictionary, dictionary_csv
+from icha.deposit.licences import known_licence, licence_page
+from icha.deposit.readme import readme
+from icha.deposit.source import Source
+from icha.deposit.strangers_files import flaw_of_name
 from icha.planning.costs import Cost
-from icha.publication.citation import citation_cff, datacite_metadata, zenodo_metadata
-from icha.publication.crate import Job, write_crate
-from icha.publication.deposit_files import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of
-from icha.publication.dictionary import data_dictionary, dictionary_csv
-from icha.publication.licences import known_licence, licence_page
-from icha.publication.readme import readme
-from icha.publication.source import Source
-from icha.publication.strangers_files import flaw_of_name
 from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, sha256_of
 

@@ -35,13 +35,13 @@ from icha.configuration.load import load_configuration
 from icha.configuration.named_files import with_files_beside_it
 from icha.configuration.publication import KnownFailure
 from icha.configuration.settings import campaign_sha256
+from icha.deposit import deposit as deposits
+from icha.deposit import dictionary
+from icha.deposit.deposit import make_deposit
+from icha.deposit.deposit_files import verify_deposit, whole_deposit
+from icha.deposit.dictionary import data_dictionary, kind_of
+from icha.deposit.source import committed_source
 from icha.planning.plan import whole_cost
-from icha.publication import deposit as deposits
-from icha.publication import dictionary
-from icha.publication.deposit import make_deposit
-from icha.publication.deposit_files import verify_deposit, whole_deposit
-from icha.publication.dictionary import data_dictionary, kind_of
-from icha.publication.source import committed_source
 from icha.support.checksums import write_checksum
 
 # Where and by whom the campaign is run: words that are nowhere else.

@@ -6,10 +6,10 @@ from base64 import urlsafe_b64encode
 
 import pytest
 
-from icha.publication.deposit_files import files_of
-from icha.publication.environment import MADE_WITH, note_versions, refuse_results_of_another_environment
-from icha.publication.installed_source import installed_source
-from icha.publication.source import program_source
+from icha.deposit.deposit_files import files_of
+from icha.deposit.environment import MADE_WITH, note_versions, refuse_results_of_another_environment
+from icha.deposit.installed_source import installed_source
+from icha.deposit.source import program_source
 
 FILES = {
     "icha/__init__.py": "",

@@ -21,13 +21,13 @@ from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.places import slopes_of
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
+from icha.deposit.attributes import acknowledgement
+from icha.deposit.citation import paragraphs, web_address
+from icha.deposit.deposit_files import COMPUTED
+from icha.deposit.dictionary import Entry
+from icha.deposit.licences import Licence
 from icha.planning.costs import Cost
 from icha.planning.software import further_software
-from icha.publication.attributes import acknowledgement
-from icha.publication.citation import paragraphs, web_address
-from icha.publication.deposit_files import COMPUTED
-from icha.publication.dictionary import Entry
-from icha.publication.licences import Licence
 from icha.support import in_words
 
 _TEMPLATE = "README.md.jinja"

@@ -15,8 +15,8 @@ from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import Author
 from icha.datasets.model_paper import MODEL_PAPER
-from icha.publication.crate import Job, write_crate
-from icha.publication.deposit_files import CRATE
+from icha.deposit.crate import Job, write_crate
+from icha.deposit.deposit_files import CRATE
 
 SCRIPTS = "source/workflow/scripts"
 SCAN = "inputs/scan 1 µm.npy"

@@ -21,10 +21,10 @@ import pytest
 from conftest import REPOSITORY
 from reproduced import caller, lock
 
-from icha.publication.deposit_files import whole_deposit
-from icha.publication.isolation import BWRAP, isolated, works
-from icha.publication.rerun import changed_files, surroundings
-from icha.publication.source import PROGRAM as PARTS
+from icha.deposit.deposit_files import whole_deposit
+from icha.deposit.isolation import BWRAP, isolated, works
+from icha.deposit.rerun import changed_files, surroundings
+from icha.deposit.source import PROGRAM as PARTS
 from icha.support.checksums import sha256_of
 
 CAMPAIGN = """
@@ -190,9 +190,9 @@ def test_what_a_deposit_says_is_checked(changes, said, deposit, reproduce, tmp_p
 
 
 def test_what_is_missing_on_both_sides_is_not_reproduced(deposit, reproduce, monkeypatch):
-    from icha.publication.rerun_comparison import Comparison
+    from icha.deposit.rerun_comparison import Comparison
 
-    monkeypatch.setattr("icha.publication.rerun_comparison.compare_folders", lambda *_: Comparison(()))
+    monkeypatch.setattr("icha.deposit.rerun_comparison.compare_folders", lambda *_: Comparison(()))
     status, said = reproduce(deposit(**{"inputs/plan.json": '[1, "/none", "/none/x"]'}), *OWN, "none")
     assert status == 1 and "nothing was compared, so nothing is reproduced" in said and "identical" not in said
 
@@ -323,7 +323,7 @@ def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, t
         for file in folder.rglob("*"):
             if file.is_file():
                 archive.write(file, f"tiny/{file.relative_to(folder)}")
-    monkeypatch.setattr("icha.publication.strangers_files.shutil.disk_usage", lambda path: SimpleNamespace(free=3))
+    monkeypatch.setattr("icha.deposit.strangers_files.shutil.disk_usage", lambda path: SimpleNamespace(free=3))
     status, said = reproduce(tmp_path / "a.zip")
     assert status == 1 and "are needed, and 3 B are free" in said, said
     assert list((tmp_path / "temporary").iterdir()) == []

@@ -17,8 +17,8 @@ import pytest
 import yaml
 from reproduced import caller, lock
 
-from icha.publication.deposit_files import verify_deposit, whole_deposit
-from icha.publication.rerun import Refused, environment_target
+from icha.deposit.deposit_files import verify_deposit, whole_deposit
+from icha.deposit.rerun import Refused, environment_target
 
 NAME = "mine-1.0.0"
 # Nothing is isolated, so that a test can plant something; `LC_` is a beginning of names that are passed on.
@@ -142,10 +142,10 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, made, r
 @pytest.mark.parametrize(
     ("asked", "targets", "target"),
     [
-        ("name: mine\nboundary_elements: {truth: {study: load}}\n", "environment tamaas", "tamaas"),
+        ("name: mine\nfinite_range: {truth: {study: load}}\n", "environment tamaas", "tamaas"),
         ("name: mine\n", "environment tamaas", "environment"),
         # Of a program that installed all for everybody.
-        ("name: mine\nboundary_elements: {truth: {study: load}}\n", "environment", "environment"),
+        ("name: mine\nfinite_range: {truth: {study: load}}\n", "environment", "environment"),
     ],
 )
 def test_the_environment_is_the_one_that_the_campaign_needs(asked, targets, target, tmp_path):

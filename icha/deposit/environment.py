@@ -1,6 +1,6 @@
 """The environment that a deposit promises: the versions of the lock, now and when its results were made.
 
-`python -m icha.publication.environment` prints these versions for `pip install --constraint`.
+`python -m icha.deposit.environment` prints these versions for `pip install --constraint`.
 """
 
 import contextlib
@@ -80,7 +80,7 @@ def refuse_other_environment(project: Path) -> None:
         wrong = [f"  icha: imported from {imported}, and not from {own}", *wrong]
     if wrong:
         needed = (
-            "`python -m icha.publication.environment > locked.txt`, then `pip install --constraint locked.txt "
+            "`python -m icha.deposit.environment > locked.txt`, then `pip install --constraint locked.txt "
             "'icha[workflow]'`"
             if is_installed(project)
             else "`make environment`, and no other one"

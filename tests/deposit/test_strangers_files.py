@@ -13,8 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from icha.cli import app
-from icha.publication.deposit_files import read_file, verify_deposit
-from icha.publication.strangers_files import LIMITS, NO_LIMITS, flaw_of_name, looked_through, unpack
+from icha.deposit.deposit_files import read_file, verify_deposit
+from icha.deposit.strangers_files import LIMITS, NO_LIMITS, flaw_of_name, looked_through, unpack
 from icha.support.printable import is_printable
 
 CONTENT = b"read"
@@ -351,7 +351,7 @@ def test_an_encrypted_file_is_said_to_be_one(tmp_path):
 
 
 def test_a_large_text_is_not_read_as_a_whole(folder, monkeypatch):
-    monkeypatch.setattr("icha.publication.deposit_files.LARGEST_TEXT", 3)
+    monkeypatch.setattr("icha.deposit.deposit_files.LARGEST_TEXT", 3)
     with looked_through(folder) as found, pytest.raises(ValueError, match="a: has 4 B; allowed: 3 B"):
         read_file(found, "a")
 

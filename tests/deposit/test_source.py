@@ -6,8 +6,8 @@ import subprocess
 
 import pytest
 
-from icha.publication.deposit_files import files_of
-from icha.publication.source import committed_source
+from icha.deposit.deposit_files import files_of
+from icha.deposit.source import committed_source
 
 
 def git(folder, *arguments):

@@ -19,11 +19,11 @@ import netCDF4
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
+from icha.deposit.deposit_files import CHECKSUMS, COMPUTED, SOURCE, copy_file, read_file
+from icha.deposit.environment import differences
+from icha.deposit.source import PROGRAM
+from icha.deposit.strangers_files import Found, unpack
 from icha.planning.software import BY_TAMAAS, TAMAAS
-from icha.publication.deposit_files import CHECKSUMS, COMPUTED, SOURCE, copy_file, read_file
-from icha.publication.environment import differences
-from icha.publication.source import PROGRAM
-from icha.publication.strangers_files import Found, unpack
 from icha.support.checksums import sha256_of
 from icha.support.hdf5 import refuse_traps
 from icha.support.in_words import counted

@@ -2,8 +2,8 @@
 
 import json
 
-from icha.publication.deposit_files import ZENODO, read_file
-from icha.publication.strangers_files import Found
+from icha.deposit.deposit_files import ZENODO, read_file
+from icha.deposit.strangers_files import Found
 
 
 def metadata_of(deposit: Found) -> dict:

@@ -8,8 +8,8 @@ import yaml
 
 from icha.configuration.publication import Author, Funding, Publication
 from icha.datasets.model_paper import MODEL_PAPER
-from icha.publication.attributes import acknowledgement
-from icha.publication.licences import known_licence
+from icha.deposit.attributes import acknowledgement
+from icha.deposit.licences import known_licence
 
 # Types of Zenodo for what is related, by DataCite's names (https://developers.zenodo.org, deposit metadata).
 _ZENODO_TYPES = {

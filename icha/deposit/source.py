@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from icha.publication.installed_source import installed_source
+from icha.deposit.installed_source import installed_source
 from icha.support.program import is_installed
 
 # What computes the results: nothing may lie here that is not committed.

@@ -7,9 +7,9 @@ import re
 import pytest
 from publications import ALL, LEAST, ORCID
 
-from icha.publication.attributes import discovery_attributes
-from icha.publication.environment import differences, refuse_other_environment
-from icha.publication.licences import known_licence, licence_page
+from icha.deposit.attributes import discovery_attributes
+from icha.deposit.environment import differences, refuse_other_environment
+from icha.deposit.licences import known_licence, licence_page
 
 
 def test_another_environment_than_the_locked_one_is_refused(tmp_path):

@@ -17,9 +17,9 @@ from icha.analysis.checks import check_campaign
 from icha.configuration.load import load_configuration
 from icha.configuration.publication import Author, Funding, KnownFailure
 from icha.datasets.campaign_file.write import write_campaign
+from icha.deposit.licences import known_licence
+from icha.deposit.readme import markdown, readme
 from icha.planning.costs import Cost
-from icha.publication.licences import known_licence
-from icha.publication.readme import markdown, readme
 
 # What Markdown, HTML or a table would take for something else.
 ODD = [

@@ -8,7 +8,7 @@ import netCDF4
 import numpy as np
 import pytest
 
-from icha.publication.rerun_comparison import (
+from icha.deposit.rerun_comparison import (
     DIFFERENT,
     EXTRA,
     FLOOR,

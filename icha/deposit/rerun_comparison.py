@@ -25,7 +25,7 @@ import netCDF4
 import numpy as np
 
 from icha.checks.run import FRONT_LIMIT, RESIDUAL_LIMIT
-from icha.publication.deposit_files import COMPUTED
+from icha.deposit.deposit_files import COMPUTED
 from icha.support.atomic_files import whole_file
 from icha.support.hdf5 import refuse_traps
 from icha.support.printable import printable

@@ -18,8 +18,8 @@ from typer.testing import CliRunner
 from zenodo_mock.testing import spawn
 
 from icha.cli import app
-from icha.publication import zenodo
-from icha.publication.zenodo import Zenodo, ZenodoError, server_address
+from icha.deposit import zenodo
+from icha.deposit.zenodo import Zenodo, ZenodoError, server_address
 
 TOKEN = "Secret0f4ToKeN"
 NAME = "mine-1.0.0"
@@ -441,7 +441,7 @@ def test_a_file_is_not_read_into_memory(server, tmp_path):
 
     server.failures.append(("PUT", "large", count))
     program = (
-        "import re, sys; from icha.publication.zenodo import Zenodo, md5_of\n"
+        "import re, sys; from icha.deposit.zenodo import Zenodo, md5_of\n"
         "server = Zenodo(sys.argv[1], 'token'); draft = server.create()\n"
         "assert server.upload(draft, sys.argv[2], md5_of(sys.argv[2]))\n"
         "print(re.search(r'VmHWM:\\s*(\\d+)', open('/proc/self/status').read())[1])\n"

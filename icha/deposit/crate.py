@@ -23,9 +23,9 @@ from rocrate.rocrate import ROCrate
 from icha.configuration.publication import Author, Publication
 from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
-from icha.publication.citation import web_address
-from icha.publication.deposit_files import CRATE, README, SOURCE
-from icha.publication.licences import known_licence
+from icha.deposit.citation import web_address
+from icha.deposit.deposit_files import CRATE, README, SOURCE
+from icha.deposit.licences import known_licence
 from icha.support.atomic_files import whole_file
 
 _PROGRAM = f"{SOURCE}/"

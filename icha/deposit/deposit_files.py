@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from icha.publication.strangers_files import LIMITS, NO_LIMITS, Found, Limits, blocks, flaw_of_name, looked_through
+from icha.deposit.strangers_files import LIMITS, NO_LIMITS, Found, Limits, blocks, flaw_of_name, looked_through
 from icha.support import in_words
 from icha.support.printable import printable
 
