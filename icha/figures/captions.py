@@ -30,7 +30,7 @@ def caption_of(name: str) -> str:
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
-    """Count the runs of some studies that a figure of their means lacks, and those that it draws pale.
+    """Count the runs of some studies that a figure of their means lacks, and those that it marks as not applicable.
 
     Returns
     -------
@@ -74,4 +74,4 @@ def _runs_not_applicable(study: xr.Dataset, several: str) -> Iterator[str]:
     for reason, count in Counter(map(str, reasons)).items():
         if reason:
             runs = "run is" if count == 1 else "runs are"
-            yield f"{count} {runs} drawn pale{several}: {reason}."
+            yield f"{count} {runs} marked{several}: {reason}."

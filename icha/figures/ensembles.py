@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.legends import FEWER_SEEDS
+from icha.figures.looks import FEWER_SEEDS, NUMBER_PLACES
 from icha.figures.style import GREY, legend_handle
 from icha.support.statistics import ENOUGH, ensemble
 
@@ -26,7 +26,6 @@ _CROSS = {"ls": "none", "marker": "x", "mew": 0.7}
 _NUMBER = {"fontsize": 6.5, "textcoords": "offset points", "annotation_clip": True}
 # Points with bars are this far in front of what their look says.
 _BEFORE_POINTS = 0.101
-_BESIDE_MARK = ((5, -8), (-5, 5), (5, 5), (-5, -8))
 _SHADE = 0.22
 _FEW_BANDS = 3
 
@@ -107,18 +106,11 @@ def mark_fewer(
     cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.001, "label": FEWER_SEEDS}
     axes.plot(x[marks], y[marks], **cross | _CROSS)
     for own in stretches:
-        place = sum(text.get_text().startswith("n=") for text in axes.texts) % len(_BESIDE_MARK)
-        right, above = _BESIDE_MARK[place]
-        at = own[-1] if right > 0 else own[0]
-        axes.annotate(
-            f"n={counts[at]}",
-            (x[at], y[at]),
-            (right, above),
-            ha="left" if right > 0 else "right",
-            color=colour,
-            zorder=order + 1,
-            **_NUMBER,
-        )
+        # Beside the last mark of one stretch and the first of the next; the legend moves those that lie on each other.
+        place = NUMBER_PLACES[sum(text.get_text().startswith("n=") for text in axes.texts) % 2]
+        at = own[-1] if place.right > 0 else own[0]
+        beside = {"ha": place.align, "color": colour, "zorder": order + 1} | _NUMBER
+        axes.annotate(f"n={counts[at]}", (x[at], y[at]), (place.right, place.up), **beside)
 
 
 def draw_scatter(

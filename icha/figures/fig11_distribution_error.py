@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from icha.figures.declaration import Declaration
+from icha.figures.declaration import ComparedFigure, Declaration, campaign_and_model_error
 from icha.figures.errors import Quantity, draw_errors
-from icha.figures.options import ComparedFigure, campaign_and_model_error
 
 DECLARATION = Declaration(
     description=(

@@ -13,7 +13,7 @@ from icha.datasets.labels import ContactLabels
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs
 from icha.figures.ensembles import draw_points, points_handles
-from icha.figures.legends import legend_below, named_handles
+from icha.figures.looks import legend_below, named_handles
 from icha.figures.style import (
     BLACK,
     BLUE,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -9,19 +10,18 @@ import numpy as np
 from pydantic import Field
 
 from icha.figures.curves import plausible
-from icha.figures.declaration import Campaign, Declaration
+from icha.figures.declaration import Campaign, Declaration, StudyFigure, not_unloaded, studies_problems
 from icha.figures.ensembles import points_handles
 from icha.figures.hysteresis import (
-    Lines,
-    averages,
-    detached_runs_of,
+    averages_of,
+    detached_lines,
     draw_averages,
+    looks_of,
     say_which_model,
     several,
 )
-from icha.figures.legends import legend_below
-from icha.figures.options import StudyFigure, not_unloaded, studies_problems
-from icha.figures.select import asked_seeds, is_applicable, pick
+from icha.figures.looks import legend_below
+from icha.figures.select import pick
 from icha.figures.style import (
     GREY,
     ONE_COLUMN,
@@ -100,73 +100,62 @@ def figure(
     ValueError
         If there is no such study or quantity, or no run of a study was unloaded to complete separation.
     """
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     pick("quantity", quantity, list(_QUANTITIES))
-    # Of every line and whether the model is applicable to its runs, x and value by point and seed.
-    by_slope, by_load = {}, {}
-    for labels, run in detached_runs_of(campaign, [study]):
-        at, value = labels.rms_slope, float(run[quantity])
-        line = by_slope.setdefault(((labels.material, labels.surface, None), is_applicable(run)), {})
-        line.setdefault(labels._replace(seed=None), {})[labels.seed] = (at, value)
     load_studies = several("load_studies", load_studies) if load_studies else []
-    for labels, run in detached_runs_of(campaign, load_studies):
-        at, value = float(run["largest_reduced_pressure"]), float(run[quantity])
-        line = by_load.setdefault(((labels.material, labels.surface, labels.rms_slope), is_applicable(run)), {})
-        line.setdefault(labels._replace(seed=None), {})[labels.seed] = (at, value)
+    by_slope = detached_lines(campaign, [study], along_slopes=True)
+    by_load = detached_lines(campaign, load_studies)
     loaded_slopes = {slope for (*_, slope), _ in by_load}
     if len(loaded_slopes) == 1:
         # The panel's title names it, and the lines look like those of (a).
-        by_load = {((material, surface, None), own): line for ((material, surface, _), own), line in by_load.items()}
-    lines = Lines(campaign, [study, *load_studies], [key for key, _ in (*by_slope, *by_load)])
-    values = [
-        seeds[seed][1] for line in (*by_slope.values(), *by_load.values()) for seeds in line.values() for seed in seeds
-    ]
-    factor, unit = unit_for(max(values), "Pa") if quantity == "pull_off_pressure" else (1.0, "")
+        by_load = detached_lines(campaign, load_studies, along_slopes=True)
+    looks = looks_of(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
+    every = itertools.chain.from_iterable(line.values() for line in (*by_slope.values(), *by_load.values()))
+    largest = max(float(run[quantity]) for seeds in every for run in seeds.values())
+    factor, unit = unit_for(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
 
     fig = new_figure(TWO_COLUMNS if by_load else ONE_COLUMN, 2.9)
     panels = fig.subplots(1, 2 if by_load else 1, squeeze=False)[0]
-    means = []
-    for ax, letter, drawn in zip(panels, "ab", (by_slope, by_load), strict=False):
-        shown = {
-            key: averages(
-                list(line.values()),
-                factor,
-                [asked_seeds(campaign[labels.study].to_dataset(), labels) for labels in line],
-            )
-            for key, line in drawn.items()
-        }
-        for (key, applicable), line in shown.items():
-            look = {"color": lines.colour(key)} | lines.marker(key, applicable=applicable)
-            draw_averages(ax, line, **look, **_LINE)
-        means += shown.values()
-        _scale(ax, np.concatenate([line.y for line in shown.values()]))
+    counts = []
+    for ax, letter, x, drawn in zip(
+        panels, "ab", ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False
+    ):
+        means = {key: averages_of(campaign, line, x, quantity, factor) for key, line in drawn.items()}
+        for (contact, applicable), line in means.items():
+            draw_averages(ax, line, **looks.look(contact, applicable=applicable) | _LINE)
+            counts += line.counts.tolist()
+        _scale(ax, np.concatenate([line.y for line in means.values()]))
+        ax.set_ylabel(_QUANTITIES[quantity] + (f" ({unit})" if unit else ""))
         panel_label(ax, letter)
-    label = _QUANTITIES[quantity] + (f" ({unit})" if unit else "")
-    panels[0].set_ylabel(label)
-    panels[0].set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
-    slopes = sorted({labels.rms_slope for line in by_slope.values() for labels in line})
-    panels[0].set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
-    panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
-    panels[0].minorticks_off()
+    _label_slopes(panels[0], sorted({labels.rms_slope for line in by_slope.values() for labels in line}))
     if by_load:
-        loads = np.array([at for line in by_load.values() for seeds in line.values() for at, _ in seeds.values()])
-        if loads.min() > 0 and loads.max() > 2 * loads.min():
-            panels[1].set_xscale("log")
-            panels[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-            panels[1].xaxis.set_major_formatter(lambda value, _: number(value))
-            panels[1].xaxis.set_minor_formatter(NullFormatter())
-        elif np.ptp(loads) < 1e-3 * np.abs(loads).max():
-            panels[1].set_xlim(0, 2 * loads.max())
-        panels[1].set_ylabel(label)
-        panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
+        _label_loads(panels[1], np.concatenate([line.x for line in means.values()]))
         if len(loaded_slopes) == 1:
             panels[1].set_title(slope_label(*loaded_slopes), loc="right")
     say_which_model(panels[0], campaign, [study, *load_studies])
-    if lines.scale:
-        lines.scale.draw(fig, list(panels))
-    legend_below(fig, lines.handles(**_LINE) | points_handles(np.concatenate([line.counts for line in means])))
+    legend_below(fig, looks.handles(**_LINE) | points_handles(counts), scale=looks.scale, panels=panels)
     return fig
+
+
+def _label_slopes(ax, slopes):
+    """Label the axis of slopes by those that there are."""
+    ax.set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
+    ax.set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
+    ax.set_xticks(slopes, [f"{slope:g}" for slope in slopes])
+    ax.minorticks_off()
+
+
+def _label_loads(ax, loads):
+    """Label the axis of the largest loads."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    ax.set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
+    if loads.min() > 0 and loads.max() > 2 * loads.min():
+        ax.set_xscale("log")
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        ax.xaxis.set_major_formatter(lambda value, _: number(value))
+        ax.xaxis.set_minor_formatter(NullFormatter())
+    elif np.ptp(loads) < 1e-3 * np.abs(loads).max():
+        ax.set_xlim(0, 2 * loads.max())
 
 
 def _scale(ax, values):

@@ -9,12 +9,11 @@ import numpy as np
 
 from icha.datasets import results
 from icha.figures.curves import SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, not_unloaded
 from icha.figures.hysteresis import BRANCH_DASHES
-from icha.figures.legends import legend_below
+from icha.figures.looks import NOT_APPLICABLE_ALONE, legend_below, words_handle
 from icha.figures.maps import block_means, draw_whole
-from icha.figures.options import RunFigure, not_unloaded
-from icha.figures.select import NothingToDraw, run_on_topography, ways_back
+from icha.figures.select import NothingToDraw, is_applicable, run_on_topography, ways_back
 from icha.figures.style import (
     BLACK,
     GREY,
@@ -124,7 +123,7 @@ def figure(
     for ax, letter in ((where, "a"), (when, "b")):
         panel_label(ax, letter)
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
-    legend_below(fig, handles)
+    legend_below(fig, handles if is_applicable(run) else handles | words_handle(NOT_APPLICABLE_ALONE))
     return fig
 
 

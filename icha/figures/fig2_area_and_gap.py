@@ -23,10 +23,9 @@ from icha.figures.curves import (
     study_curves,
     whose_theories,
 )
-from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure, finite_range_error
 from icha.figures.ensembles import draw_members, mark_fewer
-from icha.figures.options import StudyFigure, finite_range_error
-from icha.figures.palette import FINITE_RANGE_MARKERS
+from icha.figures.looks import FINITE_RANGE_MARKERS
 from icha.figures.select import asked_of_entry, finite_range_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
@@ -85,35 +84,14 @@ def figure(
     rows = ["ab", "c" + ("d" if differences[1] else "b")]
     axes = fig.subplot_mosaic(";".join(rows), height_ratios=(1, _LOWER))
     left, right = axes["a"], axes["b"]
-    pressures, areas, gaps = [], [], []
-    for line in curves.lines:
-        p, area = draw_line(left, line, _areas, logarithmic=True, lines=len(curves.lines))
-        areas.append(area)
-        pressures.append(p)
-        p, gap = draw_line(right, line, _separations, logarithmic=True, lines=len(curves.lines))
-        gaps.append(gap)
-        draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
-    for line in curves.beside:
-        p, area = draw_crosses(left, line, _areas, logarithmic=True)
-        areas.append(area)
-        pressures.append(p)
-        p, gap = draw_crosses(right, line, _separations, logarithmic=True)
-        gaps.append(gap)
-    for ax in (left, right):
-        logarithmic_axes(ax)
-    if curves.unloaded:
-        left.plot([], [], color=GREY, label="unloading", **UNLOADING)
-    for p, area, gap in _draw_solutions(left, right, curves.colours, entries):
-        pressures.append(p)
-        areas.append(area)
-        gaps.append(gap)
-    pressures, areas, gaps = (plausible(np.concatenate(values)) for values in (pressures, areas, gaps))
+    states = _draw_states(left, right, curves) + _draw_solutions(left, right, curves.looks, entries)
+    pressures, areas, gaps = (plausible(np.concatenate(values)) for values in zip(*states, strict=True))
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
         if "gfmd_reduced_pressure" in references:
             x = (x[0], max(x[1], 1.2 * float(references["gfmd_reduced_pressure"].max())))
         _draw_references(left, right, references, x)
-        _draw_separate_summits(left, right, references, dataset, curves.colours)
+        _draw_separate_summits(left, right, references, dataset, curves.looks.colours)
     left.set_ylim(min(areas.min(), 1.6 * x[0]) / 1.5, min(1, 3 * areas.max()))
     right.set_ylim(gaps.min() / 1.4, gaps.max() * 1.4)
     _label_separations(right, gaps)
@@ -130,6 +108,25 @@ def figure(
         axes.get(below, axes[letter]).set_xlabel(PRESSURE_LABEL)
     add_legend(fig, [left, right], curves, whose_theories(dataset) if references is not None else {})
     return fig
+
+
+def _draw_states(left, right, curves):
+    """Draw the runs by both models; returns loads, areas and separations of what was drawn."""
+    states = []
+    for line in curves.lines:
+        _, areas = draw_line(left, line, _areas, logarithmic=True, lines=len(curves.lines))
+        p, gaps = draw_line(right, line, _separations, logarithmic=True, lines=len(curves.lines))
+        states.append((p, areas, gaps))
+        draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
+    for line in curves.beside:
+        _, areas = draw_crosses(left, line, _areas, logarithmic=True)
+        p, gaps = draw_crosses(right, line, _separations, logarithmic=True)
+        states.append((p, areas, gaps))
+    for ax in (left, right):
+        logarithmic_axes(ax)
+    if curves.unloaded:
+        left.plot([], [], color=GREY, label="unloading", **UNLOADING)
+    return states
 
 
 def _label_separations(ax, gaps):
@@ -255,7 +252,7 @@ def _separations(run):
     return run["reduced_pressure"].values, run["reduced_separation"].values
 
 
-def _draw_solutions(left, right, colours, entries):
+def _draw_solutions(left, right, looks, entries):
     """Mark the states of boundary elements at a finite range, means over their seeds; returns loads and values."""
     states, drawn, named = [], [], set()
     for entry, errors in entries.items():
@@ -263,7 +260,7 @@ def _draw_solutions(left, right, colours, entries):
         for material in errors["material"].values.tolist():
             again = drawn.count((name, material))
             drawn.append((name, material))
-            own = errors.sel(material=material)
+            own, adhesive = errors.sel(material=material), float(errors["surface_energy"].sel(material=material)) > 0
             members = [
                 own[f"{quantity}_boundary_elements"].transpose("seed", ..., "reduced_pressure").values
                 for quantity in ("contact_area_fraction", "reduced_separation")
@@ -273,58 +270,37 @@ def _draw_solutions(left, right, colours, entries):
             p = np.broadcast_to(own["reduced_pressure"].values, area.shape)
             # Of measured surfaces each has its own slope, and no states at those of others.
             there = np.isfinite(area)
-            look = {
-                "ls": "none",
-                "marker": FINITE_RANGE_MARKERS[again % 4],
-                "mec": colours.get(material, GREY),
-                "mew": 1.0,
-                # The larger ones show behind the others where the results agree, as the runs' markers do.
-                "ms": 8 if float(own["surface_energy"]) > 0 else 11,
-                "zorder": 6 + (float(own["surface_energy"]) > 0),
-            }
+            # The larger ones show behind the others where the results agree, as the runs' markers do.
+            look = {"ls": "none", "mew": 1.0, "ms": 8 if adhesive else 11, "zorder": 6 + adhesive}
+            look |= {"marker": FINITE_RANGE_MARKERS[again % 4], "mec": looks.colours.get(material, GREY)}
             states.append((p[there], area[there], gap[there]))
             known = np.isfinite(members[0])[:, there]
-            for ax, values in ((left, states[-1][1]), (right, states[-1][2])):
+            label = f"{name}, {entry}" if again else name
+            for ax, values in zip((left, right), states[-1][1:], strict=True):
                 ax.plot(states[-1][0], values, **look)
                 mark_fewer(ax, states[-1][0], values, known, look, asked[there])
-            label = f"{name}, {entry}" if again else name
-            if label not in named:
-                named.add(label)
-                for ax in (left, right):
+                if label not in named:
                     ax.plot([], [], **look | {"mec": GREY, "ms": 8}, label=label)
+            named.add(label)
     return states
 
 
 def _draw_references(left, right, references, limits):
+    """Draw theories of rough contact and published points within the limits of the loads."""
     p = references["reduced_pressure"].values
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
-    left.plot(
-        p[shown], references["persson_area_fraction"].values[shown], "-", color=BLACK, lw=1, label="Persson", zorder=2
-    )
+    look = {"color": BLACK, "lw": 1, "zorder": 2}
+    left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **look)
     linear = references["linear_pressure"].values
     own = linear >= limits[0] / 1.5
-    left.plot(
-        linear[own],
-        references["bush_gibson_thomas_area_fraction"].values[own],
-        "--",
-        color=GREY,
-        lw=1,
-        label="Bush, Gibson & Thomas",
-        zorder=2,
-    )
+    area = references["bush_gibson_thomas_area_fraction"].values
+    left.plot(linear[own], area[own], label="Bush, Gibson & Thomas", **look | {"ls": "--", "color": GREY})
     if "gfmd_reduced_pressure" in references:
         points = (references["gfmd_reduced_pressure"].values, references["gfmd_area_fraction"].values)
         left.plot(*points, "x", color=BLACK, ms=6, mew=1.2, label="GFMD, no adhesion", zorder=5)
     if "persson_reduced_separation" in references:
-        right.plot(
-            p[shown],
-            references["persson_reduced_separation"].values[shown],
-            "-",
-            color=BLACK,
-            lw=1,
-            label="Yang & Persson",
-            zorder=2,
-        )
+        separation = references["persson_reduced_separation"].values
+        right.plot(p[shown], separation[shown], label="Yang & Persson", **look)
 
 
 def _draw_separate_summits(left, right, references, dataset, colours):

@@ -10,12 +10,10 @@ import numpy as np
 from icha.datasets import results
 from icha.datasets.places import place_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.curves import material_looks, model_name, plausible, say_which_snapshots
-from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.curves import model_name, plausible, say_which_snapshots, snapshot_looks
+from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigure, finite_range_error
 from icha.figures.ensembles import draw_members, lines_handles
-from icha.figures.legends import legend_below, named_handles
-from icha.figures.options import SnapshotFigure, finite_range_error
-from icha.figures.palette import BESIDE_LINE, MODEL_MARKERS, model_handle
+from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS, legend_below, model_handle, named_handles
 from icha.figures.select import finite_range_errors, first_line, same_snapshots_by_boundary_elements
 from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, styled
 
@@ -71,12 +69,12 @@ def figure(
 
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
-    looks, scale = material_looks(campaign, study, lines)
+    each_look, looks = snapshot_looks(campaign, study, lines)
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2)
     lowest, highest, top, named, floor = -0.3, 0.3, 0.0, {}, []
     truths = same_snapshots_by_boundary_elements(campaign, lines)
-    for line, truth, look in zip(lines, truths, looks, strict=True):
+    for line, truth, look in zip(lines, truths, each_look, strict=True):
         u, densities = gap_densities(line.members)
         drawn = {"positive": True, "lines": len(lines), "asked": line.asked}
         draw_members(left, u, densities, look, **drawn, markevery=1 + len(u) // _MOST_MARKERS)
@@ -101,7 +99,7 @@ def figure(
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
-    say_which_snapshots(fig, [left, right], dataset, lines, scale)
+    say_which_snapshots([left, right], dataset, lines)
     if load > 0:
         line = np.linspace(0.002, highest, 300)
         right.semilogy(line, persson_pressure_density(line, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
@@ -117,7 +115,8 @@ def figure(
     seeds = lines_handles(len(line.members) for line in lines)
     own = model_name(dataset)
     models = {own: model_handle(own, ls="-", lw=0.8, mfc="white")} | named
-    legend_below(fig, named_handles([left]) | models | seeds | named_handles([right]))
+    handles = looks.handles(ls="-", marker=MODEL_MARKERS[own]) | models | seeds | named_handles([right])
+    legend_below(fig, handles, scale=looks.scale, panels=[left, right])
     return fig
 
 

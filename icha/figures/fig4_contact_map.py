@@ -10,11 +10,10 @@ from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.labels import SolutionLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.maps import block_means, draw_whole
-from icha.figures.options import RunFigure, SnapshotFigure
-from icha.figures.select import run_on_topography
-from icha.figures.spots import circles_in_cell, draw_spots
+from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, SnapshotFigure
+from icha.figures.looks import NOT_APPLICABLE_ALONE
+from icha.figures.maps import block_means, circles_in_cell, draw_spots, draw_whole
+from icha.figures.select import is_applicable, run_on_topography
 from icha.figures.style import TWO_COLUMNS, material_label, new_figure, number, panel_label, styled, unit_for
 
 if TYPE_CHECKING:
@@ -143,7 +142,8 @@ def figure(
     load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
     area = rf"$A/A_0$ = {float(run['contact_area_fraction'].values[step]):.3f}"
     contact = f"{labels.surface}, {material_label(campaign[study].to_dataset(), labels.material)}"
-    fig.suptitle(f"{contact}, {load}", fontsize="medium")
+    warning = "" if is_applicable(run) else f"\n{NOT_APPLICABLE_ALONE}"
+    fig.suptitle(f"{contact}, {load}{warning}", fontsize="medium")
     if solved is None:
         whole.set_title(area, loc="right")
     else:

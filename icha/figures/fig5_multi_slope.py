@@ -12,15 +12,13 @@ from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
     UNLOADING,
+    add_legend,
     draw_crosses,
     draw_line,
     draw_ways_back,
     study_curves,
 )
-from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import lines_handles
-from icha.figures.legends import legend_below, named_handles
-from icha.figures.options import TruthFigure
+from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
 from icha.figures.style import (
     BLACK,
     DASHES,
@@ -105,18 +103,15 @@ def figure(
         If there is no such study or no run in it, or a table cannot be read.
     """
     curves = study_curves(campaign, study, boundary_elements)
-    dataset = campaign[study].to_dataset()
+    dataset, colours = campaign[study].to_dataset(), curves.looks.colours
     # Of curves that lie on each other all stay visible: later materials have smaller markers.
-    drawn = [
-        name for name in dataset["material"].values.tolist() if any(x.labels.material == name for x in curves.lines)
-    ]
-    size = {name: max(7.0 * 0.7**k, 1.6) for k, name in enumerate(drawn)}
+    size = {name: max(7.0 * 0.7**k, 1.6) for k, name in enumerate(curves.looks.materials)}
 
     fig = new_figure(TWO_COLUMNS, 3.5)
     left, right = fig.subplots(1, 2, sharey=True)
     for line in curves.lines:
         labels = line.labels
-        if curves.scale is None:
+        if curves.looks.scale is None:
             line = line._replace(look=line.look | {"mfc": "none", "ms": size[labels.material]})
         slope = float(line.runs[0]["rms_slope"])
         draw_ways_back([(left, lambda p, a, _: (p, a)), (right, lambda p, a, _, slope=slope: (p * slope, a))], line)
@@ -128,17 +123,15 @@ def figure(
     for ax in (left, right):
         logarithmic_axes(ax)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
-        _draw_measured(left, right, table, known, curves.colours.get(known["material"], BLACK), DASHES[k % len(DASHES)])
+        _draw_measured(left, right, table, known, colours.get(known["material"], BLACK), DASHES[k % len(DASHES)])
     left.set_xlabel(PRESSURE_LABEL)
     right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
     left.set_ylabel(AREA_LABEL)
 
-    if curves.scale:
-        curves.scale.draw(fig, [left, right])
-    unloading = {"unloading": legend_handle(color=GREY, **UNLOADING)} if curves.unloaded else {}
-    seeds = lines_handles(len(line.runs) for line in curves.lines)
-    open_shapes = {} if curves.scale else {material_label(dataset, m): _open(curves.colours[m], size[m]) for m in size}
-    legend_below(fig, curves.handles | open_shapes | unloading | seeds | named_handles([left]))
+    further = {"unloading": legend_handle(color=GREY, **UNLOADING)} if curves.unloaded else {}
+    if not curves.looks.scale:
+        further = {material_label(dataset, name): _open(colours[name], size[name]) for name in size} | further
+    add_legend(fig, [left, right], curves, further)
     for ax, letter in ((left, "a"), (right, "b")):
         panel_label(ax, letter)
     return fig

@@ -16,8 +16,7 @@ from icha.figures.curves import (
     study_curves,
     whose_theories,
 )
-from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.options import StudyFigure
+from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.figures.curves import material_looks, model_name, say_which_snapshots
-from icha.figures.declaration import Declaration
+from icha.figures.curves import model_name, say_which_snapshots, snapshot_looks
+from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, lines_handles
-from icha.figures.legends import legend_below, named_handles
-from icha.figures.options import SnapshotFigure
-from icha.figures.palette import BESIDE_LINE, MODEL_MARKERS, model_handle
+from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS, legend_below, model_handle
 from icha.figures.select import first_line, same_snapshots_by_boundary_elements
 from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, styled, unit_for
 
@@ -57,14 +55,14 @@ def figure(
     """
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
-    looks, scale = material_looks(campaign, study, lines)
+    each_look, looks = snapshot_looks(campaign, study, lines)
     fig = new_figure(TWO_COLUMNS, 3.1)
     left, right = fig.subplots(1, 2, sharex=True)
     truths = same_snapshots_by_boundary_elements(campaign, lines)
     period = float(lines[0].members[0][0]["period"])
     factor, unit = unit_for(period, "m")
     cell = (period * factor) ** 2
-    for line, truth, look in zip(lines, truths, looks, strict=True):
+    for line, truth, look in zip(lines, truths, each_look, strict=True):
         areas, true_areas = ([patch_areas(run, at) * factor**2 for run, at in each.members] for each in (line, truth))
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         for ax, points, own, marker in (
@@ -78,16 +76,18 @@ def figure(
     for ax in (left, right):
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
-    say_which_snapshots(fig, [left, right], dataset, lines, scale)
+    say_which_snapshots([left, right], dataset, lines)
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    models = {model_name(dataset): {"ls": "-", "lw": 0.8, "mfc": "white"}}
+    own = model_name(dataset)
+    models = {own: {"ls": "-", "lw": 0.8, "mfc": "white"}}
     if any(truth.members for truth in truths):
         models[SHORT_RANGE] = BESIDE_LINE
     seeds = lines_handles(len(line.members) for line in lines)
-    legend_below(
-        fig, named_handles([left]) | {name: model_handle(name, **look) for name, look in models.items()} | seeds
-    )
+    handles = looks.handles(ls="-", marker=MODEL_MARKERS[own]) | {
+        name: model_handle(name, **look) for name, look in models.items()
+    }
+    legend_below(fig, handles | seeds, scale=looks.scale, panels=[left, right])
     return fig
 
 

@@ -23,10 +23,8 @@ from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.results import EXPLORER
 from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
-from icha.report.model_error import entry_section
-from icha.report.provenance import provenance
+from icha.report.sections import entry_section, provenance, sources, spectra, surface_row
 from icha.report.studies import study_section
-from icha.report.surfaces import sources, spectra, surface_row
 from icha.report.template import MOST_ROWS, template
 from icha.support.atomic_files import whole_file
 

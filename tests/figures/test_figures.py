@@ -32,11 +32,9 @@ from icha.figures import (
     fig11_distribution_error,
 )
 from icha.figures.curves import GAP_LABEL, SEPARATION_LABEL, gap_label
-from icha.figures.maps import block_means
-from icha.figures.palette import material_colours, place_markers
-from icha.figures.scale import Scale, materials_scale, places_scale
+from icha.figures.looks import Scale, material_colours, materials_scale, place_markers, places_scale
+from icha.figures.maps import block_means, circles_in_cell
 from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
-from icha.figures.spots import circles_in_cell
 from icha.figures.style import (
     BLACK,
     logarithmic_axes,

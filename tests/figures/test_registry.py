@@ -10,7 +10,7 @@ from icha.figures.registry import DECLARATIONS, figure_module
 
 MODULE = """
 from icha.figures.declaration import Declaration
-from icha.figures.options import StudyFigure
+from icha.figures.declaration import StudyFigure
 from icha.figures.select import study_runs
 from icha.figures.style import new_figure, styled
 
@@ -37,7 +37,7 @@ icha.figures.__path__.append(sys.argv[1])
 from icha.configuration.figures import Figures
 from icha.configuration.schema import json_schema, key_tables
 from icha.datasets.results import ResultFiles
-from icha.figures.drawing import draw_figure
+from icha.figures.registry import draw_figure
 figures = Figures.model_validate({"fig99_trivial": {"study": "slopes"}})
 assert list(figures.drawn()) == ["fig99_trivial"]
 assert "and nothing else" in json_schema() and "`figures.fig99_trivial`" in key_tables()

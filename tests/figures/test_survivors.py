@@ -17,7 +17,7 @@ from icha.figures import (
 )
 from icha.figures.captions import count_runs
 from icha.figures.ensembles import draw_members, draw_points
-from icha.figures.legends import FEWER_SEEDS, NOT_APPLICABLE
+from icha.figures.looks import FEWER_SEEDS, NOT_APPLICABLE
 from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)

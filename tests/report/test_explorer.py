@@ -15,8 +15,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from icha.cli import app
-from icha.report.explorer import NothingToExplore, write_explorer
-from icha.report.explorer_data import partners, picture, topography
+from icha.report.explorer import NothingToExplore, partners, picture, topography, write_explorer
 
 
 @pytest.fixture(scope="module")

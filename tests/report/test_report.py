@@ -24,8 +24,8 @@ from icha.figures.select import path_steps
 from icha.figures.style import quantity, save
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, read_benchmarks, write_times_page
+from icha.report.sections import read_surface_statistics
 from icha.report.studies import _range, own_stops
-from icha.report.surfaces import read_surface_statistics
 from icha.report.template import MOST_ROWS, scientific
 
 

@@ -19,7 +19,7 @@ from icha.figures import fig1_jkr, fig2_area_and_gap
 from icha.figures.style import save
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, write_times_page
-from icha.report.surfaces import read_surface_statistics
+from icha.report.sections import read_surface_statistics
 
 pytestmark = WANTED
 

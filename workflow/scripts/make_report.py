@@ -9,7 +9,7 @@ from icha.datasets.files import read_campaign
 from icha.figures.captions import caption_of
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import write_times
-from icha.report.surfaces import read_surface_statistics
+from icha.report.sections import read_surface_statistics
 
 if "snakemake" in globals():
     with guarded(snakemake):
