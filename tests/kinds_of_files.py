@@ -8,7 +8,7 @@ import small_campaign as small
 
 import icha
 from icha.analysis.common_loads import compare_campaign
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface

@@ -18,9 +18,8 @@ from snakemake_records import METADATA, file_of, mark_incomplete, record_of
 from icha.deposit.environment import note_versions
 from icha.planning.belonging import belongs_to_another, claim
 from icha.support import checksums
-from icha.support.atomic_files import is_left_over, why_not_writable
-from icha.support.ownership import Superseded, take_over, while_owned
-from icha.support.processes import beginning_of, end_with_parent
+from icha.support.atomic_files import Superseded, is_left_over, take_over, while_owned, why_not_writable
+from icha.support.program import beginning_of, end_with_parent
 
 
 def end_jobs_with_this_process() -> None:

@@ -8,12 +8,11 @@ from icha.cli.check import check
 from icha.cli.describe import describe
 from icha.cli.explore import explore
 from icha.cli.new import new
-from icha.cli.project import told
+from icha.cli.project import say, told
 from icha.cli.reproduce import reproduce
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
-from icha.cli.terminal import say
 from icha.cli.upload import upload
 from icha.cli.verify import verify
 

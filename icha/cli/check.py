@@ -5,11 +5,9 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, WRONG
-from icha.cli.terminal import say
+from icha.cli.project import FAILED, WRONG, say
 from icha.deposit.deposit_files import CHECKSUMS
-from icha.support.in_words import counted
-from icha.support.printable import printable
+from icha.support.in_words import counted, printable
 
 # What of a campaign is no netCDF file, by its name.
 _BY_NAME = {

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import typer
 
-from icha.cli.project import FAILED, Mistake
-from icha.cli.terminal import confirmed, say
+from icha.cli.project import FAILED, Mistake, confirmed, say
 
 _MOST_FLAWS = 100
 

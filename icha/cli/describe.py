@@ -6,18 +6,22 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.options import Config, Cores, Folder, core_count
 from icha.cli.project import (
+    Config,
+    Cores,
+    Folder,
     Mistake,
     configuration_path,
+    core_count,
+    markup,
     profile_settings,
     project,
     read_configuration,
+    say,
     shown,
     workflow_folder,
 )
 from icha.cli.scans import about_scan, check_picture, draw_scans
-from icha.cli.terminal import markup, say
 from icha.support import in_words
 from icha.support.in_words import counted
 

@@ -9,10 +9,8 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.measured_section import MeasuredSection, measured_section
-from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, shown, workflow_folder
-from icha.cli.scans import about_scan, check_picture, draw_scans
-from icha.cli.terminal import say
+from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, say, shown, workflow_folder
+from icha.cli.scans import MeasuredSection, about_scan, check_picture, draw_scans, measured_section
 
 TEMPLATES = Path(__file__).parent / "templates"
 # What explains the keys of a configuration to editors and to people.

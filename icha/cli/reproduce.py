@@ -10,14 +10,11 @@ from typing import Annotated, Literal, NamedTuple
 import typer
 
 from icha.cli.deposits import agree, flaws_of, listed
-from icha.cli.options import Anyway, Cores, Large
-from icha.cli.project import FAILED, Mistake, shown
+from icha.cli.project import FAILED, Anyway, Cores, Large, Mistake, say, shown
 from icha.cli.rerun_programs import fail, run_installed, run_own_source, stopped_by_signals
-from icha.cli.terminal import say
 from icha.deposit.strangers_files import Found
 from icha.support import in_words
-from icha.support.in_words import counted
-from icha.support.printable import printable
+from icha.support.in_words import counted, printable
 
 
 def reproduce(

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import typer
 
-from icha.cli.project import FAILED, Mistake, shown
-from icha.cli.terminal import say
-from icha.support.printable import printable
+from icha.cli.project import FAILED, Mistake, say, shown
+from icha.support.in_words import printable
 
 # Beside the project: what was said while its environment was installed.
 _LOG = "environment.log"

@@ -10,11 +10,9 @@ from typing import Annotated
 import typer
 
 from icha.cli.deposits import agree, flaws_of, listed
-from icha.cli.options import Large
-from icha.cli.project import FAILED, Mistake, shown
-from icha.cli.terminal import confirmed, say
+from icha.cli.project import FAILED, Large, Mistake, confirmed, say, shown
 from icha.support import in_words
-from icha.support.printable import printable
+from icha.support.in_words import printable
 
 TOKEN = "ZENODO_TOKEN"
 

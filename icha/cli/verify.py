@@ -6,11 +6,9 @@ from typing import Annotated
 import typer
 
 from icha.cli.deposits import flaws_of, listed
-from icha.cli.options import Large
-from icha.cli.project import FAILED
-from icha.cli.terminal import say
+from icha.cli.project import FAILED, Large, say
 from icha.support import in_words
-from icha.support.printable import printable
+from icha.support.in_words import printable
 
 
 def verify(

@@ -27,7 +27,7 @@ from icha.configuration.values import MEASURED
 from icha.configuration.yaml_files import dumped, read_yaml
 from icha.support.checksums import sha256_of
 from icha.support.values import NOTHING, Problem
-from icha.surfaces.measured.height_map import read_height_map
+from icha.surfaces.measured.array_files import read_height_map
 
 
 @dataclass(frozen=True)

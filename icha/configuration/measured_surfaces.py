@@ -6,8 +6,18 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from icha.support import in_words
 from icha.support.rules import GRID, LENGTH, Integer, Real
-from icha.support.units import PATTERN, conversion_factor, to_si
-from icha.support.values import File, Length, Section, Text, integer, number, quantity
+from icha.support.values import (
+    PATTERN,
+    File,
+    Length,
+    Section,
+    Text,
+    conversion_factor,
+    integer,
+    number,
+    quantity,
+    to_si,
+)
 
 
 def _unit_of_length(value: Any) -> float:

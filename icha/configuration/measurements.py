@@ -10,8 +10,7 @@ from pydantic import (
     model_validator,
 )
 
-from icha.datasets.measured_table import read_columns
-from icha.support.units import conversion_factor
+from icha.support.input_files import read_columns
 from icha.support.values import (
     File,
     Name,
@@ -19,6 +18,7 @@ from icha.support.values import (
     Problem,
     Section,
     Text,
+    conversion_factor,
     unknown,
 )
 

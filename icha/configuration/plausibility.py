@@ -7,8 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from icha.support import in_words
-from icha.support.units import to_number, to_si
-from icha.support.values import Problem, listed
+from icha.support.values import Problem, listed, to_number, to_si
 
 CONFIRMED = "confirmed"
 # Where keys of that name are quantities; in all other sections they are not, or are names of what is in these.

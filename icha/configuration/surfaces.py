@@ -10,12 +10,12 @@ from pydantic import (
 
 from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.support.rules import GRID, HURST
-from icha.support.units import conversion_factor
 from icha.support.values import (
     ROUNDING,
     File,
     Length,
     Section,
+    conversion_factor,
     integer,
     number,
 )

@@ -5,8 +5,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from icha.support.rules import SLOPE
-from icha.support.units import to_number
-from icha.support.values import distinct
+from icha.support.values import distinct, to_number
 
 # The slope of a topography as it was measured.
 MEASURED = "measured"

@@ -12,14 +12,12 @@ import numpy as np
 import xarray as xr
 
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
-from icha.datasets.files import has_groups, read_campaign, read_dataset
+from icha.datasets.files import has_groups, is_refused, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
-from icha.datasets.netcdf import is_refused
 from icha.datasets.variables import run as variables_of_run
 from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
 from icha.datasets.variables.terms import Variable
-from icha.support.hdf5 import refuse_traps
-from icha.support.input_files import bounded_memory, flaw_of_path, most_memory, require_room
+from icha.support.input_files import bounded_memory, flaw_of_path, most_memory, refuse_traps, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
 SOLUTION = "solution by boundary elements at a finite range"

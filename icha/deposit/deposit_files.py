@@ -10,7 +10,7 @@ from pathlib import Path
 
 from icha.deposit.strangers_files import LIMITS, NO_LIMITS, Found, Limits, blocks, flaw_of_name, looked_through
 from icha.support import in_words
-from icha.support.printable import printable
+from icha.support.in_words import printable
 
 CHECKSUMS = "SHA256SUMS"
 # What it says of itself: to readers, as an RO-Crate, to Zenodo.

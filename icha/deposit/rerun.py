@@ -25,8 +25,8 @@ from icha.deposit.source import PROGRAM
 from icha.deposit.strangers_files import Found, unpack
 from icha.planning.software import BY_TAMAAS, TAMAAS
 from icha.support.checksums import sha256_of
-from icha.support.hdf5 import refuse_traps
 from icha.support.in_words import counted
+from icha.support.input_files import refuse_traps
 from icha.support.program import own_workflow, package_of
 from icha.support.values import NAME_PATTERN
 

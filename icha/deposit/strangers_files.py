@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from icha.support import in_words
-from icha.support.printable import is_printable, printable
+from icha.support.in_words import is_printable, printable
 
 _BLOCK = 1 << 20
 # What of a name most systems can have: of a part, of a path.

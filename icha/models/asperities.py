@@ -2,7 +2,7 @@
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.attributes import MODEL_PAPER
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.observables import AsperityObservables
 from icha.models.model import Model

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from icha.datasets.storage import COMPRESSED_SIZES, LEFT_IN_FILE
+from icha.datasets.results import COMPRESSED_SIZES, LEFT_IN_FILE
 from icha.path.limits import DEFAULT_STEP
 from icha.planning.constants import FITTED, Constants, MiB
 from icha.support.parallel import LARGE_GRID

@@ -13,7 +13,7 @@ from icha.configuration.settings import run_settings, run_sha256
 from icha.contact.models import ASPERITIES
 from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
-from icha.datasets.places import count_cells
+from icha.datasets.labels import count_cells
 from icha.datasets.results import ResultFiles, job_file
 from icha.figures.registry import DECLARATIONS
 from icha.planning import costs
@@ -22,7 +22,7 @@ from icha.planning.resources import run_threads
 from icha.planning.results import CampaignFiles, campaign_files
 from icha.planning.roughness import roughness
 from icha.support.checksums import is_whole
-from icha.support.hdf5 import text
+from icha.support.input_files import text
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
 # So many of the files that are there are compared with what was expected of them.

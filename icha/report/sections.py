@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from icha.analysis.model_error import SUMMARISED
-from icha.datasets.places import place_of, slopes_of, surfaces_and_slopes
+from icha.datasets.labels import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.surface_file import as_measured
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.looks import MOST_COLOURS, Scale, legend_below, named_handles

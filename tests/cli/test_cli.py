@@ -21,15 +21,14 @@ from typer.testing import CliRunner
 from icha.analysis.checks import check_campaign, write_checks
 from icha.analysis.common_loads import compare_campaign
 from icha.cli import app
-from icha.cli.events import Watch, last_line, reason_of
-from icha.cli.live import LiveView
+from icha.cli.live import LiveView, Watch, last_line, reason_of
 from icha.cli.project import campaigns
 from icha.cli.show import sparkline
 from icha.configuration.cases import run_cases
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
 from icha.configuration.settings import run_sha256
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.figures.style import quantity

@@ -9,10 +9,9 @@ import small_campaign as small
 import xarray as xr
 
 from icha import Surface
-from icha.datasets import files
+from icha.datasets import campaign_file, files
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
-from icha.datasets.campaign_file import group, write
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
 from icha.datasets.labels import LABELS
 from icha.datasets.surface_file import read_surface, write_surface
@@ -260,9 +259,8 @@ def test_blocks_of_runs_leave_no_seams(tmp_path, monkeypatch, runs):
     members = {**cyclic.runs(), **dict(small.runs())}
     del members[next(iter(cyclic.runs()))]
     write_campaign(members.items(), tmp_path / "whole.nc")
-    monkeypatch.setattr(group, "_RUNS_IN_BLOCK", runs)
-    monkeypatch.setattr(group, "VALUES_IN_BLOCK", 2000)
-    monkeypatch.setattr(write, "VALUES_IN_BLOCK", 2000)
+    monkeypatch.setattr(campaign_file, "_RUNS_IN_BLOCK", runs)
+    monkeypatch.setattr(campaign_file, "VALUES_IN_BLOCK", 2000)
     write_campaign(members.items(), tmp_path / "blocks.nc")
     xr.testing.assert_identical(read_campaign(tmp_path / "blocks.nc"), read_campaign(tmp_path / "whole.nc"))
 

@@ -13,10 +13,9 @@ from icha.analysis.common_loads import compare_campaign
 from icha.analysis.validity import of_dataset
 from icha.cli import app
 from icha.datasets.campaign import run_labels, select_run
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, write_dataset
-from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.places import arrange_slopes, labels_at, place_of, slopes_of, surfaces_and_slopes
+from icha.datasets.labels import LABELS, RunLabels, arrange_slopes, labels_at, place_of, slopes_of, surfaces_and_slopes
 from icha.figures import (
     fig2_area_and_gap,
     fig3_distributions,

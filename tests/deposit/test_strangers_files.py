@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from icha.cli import app
 from icha.deposit.deposit_files import read_file, verify_deposit
 from icha.deposit.strangers_files import LIMITS, NO_LIMITS, flaw_of_name, looked_through, unpack
-from icha.support.printable import is_printable
+from icha.support.in_words import is_printable
 
 CONTENT = b"read"
 SUM = hashlib.sha256(CONTENT).hexdigest()

@@ -13,7 +13,7 @@ from icha.analysis.common_loads import compare_runs
 from icha.checks.run import check_run
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, read_run, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, flaws, kind_of
 from icha.datasets.labels import LABELS, RunLabels

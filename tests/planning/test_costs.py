@@ -8,7 +8,7 @@ import pytest
 
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.places import count_cells
+from icha.datasets.labels import count_cells
 from icha.planning import costs
 from icha.planning.roughness import measured_roughness
 from icha.surfaces.moments import spectral_moments, summit_density

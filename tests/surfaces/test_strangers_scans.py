@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, scan, write_xyz
 
 from icha.datasets.format import SURFACE, UnknownFile, kind_of
-from icha.surfaces.measured.height_map import read_height_map
+from icha.surfaces.measured.array_files import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
 

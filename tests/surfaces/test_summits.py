@@ -6,8 +6,7 @@ import scipy.optimize
 from scipy.spatial import cKDTree
 
 from icha import SelfAffineSpectrum, Surface
-from icha.surfaces.summit_coverage import SummitCoverage
-from icha.surfaces.summits import find_summits, locate_summits
+from icha.surfaces.summits import SummitCoverage, find_summits, locate_summits
 
 PERIOD = 100e-6
 SPECTRUM = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 16, 0.8)

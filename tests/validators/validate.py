@@ -255,7 +255,7 @@ VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
 
 def validate(folder: Path, names: list[str], most: int) -> bool:
     """Run validators and print what they say; whether all are content."""
-    from icha.support.printable import printable
+    from icha.support.in_words import printable
 
     good = True
     for name in names:
@@ -281,8 +281,8 @@ def main() -> int:
     """Validate what the command line names."""
     from icha.deposit.deposit_files import verify_deposit
     from icha.deposit.strangers_files import LARGE, LIMITS, NO_LIMITS, looked_through, unpack
-    from icha.support.hdf5 import refuse_traps
-    from icha.support.printable import printable
+    from icha.support.in_words import printable
+    from icha.support.input_files import refuse_traps
 
     parser = argparse.ArgumentParser(description="Put a deposit to the validators of others, without any network.")
     parser.add_argument("deposit", type=Path, help="a folder or a zip archive")

@@ -85,7 +85,7 @@ def workflow(tmp_path_factory):
     """Start Snakemake on this workflow."""
     folder = tmp_path_factory.mktemp("executor")
     files = {"Snakefile": SNAKEFILE, "icha/__init__.py": "", "icha/asked.py": ASKED, "icha/broken.py": "raise OSError"}
-    files["icha/support/processes.py"] = (REPOSITORY / "icha/support/processes.py").read_text()
+    files["icha/support/program.py"] = (REPOSITORY / "icha/support/program.py").read_text()
     scripts = {"tell": TELL, "wrong": WRONG, "long": LONG, "heavy": HEAVY, "beside": "WORD = 'beside'"}
     for name, text in (files | {f"workflow/scripts/{name}.py": text for name, text in scripts.items()}).items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)

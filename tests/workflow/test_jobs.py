@@ -16,10 +16,9 @@ import pytest
 from conftest import REPOSITORY
 
 from icha.datasets.surface_file import write_surface
-from icha.support.atomic_files import whole_file, why_not_writable
+from icha.support.atomic_files import take_over, whole_file, why_not_writable
 from icha.support.checksums import asked_of, is_whole, lost, made_as, sha256_of, write_checksum
-from icha.support.ownership import take_over
-from icha.support.processes import beginning_of
+from icha.support.program import beginning_of
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 RESULTS = "results/tiny"
@@ -175,7 +174,7 @@ def test_a_job_is_killed_with_the_snakemake_that_started_it(job, tmp_path):
     caller = f"""
 import os, subprocess, sys
 sys.path.insert(0, {str(REPOSITORY)!r})
-from icha.support.processes import beginning_of
+from icha.support.program import beginning_of
 os.environ["ICHA_SNAKEMAKE"] = f"{{os.getpid()}} {{beginning_of(os.getpid())}}"
 process = subprocess.Popen([sys.executable, "busy.py", "{RESULTS}/logs/b.log"])
 print(process.pid, flush=True)

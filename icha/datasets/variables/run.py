@@ -5,7 +5,7 @@ import numpy as np
 from icha.asperity.full_contact import MEANING
 from icha.contact.events import EVENT_KINDS
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
-from icha.datasets.bins import bin_table
+from icha.datasets.build import bin_table
 from icha.datasets.variables.terms import INFINITE, MATERIAL, ROUGHNESS, Variable, term, terms
 
 _STEP, _SNAPSHOT, _SPOT, _EVENT = ("step",), ("snapshot",), ("spot",), ("event",)

@@ -1,4 +1,4 @@
-"""Readers of arrays with or without their units: npy, netCDF and HDF5."""
+"""Readers of arrays: npy, netCDF, HDF5, and whatever formats of instruments SurfaceTopography reads."""
 
 import math
 from collections.abc import Mapping
@@ -6,9 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from icha.support.input_files import require_room
-from icha.surfaces.measured.found import Found, chosen_name, metres_of, regular_ticks, with_y_first
-from icha.surfaces.measured.settings import Preparation, UnfitTopography
+from icha.support.input_files import bounded_memory, flaw_of_path, refuse_traps, require_room
+from icha.support.rules import LENGTH
+from icha.surfaces.measured.settings import (
+    LINE_SCAN,
+    Found,
+    Preparation,
+    UnfitTopography,
+    chosen_name,
+    metres_of,
+    regular_ticks,
+    with_y_first,
+)
+from icha.surfaces.square import flaw_of_heights
 
 # Copies of an array, as floats, that are held while it is read.
 _COPIES = 3
@@ -150,3 +160,117 @@ def _unit_of(attributes):
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
     return None if text is None else metres_of(text)
+
+
+# Formats in which any bytes of the right number are heights: there it is the ending of the name that tells.
+_WITHOUT_SIGNATURE = ("hgt", "nms")
+# Formats of arrays that say nothing about themselves.
+_ARRAYS = ("mat", "npz")
+_UNKNOWN = (
+    "cannot be read as instrument: the file is of none of the formats of instruments that are known here, or damaged; "
+    "allowed: another `format`, or an export of the heights as text"
+)
+
+
+# Formats that are no evidence of an instrument: of any text with numbers, of which other fields are dropped, and
+# of any file of a certain length.
+_OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
+
+
+def is_instrument_text(path: Path) -> bool:
+    """Whether SurfaceTopography knows the format of a text file, as one of a certain instrument."""
+    from SurfaceTopography import open_topography
+    from SurfaceTopography.Exceptions import CannotDetectFileFormat
+
+    try:
+        with open_topography(str(path)) as file:
+            return file.format() not in _OF_ANY_TEXT
+    except CannotDetectFileFormat:
+        return False
+    except Exception:  # a damaged file of a format that it knows; reading it gives the message
+        return True
+
+
+def read_instrument(path: Path, how: Preparation) -> Found:
+    """Whatever SurfaceTopography reads. Its arrays have x as first axis."""
+    from SurfaceTopography import open_topography
+    from SurfaceTopography.Exceptions import CannotDetectFileFormat
+
+    try:
+        opened = open_topography(str(path))
+    except CannotDetectFileFormat:  # its message lists what every reader says
+        raise UnfitTopography("path", _UNKNOWN) from None
+    with opened as file:
+        if file.format() in _WITHOUT_SIGNATURE and path.suffix.lower().removeprefix(".") not in file.file_extensions():
+            raise UnfitTopography("path", _UNKNOWN)
+        name = file.name()
+        names = [channel.name for channel in file.channels]
+        maps = maps_among({f"{k}": tuple(channel.nb_grid_pts) for k, channel in enumerate(file.channels)})
+        maps = [file.channels[int(k)] for k in maps]
+        if how.data is not None:
+            channel = file.channels[names.index(chosen_name(how.data, names, (), "channel"))]
+        elif file.format() in _ARRAYS and maps:
+            # Arrays of a workspace have no default: whichever came first would be pressed.
+            channel = file.channels[names.index(chosen_name(None, [each.name for each in maps], (), "array"))]
+        else:
+            channel = file.default_channel
+        if channel.dim != 2:
+            areal = [each.name for each in file.channels if each.dim == 2]
+            if not areal:
+                raise UnfitTopography("path", LINE_SCAN.format(max(channel.nb_grid_pts)))
+            raise UnfitTopography("data", f"is a line scan; allowed: a topography, of {', '.join(areal)}")
+        said = channel.physical_sizes
+        topography = channel.topography(**({"physical_sizes": (1.0, 1.0)} if said is None else {}))
+        heights = np.ma.filled(np.ma.asarray(topography.heights()).astype(float), np.nan).T
+        unit = None if topography.unit is None else metres_of(topography.unit)
+        sides = None if said is None else tuple(float(side) for side in topography.physical_sizes)
+        data = channel.name if len(maps) > 1 else ""
+    if sides is not None and (lateral := how.lateral_unit or unit) is not None:
+        return Found(heights, unit, tuple(side * lateral for side in sides), format=name, data=data)
+    return Found(heights, unit, coordinates=sides, format=name, data=data)
+
+
+_ALLOWED = "allowed: a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
+
+
+def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
+    """Read the heights of a file, (n, n) in m, first axis y.
+
+    Parameters
+    ----------
+    path : `.npy`, or netCDF with a variable `height`.
+    metres_per_unit : the unit of the heights in the file.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or its heights are not a square array of finite numbers.
+    """
+    path = Path(path)
+    if flaw := flaw_of_path(path):
+        raise ValueError(f"{flaw}; {_ALLOWED}")
+    try:
+        with bounded_memory():
+            refuse_traps(path)
+            heights = _heights(path)
+    except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
+        raise ValueError(f"cannot be read ({error}); {_ALLOWED}") from None
+    if heights.dtype.kind not in "iuf":
+        raise ValueError(f"holds {heights.dtype}, not real numbers; {_ALLOWED}")
+    if flaw := flaw_of_heights(heights):
+        raise ValueError(f"holds {flaw}; {_ALLOWED}")
+    heights = heights.astype(float) * metres_per_unit
+    if not LENGTH.holds(float(np.ptp(heights))):
+        raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {_ALLOWED}, and another unit")
+    return heights
+
+
+def _heights(path: Path) -> np.ndarray:
+    if path.suffix == ".npy":
+        return whole_npy(path)
+    if path.suffix == ".nc":
+        import netCDF4
+
+        with netCDF4.Dataset(path) as data:
+            return whole_variable(data["height"])
+    raise ValueError(f"unknown kind of file {path.suffix!r}")

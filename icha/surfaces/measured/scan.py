@@ -7,15 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from icha.support import in_words
-from icha.support.hdf5 import is_hdf5, refuse_traps
-from icha.support.input_files import TooLarge, bounded_memory
-from icha.support.printable import printable
+from icha.support.in_words import printable
+from icha.support.input_files import TooLarge, bounded_memory, is_hdf5, refuse_traps
 from icha.support.rules import LENGTH
-from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_netcdf, read_npy
-from icha.surfaces.measured.fourier_files import read_fourier
-from icha.surfaces.measured.instrument_files import read_instrument
+from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
-from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
+from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
 
 READERS = {
     "npy": read_npy,

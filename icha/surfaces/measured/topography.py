@@ -21,14 +21,9 @@ import numpy as np
 
 from icha.support.checksums import sha256_of
 from icha.support.input_files import flaw_of_path
-from icha.surfaces.measured.crop import cropped
-from icha.surfaces.measured.cutoff import without_short_waves
-from icha.surfaces.measured.edges import bounded
-from icha.surfaces.measured.holes import filled
-from icha.surfaces.measured.pixels import squared
 from icha.surfaces.measured.scan import load_scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.trend import detrended, refuse_flat
+from icha.surfaces.measured.steps import bounded, cropped, detrended, filled, refuse_flat, squared, without_short_waves
 from icha.surfaces.surface import Surface
 
 

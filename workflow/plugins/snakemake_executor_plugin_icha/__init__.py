@@ -32,7 +32,7 @@ from snakemake.executors.local import Executor as LocalExecutor
 from snakemake.executors.local import common_settings
 from snakemake.script import Snakemake
 
-from icha.support.processes import end_with_parent
+from icha.support.program import end_with_parent
 
 __all__ = ["Executor", "common_settings"]
 
