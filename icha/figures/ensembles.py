@@ -92,6 +92,8 @@ def mark_fewer(
     -----
     Points in a row that are means over the same members have one n, beside the last or the first of them.
     """
+    from matplotlib.patheffects import withStroke
+
     counts = known.sum(axis=0)
     fewer = (counts > 0) & (counts < asked) & np.isfinite(y)
     if not fewer.any():
@@ -105,11 +107,12 @@ def mark_fewer(
         axes.plot(x[marks], y[marks], **look | {"ls": "none", "mfc": "white", "zorder": order})
     cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.001, "label": FEWER_SEEDS}
     axes.plot(x[marks], y[marks], **cross | _CROSS)
+    halo = [withStroke(linewidth=1.5, foreground="white")]
     for own in stretches:
         # Beside the last mark of one stretch and the first of the next; the legend moves those that lie on each other.
         place = NUMBER_PLACES[sum(text.get_text().startswith("n=") for text in axes.texts) % 2]
         at = own[-1] if place.right > 0 else own[0]
-        beside = {"ha": place.align, "color": colour, "zorder": order + 1} | _NUMBER
+        beside = {"ha": place.align, "color": colour, "zorder": order + 1, "path_effects": halo} | _NUMBER
         axes.annotate(f"n={counts[at]}", (x[at], y[at]), (place.right, place.up), **beside)
 
 

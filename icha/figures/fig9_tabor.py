@@ -12,7 +12,7 @@ from icha.figures.declaration import Campaign, Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import NothingToDraw, asked_seeds, is_applicable, snapshot_label, study_runs
-from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, styled
+from icha.figures.style import GREY, TWO_COLUMNS, material_label, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
 from icha.support.values import Problem
 
@@ -75,8 +75,8 @@ def figure(
     panels = fig.subplots(1, 2)
     drawn = []
     for (contact, applicable), points in curves.items():
-        label = {} if looks.scale else {"label": looks.name(contact)}
-        drawn += _draw_curve(panels, points, label | looks.look(contact, applicable=applicable))
+        name = material_label(interfaces, contact[0]) if looks.scale else looks.name(contact)
+        drawn += _draw_curve(panels, points, {"label": name} | looks.look(contact, applicable=applicable))
     for k, (contact, members) in enumerate(bare.items()):
         colour = looks.colour(contact) if looks.by_place else GREY
         name = None if k else "no adhesion"

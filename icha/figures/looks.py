@@ -165,9 +165,10 @@ class Looks:
     def name(self, contact: Contact) -> str:
         """Return what tells a line apart from the others of its figure."""
         material, *place = contact
-        parts = [material_label(self.interfaces, material)] if len(self.materials) > 1 or len(self.places) == 1 else []
-        words = ", ".join(filter(None, [*parts, self.place_name(tuple(place))]))
-        return words or material_label(self.interfaces, material)
+        parts = [material_label(self.interfaces, material), self.place_name(tuple(place))]
+        # A single material is not named where surfaces and slopes have the colours.
+        parts = parts[1:] if self.by_place and len(self.materials) == 1 and parts[1] else parts
+        return ", ".join(filter(None, parts))
 
 
 def _place_name(place, places):
@@ -412,13 +413,12 @@ def _spread_numbers(figure):
     figure.draw_without_rendering()
     taken = []
     for axes, text in numbers:
-        frame, boxes = axes.get_window_extent(), []
+        frame, boxes = axes.get_window_extent(), {}
         for place in NUMBER_PLACES:
             text.set(ha=place.align, position=(place.right, place.up))
-            boxes.append(text.get_window_extent())
-            inside = boxes[-1].x0 >= frame.x0 and boxes[-1].x1 <= frame.x1
-            if inside and not any(boxes[-1].overlaps(other) for other in taken):
-                break
-        else:
-            text.set(ha=NUMBER_PLACES[0].align, position=NUMBER_PLACES[0][:2])
-        taken.append(text.get_window_extent())
+            boxes[place] = text.get_window_extent()
+        free = [place for place, box in boxes.items() if not any(box.overlaps(other) for other in taken)]
+        inside = [place for place in free if frame.contains(*boxes[place].min) and frame.contains(*boxes[place].max)]
+        place = (inside or free or NUMBER_PLACES)[0]
+        text.set(ha=place.align, position=(place.right, place.up))
+        taken.append(boxes[place])
