@@ -106,6 +106,7 @@ lint: tamaas
 	ruff format --check .
 	lint-imports
 	snakefmt --check Snakefile workflow
+	codespell
 	snakemake --lint
 
 format: environment

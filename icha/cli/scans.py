@@ -208,14 +208,13 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     import numpy as np
 
     from icha.surfaces.measured.resolution import scan_resolution
-    from icha.surfaces.measured.scan import format_of
     from icha.surfaces.measured.settings import UnfitTopography
 
     _check_file(path)
     scan, assumed, missing, sides = _read(path, data)
     rows, columns = scan.heights.shape
     gaps = int(np.count_nonzero(~np.isfinite(scan.heights)))
-    boundary, detrend = ("periodic", "none") if format_of(path) == "fourier" else ("free", "tilt")
+    boundary, detrend = ("periodic", "none") if scan.format == "fourier" else ("free", "tilt")
     how = {"format": "auto", "boundary": boundary, "data": data, "detrend": detrend, "missing": "fill"} | assumed
     try:
         resolution = scan_resolution(path, how)

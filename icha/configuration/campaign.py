@@ -24,13 +24,10 @@ from icha.configuration.boundary_elements import (
     ErrorSources,
     OneAsperity,
 )
-from icha.configuration.figures import Figures
-from icha.configuration.materials import MaterialSection
-from icha.configuration.measurements import Measurement
+from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
-from icha.configuration.studies import Study
-from icha.configuration.surfaces import AnySurface, SelfAffineSurface
-from icha.configuration.values import MEASURED
+from icha.configuration.studies import MEASURED, Study
+from icha.configuration.surfaces import AnySurface, MaterialSection, SelfAffineSurface
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.support.values import (
     ROUNDING,

@@ -17,10 +17,8 @@ from pydantic import ValidationError
 
 from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
 from icha.configuration.errors import MOST_TOLD
-from icha.configuration.materials import MaterialSection
-from icha.configuration.studies import SCALARS, Study
-from icha.configuration.surfaces import SURFACE_KINDS
-from icha.configuration.values import MEASURED
+from icha.configuration.studies import MEASURED, SCALARS, Study
+from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.datasets.labels import number_label
 from icha.support.values import LONGEST_LABEL, NOTHING, Problem, Unit, listed
 

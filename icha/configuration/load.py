@@ -5,26 +5,33 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
+import yaml
 from pydantic import ValidationError
 
 from icha.configuration.campaign import Campaign, Topography
-from icha.configuration.defaults import excessive_defaults, merged, place_in_defaults, with_defaults
 from icha.configuration.design import designed
 from icha.configuration.errors import MOST_TOLD, ConfigurationError, line, problem_of
-from icha.configuration.full_contact import sticky_runs
-from icha.configuration.measured_surfaces import MeasuredSurface
 from icha.configuration.plausibility import (
     CONFIRMED,
     needless_confirmations,
     plausibility_problems,
+    sticky_runs,
     unusual_topography,
     unusual_values,
 )
-from icha.configuration.values import MEASURED
-from icha.configuration.yaml_files import dumped, read_yaml
+from icha.configuration.studies import MEASURED
+from icha.configuration.surfaces import MeasuredSurface
+from icha.configuration.yaml_files import (
+    dumped,
+    excessive_defaults,
+    merged,
+    place_in_defaults,
+    read_yaml,
+    with_defaults,
+)
 from icha.support.checksums import sha256_of
 from icha.support.values import NOTHING, Problem
 from icha.surfaces.measured.array_files import read_height_map
@@ -179,3 +186,36 @@ def _facts(surface, with_slope: bool, with_energy: bool) -> tuple[int, float, st
         slope = topography.rms_slope if with_slope else None
         energy = topography.full_contact_energy / topography.rms_slope**2 if with_energy else math.nan
     return len(heights), surface.period, "periodic", slope, sha256_of(Path(surface.path)), energy
+
+
+INPUTS = "inputs"
+
+
+def with_files_beside_it(configuration: Configuration) -> tuple[str, dict[str, str]]:
+    """The text of a configuration as used, and the files that belong beside it.
+
+    Returns
+    -------
+    text : the configuration, whose files lie in `inputs/<section>/<entry>/`, with their own names.
+    files : where these files are now, by their paths from the folder of the text. A surface that no study presses has
+        a path, too, but no file: nobody has read it.
+    """
+    campaign = configuration.campaign
+    named = {("surfaces", name): each.path for name, each in campaign.surfaces.items() if not each.random}
+    named |= {("measurements", name): each.path for name, each in campaign.measurements.items()}
+    # Variants of a surface have its file.
+    named = {key: path for key, path in named.items() if campaign.origin(*key) == key[1]}
+    if not named:
+        return configuration.text, {}
+    content = yaml.safe_load(configuration.text)
+    pressed = {each.surface for study in campaign.studies for each in campaign.contacts(study)}
+    used = {("surfaces", campaign.origin("surfaces", name)) for name in pressed}
+    files = {}
+    for (section, name), path in named.items():
+        place = str(PurePosixPath(INPUTS, section, name, Path(path).name))
+        content[section][name] = (content[section][name] or {}) | {"path": place}
+        if section == "measurements" or (section, name) in used:
+            files[place] = path
+    # All surfaces have a path of their own now.
+    (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
+    return dumped(content, configuration.origin), files

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from icha.configuration.errors import ConfigurationError, line, problem_of
-from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.configuration.surfaces import MeasuredSurface
 from icha.support.values import NOTHING
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography

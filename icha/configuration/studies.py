@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
+    BeforeValidator,
     Field,
     WithJsonSchema,
     WrapValidator,
@@ -12,14 +13,12 @@ from pydantic import (
     model_validator,
 )
 
-from icha.configuration.materials import MaterialSection
-from icha.configuration.surfaces import SURFACE_KINDS
-from icha.configuration.values import SCALAR_SCHEMA, Slope, Slopes, Values, scalar
+from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import ASPERITIES, MODELS
 from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
 from icha.path.targets import Path
-from icha.support.rules import NUMBER, Real
+from icha.support.rules import NUMBER, SLOPE, Real
 from icha.support.values import (
     Flag,
     Length,
@@ -36,7 +35,51 @@ from icha.support.values import (
     list_of_names,
     number,
     stops,
+    to_number,
 )
+
+# The slope of a topography as it was measured.
+MEASURED = "measured"
+
+
+def _slope(value: Any) -> float | str:
+    try:
+        slope = to_number(value)
+    except ValueError as error:
+        if value == MEASURED:
+            return value
+        raise ValueError(f"{error}; allowed: {SLOPE.allowed}, or {MEASURED}") from None
+    if not SLOPE.holds(slope):
+        raise ValueError(f"is out of range; allowed: {SLOPE.allowed}, or {MEASURED}")
+    return slope
+
+
+_ONE_SLOPE = {"anyOf": [{"type": "number", "minimum": SLOPE.least, "maximum": SLOPE.most}, {"const": MEASURED}]}
+Slope = Annotated[Any, BeforeValidator(_slope), WithJsonSchema(_ONE_SLOPE)]
+Slopes = Annotated[
+    list[Slope],
+    BeforeValidator(lambda value: [value] if value == MEASURED else value),
+    Field(min_length=1),
+    AfterValidator(distinct),
+    WithJsonSchema({"anyOf": [{"const": MEASURED}, {"type": "array", "minItems": 1, "items": _ONE_SLOPE}]}),
+]
+SCALAR_SCHEMA = {"type": ["string", "number", "boolean"]}
+
+
+def scalar(value: Any) -> Any:
+    """Refuse what is no single value."""
+    if not isinstance(value, str | int | float):
+        raise ValueError("is no single value; allowed: a number, a text, true or false")
+    return value
+
+
+Values = Annotated[
+    list[Annotated[Any, AfterValidator(scalar)]],
+    BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
+    Field(min_length=1),
+    AfterValidator(distinct),
+    WithJsonSchema({"anyOf": [SCALAR_SCHEMA, {"type": "array", "minItems": 1, "items": SCALAR_SCHEMA}]}),
+]
 
 
 class Targets(Section):

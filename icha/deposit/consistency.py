@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.settings import campaign_sha256, run_sha256
+from icha.configuration.cases import campaign_sha256, run_sha256
 from icha.planning.plan import read_attributes
 from icha.planning.results import campaign_files
 from icha.support.checksums import made_as, stale

@@ -26,7 +26,7 @@ from icha.deposit.deposit_files import COMPUTED
 from icha.deposit.dictionary import Entry
 from icha.deposit.licences import Licence
 from icha.planning.costs import Cost
-from icha.planning.software import further_software
+from icha.planning.needs import further_software
 from icha.support import in_words
 
 _TEMPLATE = "README.md.jinja"

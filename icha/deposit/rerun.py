@@ -23,7 +23,7 @@ from icha.deposit.deposit_files import CHECKSUMS, COMPUTED, SOURCE, copy_file, r
 from icha.deposit.environment import differences
 from icha.deposit.source import PROGRAM
 from icha.deposit.strangers_files import Found, unpack
-from icha.planning.software import BY_TAMAAS, TAMAAS
+from icha.planning.needs import BY_TAMAAS, TAMAAS
 from icha.support.checksums import sha256_of
 from icha.support.in_words import counted
 from icha.support.input_files import refuse_traps
@@ -208,7 +208,7 @@ def prepare(folder: Path, deposit: Found, *, own_source: bool) -> tuple[Path, Pa
 
     With its own source the project is that; else it is nothing but data.
     """
-    from icha.configuration.named_files import FOLDER as INPUTS
+    from icha.configuration.load import INPUTS
 
     project, original = folder / (PROJECT if own_source else _DATA), deposit.path
     if not deposit.path.is_dir():

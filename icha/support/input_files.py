@@ -31,7 +31,11 @@ _KINDS = {
 }
 
 
-class TooLarge(ValueError):
+class RefusedFile(ValueError):
+    """A file that is not read, for it might do harm; the message says why, and what is allowed."""
+
+
+class TooLarge(RefusedFile):
     """A file that would take more memory than reading one may; the message says how to allow more."""
 
     def __init__(self, needed: str, most: int):
@@ -138,7 +142,7 @@ def refuse_traps(path: str | os.PathLike) -> None:
 
     Raises
     ------
-    ValueError
+    RefusedFile
         Naming the link, group or dataset.
     OSError
         If the file is damaged.
@@ -172,7 +176,7 @@ def refuse_traps(path: str | os.PathLike) -> None:
             return None
 
         if found := file.id.links.visit(trap, info=True):
-            raise ValueError(found)
+            raise RefusedFile(found)
 
 
 def is_hdf5(path):

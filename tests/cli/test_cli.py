@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -24,16 +23,15 @@ from icha.cli import app
 from icha.cli.live import LiveView, Watch, last_line, reason_of
 from icha.cli.project import campaigns
 from icha.cli.show import sparkline
-from icha.configuration.cases import run_cases
+from icha.configuration.cases import run_cases, run_sha256
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
-from icha.configuration.settings import run_sha256
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.figures.style import quantity
 from icha.planning.belonging import belongs_to_another, claim
-from icha.planning.constants import FITTED
+from icha.planning.costs import WORKFLOW
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, start_up, time_on, total
 from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
@@ -633,11 +631,9 @@ def test_time_on_several_cores_is_never_less_than_the_longest_job_of_every_stage
     Path("tiny.yaml").write_text(TINY)
     items = plan(load_configuration("tiny.yaml").campaign, project / "results/tiny")
     runs = [item for item in items if item.is_run]
-    handed_out_at_once = replace(FITTED, workflow=replace(FITTED.workflow, job=0.0))
-    start, work = start_up(runs, handed_out_at_once), total(runs).work
-    assert time_on(runs, 2, handed_out_at_once) == pytest.approx(start + work / 2)
-    assert time_on(runs, 10**6, handed_out_at_once) == start + total(runs).longest
-    assert time_on(runs, 10**6) == start + max(total(runs).longest, FITTED.workflow.job * len(runs))
+    start, sums, handing_out = start_up(runs), total(runs), WORKFLOW.job * len(runs)
+    assert time_on(runs, 2) == pytest.approx(start + max((sums.work + handing_out) / 2, sums.longest, handing_out))
+    assert time_on(runs, 10**6) == start + max(sums.longest, handing_out)
     longest = [total(item for item in items if item.stage == stage).longest for stage in range(5)]
     assert time_on(items, 10**6) >= start_up(items) + sum(longest)
 

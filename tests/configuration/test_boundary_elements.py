@@ -7,13 +7,11 @@ from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
 from icha.configuration.cases import (
     asperity_cases,
     loop_cases,
-    solution_cases,
-)
-from icha.configuration.errors import ConfigurationError
-from icha.configuration.settings import (
     loop_settings,
+    solution_cases,
     solution_settings,
 )
+from icha.configuration.errors import ConfigurationError
 
 BAD = {
     # key, value, what the message must say of it

@@ -6,14 +6,12 @@ from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
 
 from icha.configuration.cases import (
     run_cases,
+    run_settings,
     solution_cases,
     surface_cases,
-)
-from icha.configuration.design import value_label
-from icha.configuration.settings import (
-    run_settings,
     surface_settings,
 )
+from icha.configuration.design import value_label
 
 BAD = {
     # key, value, what the message must say of it

@@ -5,11 +5,9 @@ from demo_configuration import LONG_RANGE, TRUTH
 
 from icha.configuration.cases import (
     source_cases,
-)
-from icha.configuration.errors import ConfigurationError
-from icha.configuration.settings import (
     source_settings,
 )
+from icha.configuration.errors import ConfigurationError
 from icha.figures.fig4_contact_map import finest_solution
 
 BAD = {

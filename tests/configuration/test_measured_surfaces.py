@@ -5,12 +5,10 @@ from demo_configuration import measured_surface
 
 from icha.configuration.cases import (
     run_cases,
-)
-from icha.configuration.errors import ConfigurationError
-from icha.configuration.measured_surfaces import MeasuredSurface
-from icha.configuration.settings import (
     surface_settings,
 )
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.surfaces import MeasuredSurface
 from icha.surfaces.measured.settings import Preparation
 from icha.surfaces.measured.topography import prepared_topography
 

@@ -3,12 +3,11 @@
 import pytest
 from demo_configuration import LONG_RANGE, TRUTH, measured_surface
 
-from icha.configuration.cases import run_cases
+from icha.configuration.cases import run_cases, run_settings, run_sha256
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.settings import run_settings, run_sha256
 from icha.planning.costs import PATCH_ARRAYS
+from icha.planning.needs import run_memory, run_minutes, run_threads
 from icha.planning.plan import plan
-from icha.planning.resources import run_memory, run_minutes, run_threads
 from icha.planning.results import campaign_files
 
 BOTH = {"studies.one.models": ["asperities", "boundary_elements"]}

@@ -4,10 +4,8 @@ import numpy as np
 from demo_configuration import file_surface
 
 from icha.configuration.cases import (
-    run_cases,
-)
-from icha.configuration.settings import (
     campaign_sha256,
+    run_cases,
     run_sha256,
 )
 

@@ -5,10 +5,8 @@ from demo_configuration import LONG_RANGE, TRUTH
 
 import icha
 from icha.configuration.cases import (
-    run_cases,
-)
-from icha.configuration.settings import (
     campaign_sha256,
+    run_cases,
     run_settings,
 )
 

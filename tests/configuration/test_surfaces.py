@@ -9,11 +9,9 @@ from demo_configuration import (
 from icha.configuration.cases import (
     run_cases,
     surface_cases,
-)
-from icha.configuration.errors import ConfigurationError
-from icha.configuration.settings import (
     surface_settings,
 )
+from icha.configuration.errors import ConfigurationError
 from icha.datasets.labels import number_label
 
 BAD = {

@@ -4,9 +4,8 @@ import pytest
 import small_campaign as small
 from bare_campaign import CAMPAIGN
 
-from icha.configuration.cases import run_cases
+from icha.configuration.cases import campaign_sha256, run_cases, run_sha256
 from icha.configuration.load import load_configuration
-from icha.configuration.settings import campaign_sha256, run_sha256
 from icha.datasets.files import write_dataset
 from icha.deposit.consistency import refuse_mixed
 from icha.planning.results import campaign_files

@@ -31,10 +31,9 @@ from typer.testing import CliRunner
 
 from icha.analysis.checks import read_checks
 from icha.cli import app
-from icha.configuration.load import load_configuration
-from icha.configuration.named_files import with_files_beside_it
+from icha.configuration.cases import campaign_sha256
+from icha.configuration.load import load_configuration, with_files_beside_it
 from icha.configuration.publication import KnownFailure
-from icha.configuration.settings import campaign_sha256
 from icha.deposit import deposit as deposits
 from icha.deposit import dictionary
 from icha.deposit.deposit import make_deposit

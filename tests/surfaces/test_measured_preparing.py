@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scans import NM, SIZE, UM, centred, preparation, scan, write_xyz
 
-from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.configuration.surfaces import MeasuredSurface
 from icha.datasets.files import read_dataset
 from icha.datasets.surface_file import read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography

@@ -18,8 +18,8 @@ import yaml
 from conftest import FIGURES, REPOSITORY, SMOKE, copy_project, modules_of, snakemake, snakemake_command
 from traces import traces
 
+from icha.configuration.cases import campaign_sha256
 from icha.configuration.load import load_configuration
-from icha.configuration.settings import campaign_sha256
 from icha.support.checksums import made_as, write_checksum
 
 CAMPAIGNS = ["config/config.yaml", *(f"config/campaigns/{p.name}" for p in (REPOSITORY / "config/campaigns").iterdir())]

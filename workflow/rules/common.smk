@@ -11,8 +11,8 @@ import before_jobs
 from command_line import campaign_configuration
 from fingerprint import code_fingerprint
 
-from icha.configuration.named_files import with_files_beside_it
-from icha.configuration.settings import run_sha256
+from icha.configuration.load import with_files_beside_it
+from icha.configuration.cases import run_sha256
 from icha.datasets import results
 from icha.planning.results import campaign_files
 

@@ -1,8 +1,8 @@
 # What runs are compared with: what theories say of a surface, and published points; boundary elements on the topography
 # of a run, one load each or both ways; variants between the model and them; one asperity, where the answer is known.
 
-from icha.configuration.settings import adhesive_contacts, loop_settings, solution_settings, source_settings
-from icha.planning.resources import solver_memory
+from icha.configuration.cases import adhesive_contacts, loop_settings, solution_settings, source_settings
+from icha.planning.needs import solver_memory
 
 
 rule reference:

@@ -1,9 +1,9 @@
 # One sweep each, by asperities or by another model of contact, whose runs are in a folder of its name.
 
-from icha.configuration.settings import run_settings
+from icha.configuration.cases import run_settings
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.labels import model_folder
-from icha.planning.resources import run_memory, run_minutes, run_threads
+from icha.planning.needs import run_memory, run_minutes, run_threads
 
 
 wildcard_constraints:

@@ -1,7 +1,6 @@
 """Steps from a scan to a surface: crop, trend, missing points, pixels, short waves, edges and grid."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import scipy.fft
@@ -19,8 +18,8 @@ from icha.surfaces.surface import FREE, PERIODIC, Surface
 _ROUNDING = 1e-9
 
 
-def cropped(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
-    """The square that the settings ask for, and what is to be said about it.
+def cropped(scan: Scan, how: Preparation) -> Scan:
+    """The square that the settings ask for.
 
     It is made of whole pixels. If these are not square, one of its sides may be too long by less than a pixel.
     """
@@ -54,22 +53,22 @@ def cropped(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
             f"needs a square, and the scan is {width} x {height}; allowed: a square one, or another boundary",
         )
     part = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
-    said = [] if part.shape == scan.heights.shape else [f"cut to {nx} x {ny} points from ({first_x}, {first_y})"]
-    return Scan(part, (nx * dx, ny * dy)), said
+    said = () if part.shape == scan.heights.shape else (f"cut to {nx} x {ny} points from ({first_x}, {first_y})",)
+    return scan.after(part, *said, size=(nx * dx, ny * dy))
 
 
 # Heights that differ by less than this part of the largest one, once their trend is removed, are rounding.
 _FLAT = 1e-13
 
 
-def detrended(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
+def detrended(scan: Scan, how: Preparation) -> Scan:
     """Without the plane or paraboloid that fits the known heights best."""
     known = np.isfinite(scan.heights)
     if not known.any():
         raise UnfitTopography("path", "holds no height at all in the part that is used; allowed: another part or file")
     degree = {"none": 0, "tilt": 1, "curvature": 2}[how.detrend]
     if degree == 0:
-        return scan, []
+        return scan
     rows, columns = scan.heights.shape
     powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
     y, x = (np.vander(np.linspace(-1, 1, n), 2 * degree + 1, increasing=True) for n in (rows, columns))
@@ -81,7 +80,7 @@ def detrended(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
     coefficients = np.zeros((degree + 1, degree + 1))
     coefficients[tuple(np.transpose(powers))] = np.linalg.lstsq(matrix, right, rcond=None)[0]
     trend = y[:, : degree + 1] @ coefficients @ x[:, : degree + 1].T
-    return replace(scan, heights=scan.heights - trend), [f"{how.detrend} removed"]
+    return scan.after(scan.heights - trend, f"{how.detrend} removed")
 
 
 def refuse_flat(left: Scan, part: Scan, how: Preparation) -> None:
@@ -91,12 +90,12 @@ def refuse_flat(left: Scan, part: Scan, how: Preparation) -> None:
         raise UnfitTopography("path", f"holds heights that are all the same{without}; allowed: a rough surface")
 
 
-def filled(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
+def filled(scan: Scan, how: Preparation) -> Scan:
     """Without missing points."""
     missing = ~np.isfinite(scan.heights)
     count = int(np.count_nonzero(missing))
     if not count:
-        return scan, []
+        return scan
     if how.missing == "refuse":
         raise UnfitTopography(
             "missing",
@@ -108,7 +107,7 @@ def filled(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
     heights = scan.heights.copy()
     heights[missing] = _harmonic(heights, missing, periodic=how.boundary == PERIODIC)
     said = f"{count} missing points filled, {in_words.share(count, missing.size)} of the points"
-    return replace(scan, heights=heights), [said]
+    return scan.after(heights, said)
 
 
 def _harmonic(heights, missing, *, periodic):
@@ -138,7 +137,7 @@ def _harmonic(heights, missing, *, periodic):
 SQUARE = 1e-3
 
 
-def squared(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
+def squared(scan: Scan, how: Preparation) -> Scan:
     """On square cells as large as the shorter side of a pixel.
 
     Lines along that side stay as they are. Across them, heights are those of their cosine series, which is
@@ -147,14 +146,14 @@ def squared(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
     """
     dx, dy = scan.pixel
     if how.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
-        return scan, []
+        return scan
     across, cell = (0, dx) if dx < dy else (1, dy)
     grid = int(min(scan.size) / cell * (1 + 1e-9))
     lines = np.take(scan.heights, range(grid), axis=1 - across)
     heights = _by_cosine_series(lines, across, cell / max(dx, dy), grid)
     pixel = " x ".join(map(in_words.length, (dx, dy)))
     said = f"pixels of {pixel} resampled to {grid} x {grid} square ones, by the cosine series along {'yx'[across]}"
-    return Scan(heights, (grid * cell, grid * cell)), [said]
+    return scan.after(heights, said, size=(grid * cell, grid * cell))
 
 
 def _by_cosine_series(heights, axis, step, count):
@@ -178,14 +177,14 @@ LEAST_PIXELS = 4
 _REACH = 6
 
 
-def without_short_waves(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
+def without_short_waves(scan: Scan, how: Preparation) -> Scan:
     """After the areal Gaussian filter of ISO 16610-61, whose nesting index is the cut-off: it halves that wave.
 
     A wave of length l is multiplied by 2^-(cutoff/l)^2. At the edges heights go on by reflection (ISO 16610-28),
     those of a periodic scan by its period.
     """
     if how.cutoff is None:
-        return scan, []
+        return scan
     # Slow to import, and seldom needed.
     from scipy.ndimage import gaussian_filter
 
@@ -201,14 +200,14 @@ def without_short_waves(scan: Scan, how: Preparation) -> tuple[Scan, list[str]]:
     mode = "wrap" if how.boundary == PERIODIC else "reflect"
     heights = gaussian_filter(scan.heights, (sigma / dy, sigma / dx), mode=mode, truncate=_REACH)
     said = f"Gaussian S-filter (ISO 16610-61) with a nesting index of {how.cutoff:.6g} m"
-    return replace(scan, heights=heights), [said]
+    return scan.after(heights, said)
 
 
 def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
-    """The surface with edges as its boundary has them, on the grid that is asked for."""
+    """The surface with edges as its boundary has them, on the grid that is asked for; all steps that led to it."""
     _require_room_for(how.grid or (2 if how.boundary == MIRROR else 1) * max(scan.heights.shape))
     heights, side = scan.heights - np.mean(scan.heights), scan.size[0]
-    said = []
+    said = list(scan.steps)
     if how.boundary == WINDOW:
         across, along = (_taper(n, how.taper) for n in heights.shape)
         heights = heights * across[:, None] * along

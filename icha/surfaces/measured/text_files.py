@@ -5,7 +5,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import scipy.fft
@@ -22,48 +21,42 @@ from icha.surfaces.measured.settings import (
     regular_ticks,
     with_y_first,
 )
-from icha.surfaces.measured.text_tables import layout_of, read_table, without_scales
+from icha.surfaces.measured.text_tables import SourceFile, without_scales
 
 # A surface has at least so many columns of heights.
 _FEWEST_COLUMNS = 8
 
 
-def read_matrix(path: Path, how: Preparation) -> Found:
+def read_matrix(file: SourceFile, how: Preparation) -> Found:
     """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
-    table = read_table(path)
-    if table.heading and (known := _as_instrument_file(path, how, table)):
+    values, lines = file.values, file.layout.heading
+    if lines and (known := _as_instrument_file(file, how)):
         return known
-    heights, steps, remark = without_scales(table.values)
+    heights, steps, remark = without_scales(values)
     rows, columns = heights.shape
-    heading = read_heading(table.heading, heights.shape)
+    heading = read_heading(lines, heights.shape)
     coordinates = heading.coordinates or (steps and (columns * steps[0], rows * steps[1]))
-    return Found(
-        with_y_first(_without_missing(heights, heading), how),
-        heading.height_unit,
-        heading.size,
-        coordinates,
-        remark=remark,
-    )
+    heights = with_y_first(_without_missing(heights, heading), how)
+    return Found(heights, heading.height_unit, heading.size, coordinates, remark=remark)
 
 
-def _as_instrument_file(path, how, table):
+def _as_instrument_file(file, how):
     """What SurfaceTopography, which knows many headings, finds; None if its heights are not all of the numbers."""
     try:
-        found = read_instrument(path, how)
+        found = read_instrument(file, how)
     except Exception:  # whatever it raises at texts of other kinds
         return None
-    if found.unit is None or found.heights.shape != table.values.shape or np.isnan(table.values).any():
+    if found.unit is None or found.heights.shape != file.values.shape or np.isnan(file.values).any():
         return None
-    scale = np.max(np.abs(found.heights)) / np.max(np.abs(table.values))
-    same = np.allclose(found.heights, scale * table.values, rtol=1e-9, atol=1e-9 * np.max(np.abs(found.heights)))
+    scale = np.max(np.abs(found.heights)) / np.max(np.abs(file.values))
+    same = np.allclose(found.heights, scale * file.values, rtol=1e-9, atol=1e-9 * np.max(np.abs(found.heights)))
     return found if same else None
 
 
-def read_xyz(path: Path, how: Preparation) -> Found:
+def read_xyz(file: SourceFile, how: Preparation) -> Found:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
-    table = read_table(path)
-    points = _columns_of_points(table.values, how)
-    heading = read_heading(table.heading, points.shape)
+    points = _columns_of_points(file.values, how)
+    heading = read_heading(file.layout.heading, points.shape)
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
     (column, nx, dx), (row, ny, dy) = (_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
@@ -114,14 +107,14 @@ def _without_missing(heights, heading):
     return np.where(np.isin(heights, heading.missing), np.nan, heights) if heading.missing else heights
 
 
-def format_of_text(path: Path) -> str | None:
+def format_of_text(file: SourceFile) -> str | None:
     """Format of a text file, by its columns; None if it is no table of numbers, or a format of an instrument."""
-    layout = layout_of(path)
-    if layout is None or (layout.words and is_instrument_text(path)):
+    layout = file.layout
+    if layout is None or (layout.words and is_instrument_text(file)):
         return None
     if any(map(WIDTH.match, layout.heading)):
         return "matrix"
-    if layout.columns == 4 and looks_like_fourier(read_table(path).values):
+    if layout.columns == 4 and looks_like_fourier(file.values):
         return "fourier"
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS else "matrix"
 
@@ -227,9 +220,9 @@ def _value(text):
 _BYTES_OF_NODE = 64
 
 
-def read_fourier(path: Path, how: Preparation) -> Found:
+def read_fourier(file: SourceFile, how: Preparation) -> Found:
     """qx qy Re Im in every line: h = sum h_q exp(i q.r) over all q; opposite ones, if left out, are the conjugates."""
-    table = read_table(path).values
+    table = file.values
     if table.shape[1] != 4:
         raise ValueError(f"{table.shape[1]} numbers in a line, not qx qy Re Im")
     k = _wave_numbers(table[:, :2], how)
