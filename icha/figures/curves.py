@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -33,7 +33,7 @@ from icha.figures.select import (
     study_runs,
     ways_back,
 )
-from icha.figures.style import line_artist, panel_label
+from icha.figures.style import line_artist, logarithmic_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -181,12 +181,11 @@ def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]
 
 
 def say_which_snapshots(panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[Snapshots]) -> None:
-    """Letters and titles of the two panels of a figure of one snapshot."""
+    """Titles of the two panels of a figure of one snapshot."""
     shown = lines[0].labels
     titles = (snapshot_label(*lines[-1].members[0]), name_of_place(dataset, shown.surface, shown.rms_slope))
-    for axes, letter, title in zip(panels, "ab", titles, strict=True):
+    for axes, title in zip(panels, titles, strict=True):
         axes.set_title(title, loc="right")
-        panel_label(axes, letter)
 
 
 def whose_theories(dataset: xr.Dataset) -> dict[str, Line2D]:
@@ -195,64 +194,72 @@ def whose_theories(dataset: xr.Dataset) -> dict[str, Line2D]:
     return words_handle(f"theories: {names[0]}") if len(names) > 1 else {}
 
 
-def draw_line(
-    axes: Axes,
-    line: Line,
-    points: Callable[[xr.Dataset], tuple[np.ndarray, np.ndarray]],
-    *,
-    logarithmic: bool,
-    lines: int,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the points of a run by markers; of several seeds their mean at common loads by a line, and their scatter.
+# Load and value of the steps of a run.
+Points = Callable[["xr.Dataset"], tuple[np.ndarray, np.ndarray]]
+
+
+def draw_curves(
+    curves: Curves, panels: Mapping[Axes, Points], *, back: Mapping[Axes, Callable] = {}
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Draw the lines of a study, and boundary elements beside them, on double logarithmic axes.
 
     Parameters
     ----------
-    points : load and value of the steps of a run.
-    lines : number of lines in the panel.
-    logarithmic : whether values are positive on a logarithmic axis.
+    curves : the lines.
+    panels : the points that a panel shows.
+    back : load and value of a way back in a panel, as `_draw_ways_back` has them.
 
     Returns
     -------
-    What was drawn: loads and values.
+    Loads and values that were drawn in each of the panels.
     """
+    drawn = {axes: [] for axes in panels}
+    for line in curves.lines:
+        for axes, points in panels.items():
+            drawn[axes].append(_draw_line(axes, line, points, lines=len(curves.lines)))
+        _draw_ways_back(back, line)
+    for line in curves.beside:
+        for axes, points in panels.items():
+            drawn[axes].append(_draw_crosses(axes, line, points))
+    for axes in panels:
+        logarithmic_axes(axes)
+    return [tuple(map(np.concatenate, zip(*own, strict=True))) for own in drawn.values()]
+
+
+def _draw_line(axes, line, points, *, lines):
+    """Draw a run by markers; of several seeds their mean at common loads by a line, and their scatter."""
     from icha.analysis.common_loads import at_common_loads
 
     members = [points(run) for run in line.runs]
     if len(members) > 1:
-        load, values = at_common_loads(members, logarithmic=logarithmic)
+        load, values = at_common_loads(members, logarithmic=True)
         if len(load):
-            draw_members(axes, load, values, line.look, positive=logarithmic, lines=lines, asked=line.asked)
+            draw_members(axes, load, values, line.look, positive=True, lines=lines, asked=line.asked)
             return np.tile(load, len(values)), values.ravel()
     # Runs without a common load have no mean.
     for load, values in members:
         axes.plot(load, values, **line.look)
         if len(members) < line.asked:
             mark_fewer(axes, load, values, np.isfinite(values)[None], line.look, line.asked)
-    load, values = map(np.concatenate, zip(*members, strict=True))
-    return load, values
+    return tuple(map(np.concatenate, zip(*members, strict=True)))
 
 
-def draw_crosses(
-    axes: Axes, line: Line, points: Callable[[xr.Dataset], tuple[np.ndarray, np.ndarray]], *, logarithmic: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the points of a line by boundary elements, of several seeds their means at common loads; returns these.
-
-    `points` and `logarithmic` as for `draw_line`.
-    """
+def _draw_crosses(axes, line, points):
+    """Draw a line by boundary elements; of several seeds their means at common loads."""
     from icha.analysis.common_loads import at_common_loads
 
-    load, values = at_common_loads([points(run) for run in line.runs], logarithmic=logarithmic)
+    load, values = at_common_loads([points(run) for run in line.runs], logarithmic=True)
     mean = values.mean(axis=0)
     axes.plot(load, mean, **line.look)
     mark_fewer(axes, load, mean, np.isfinite(values), line.look, line.asked)
     return load, mean
 
 
-def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
+def _draw_ways_back(panels, line):
     """Draw the ways back of a line's runs, or of several seeds their means at common separations.
 
-    `panels` are axes, and load and value of a way as functions of its reduced pressure, contact area and reduced
-    separation.
+    `panels` give of axes load and value of a way, functions of its reduced pressure, contact area and reduced
+    separation, and of the rms slope. Loads are shown where they are compressive; the axes keep their range.
     """
     from icha.analysis.common_loads import at_common_displacements
 
@@ -266,15 +273,13 @@ def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
             separation, found = at_common_displacements(legs)
             pressure, area = (found[name].mean(axis=0) for name in ("reduced_pressure", "contact_area_fraction"))
             ways.append((pressure, area, separation))
-    for axes, points in panels:
+    slope = float(line.runs[0]["rms_slope"])
+    for axes, points in panels.items():
         for way in ways:
-            draw_unloading(axes, *points(*way), line.look["mec"])
-
-
-def draw_unloading(axes: Axes, load: np.ndarray, values: np.ndarray, colour: str) -> None:
-    """Draw one way back of a run on logarithmic axes of load, where it is compressive; the axes keep their range."""
-    # Just before separation loads are as small as can be.
-    axes.add_artist(line_artist(np.where(load > 0, load, np.nan), values, color=colour, **UNLOADING))
+            load, values = points(*way, slope)
+            # Just before separation loads are as small as can be.
+            pressed = np.where(load > 0, load, np.nan)
+            axes.add_artist(line_artist(pressed, values, color=line.look["mec"], **UNLOADING))
 
 
 def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, object] = {}) -> None:

@@ -13,18 +13,7 @@ from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.looks import Looks, interfaces_of, legend_below, words_handle
 from icha.figures.select import NothingToDraw, asked_of_entry, study_errors
-from icha.figures.style import (
-    DASHES,
-    GREY,
-    TWO_COLUMNS,
-    legend_handle,
-    logarithmic_axes,
-    material_label,
-    new_figure,
-    number,
-    panel_label,
-    styled,
-)
+from icha.figures.style import DASHES, GREY, legend_handle, logarithmic_axes, material_label, new_panels, number, styled
 from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
@@ -108,8 +97,7 @@ def draw_errors(
     interfaces = interfaces_of(study_errors(model_error, study).values())
     looks = Looks(campaign, interfaces, contacts, by_place=own_rows)
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
-    fig = new_figure(TWO_COLUMNS, 0.55 + 2.35 * len(rows))
-    panels = fig.subplots(len(rows), len(quantities), sharex=True, sharey="col", squeeze=False)
+    fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(quantities), sharex=True, sharey="col")
     named: dict[str, object] = {}
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
@@ -182,13 +170,11 @@ def _draw_curve(row, errors, quantities, look, apart, counts):
 
 
 def _finish(panels, quantities):
-    """Letters, axes and labels of all panels."""
-    letters = iter("abcdefghijklmnopqrstuvwxyz")
+    """Axes and labels of all panels."""
     for ax, quantity in zip(panels.ravel(), itertools.cycle(quantities), strict=False):
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.7, zorder=0)
         ax.set_ylabel(quantity.label)
-        panel_label(ax, next(letters))
     low, high = panels[0, 0].dataLim.intervalx
     if high < _ONE_LOAD * low:
         load = float(f"{np.sqrt(low * high):.3g}")

@@ -24,7 +24,7 @@ from icha.figures.hysteresis import (
 )
 from icha.figures.looks import MODEL_MARKERS, WAY_BACK_MARKERS, legend_below, words_handle
 from icha.figures.select import asked_seeds, branches, is_applicable, pick, runs_by_boundary_elements, ways_back
-from icha.figures.style import GREY, TWO_COLUMNS, legend_handle, new_figure, panel_label, slope_label, styled
+from icha.figures.style import GREY, legend_handle, new_panels, slope_label, styled
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -172,9 +172,7 @@ def figure(
     looks = looks_of(campaign, [study], [contact for _, contact in drawn])
 
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
-    fig = new_figure(TWO_COLUMNS, 2.7 * len(rows))
-    panels = fig.subplots(len(rows), 2, squeeze=False)
-    letters = iter("abcdefghijklmnopqrstuvwxyz")
+    fig, panels = new_panels(2.7 * len(rows), len(rows))
     for row, shown in zip(panels, rows, strict=True):
         own = [
             (loop, looks.look(contact, applicable=loop.applicable))
@@ -182,8 +180,6 @@ def figure(
             if loop.labels.rms_slope in shown
         ]
         _draw_row(row, own, turn=len(shown) > 1)
-        for ax in row:
-            panel_label(ax, next(letters))
         if own_rows:
             row[-1].set_title(slope_label(shown[0]), loc="right")
     for ax, axis in zip(panels[-1], (_LOADS, _AREAS), strict=True):

@@ -22,17 +22,7 @@ from icha.figures.hysteresis import (
 )
 from icha.figures.looks import legend_below
 from icha.figures.select import pick
-from icha.figures.style import (
-    GREY,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    new_figure,
-    number,
-    panel_label,
-    slope_label,
-    styled,
-    unit_for,
-)
+from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_panels, number, slope_label, styled, unit_for
 from icha.support.values import Problem, list_of_names
 
 if TYPE_CHECKING:
@@ -113,19 +103,15 @@ def figure(
     largest = max(float(run[quantity]) for seeds in every for run in seeds.values())
     factor, unit = unit_for(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
 
-    fig = new_figure(TWO_COLUMNS if by_load else ONE_COLUMN, 2.9)
-    panels = fig.subplots(1, 2 if by_load else 1, squeeze=False)[0]
+    fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
     counts = []
-    for ax, letter, x, drawn in zip(
-        panels, "ab", ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False
-    ):
+    for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
         means = {key: averages_of(campaign, line, x, quantity, factor) for key, line in drawn.items()}
         for (contact, applicable), line in means.items():
             draw_averages(ax, line, **looks.look(contact, applicable=applicable) | _LINE)
             counts += line.counts.tolist()
         _scale(ax, np.concatenate([line.y for line in means.values()]))
         ax.set_ylabel(_QUANTITIES[quantity] + (f" ({unit})" if unit else ""))
-        panel_label(ax, letter)
     _label_slopes(panels[0], sorted({labels.rms_slope for line in by_slope.values() for labels in line}))
     if by_load:
         _label_loads(panels[1], np.concatenate([line.x for line in means.values()]))

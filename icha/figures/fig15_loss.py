@@ -14,7 +14,7 @@ from icha.figures.ensembles import points_handles
 from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model, several
 from icha.figures.looks import legend_below
 from icha.figures.select import NothingToDraw
-from icha.figures.style import GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
+from icha.figures.style import GREY, logarithmic_axes, new_panels, styled, unit_for
 from icha.support.values import Flag, Problem, list_of_names
 
 if TYPE_CHECKING:
@@ -101,14 +101,12 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     if over_surface_energy and not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
 
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    loss, parts = fig.subplots(1, 2, width_ratios=(1.25, 1)) if sticky else (fig.subplots(), None)
+    widths = (1.25, 1) if sticky else (1,)
+    fig, [(loss, *parts)] = new_panels(3.1, columns=len(widths), width_ratios=widths)
     handles, counts = _draw_losses(loss, campaign, sticky if over_surface_energy else runs, looks, over_surface_energy)
-    panel_label(loss, "a")
     say_which_model(loss, campaign, studies)
     if sticky:
-        shown = _draw_parts(parts, sticky, looks)
-        panel_label(parts, "b")
+        shown = _draw_parts(*parts, sticky, looks)
         handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
     legend_below(fig, handles | points_handles(counts), scale=looks.scale, panels=[loss])
     return fig

@@ -17,12 +17,10 @@ from icha.figures.select import NothingToDraw, is_applicable, run_on_topography,
 from icha.figures.style import (
     BLACK,
     GREY,
-    TWO_COLUMNS,
     legend_handle,
     logarithmic_axes,
     material_label,
-    new_figure,
-    panel_label,
+    new_panels,
     slope_label,
     styled,
     unit_for,
@@ -114,14 +112,11 @@ def figure(
     if not ways_back(run):
         raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
     events = _events(run)
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    where, when = fig.subplots(1, 2, width_ratios=(1.3, 1))
+    fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
     handles = _draw_places(where, run, surface, events)
     _draw_counts(when, events)
     title = f"{material_label(campaign[study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
     when.set_title(title, loc="right", fontsize="small")
-    for ax, letter in ((where, "a"), (when, "b")):
-        panel_label(ax, letter)
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
     legend_below(fig, handles if is_applicable(run) else handles | words_handle(NOT_APPLICABLE_ALONE))
     return fig

@@ -15,9 +15,7 @@ from icha.figures.curves import (
     Line,
     add_legend,
     contact_of,
-    draw_crosses,
-    draw_line,
-    draw_ways_back,
+    draw_curves,
     gap_label,
     plausible,
     study_curves,
@@ -84,7 +82,11 @@ def figure(
     rows = ["ab", "c" + ("d" if differences[1] else "b")]
     axes = fig.subplot_mosaic(";".join(rows), height_ratios=(1, _LOWER))
     left, right = axes["a"], axes["b"]
-    states = _draw_states(left, right, curves) + _draw_solutions(left, right, curves.looks, entries)
+    back = {left: lambda p, area, gap, slope: (p, area), right: lambda p, area, gap, slope: (p, gap)}
+    (p, areas), (_, gaps) = draw_curves(curves, {left: _areas, right: _separations}, back=back)
+    if curves.unloaded:
+        left.plot([], [], color=GREY, label="unloading", **UNLOADING)
+    states = [(p, areas, gaps), *_draw_solutions(left, right, curves.looks, entries)]
     pressures, areas, gaps = (plausible(np.concatenate(values)) for values in zip(*states, strict=True))
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
@@ -108,25 +110,6 @@ def figure(
         axes.get(below, axes[letter]).set_xlabel(PRESSURE_LABEL)
     add_legend(fig, [left, right], curves, whose_theories(dataset) if references is not None else {})
     return fig
-
-
-def _draw_states(left, right, curves):
-    """Draw the runs by both models; returns loads, areas and separations of what was drawn."""
-    states = []
-    for line in curves.lines:
-        _, areas = draw_line(left, line, _areas, logarithmic=True, lines=len(curves.lines))
-        p, gaps = draw_line(right, line, _separations, logarithmic=True, lines=len(curves.lines))
-        states.append((p, areas, gaps))
-        draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
-    for line in curves.beside:
-        _, areas = draw_crosses(left, line, _areas, logarithmic=True)
-        p, gaps = draw_crosses(right, line, _separations, logarithmic=True)
-        states.append((p, areas, gaps))
-    for ax in (left, right):
-        logarithmic_axes(ax)
-    if curves.unloaded:
-        left.plot([], [], color=GREY, label="unloading", **UNLOADING)
-    return states
 
 
 def _label_separations(ax, gaps):

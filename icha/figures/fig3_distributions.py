@@ -15,7 +15,7 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigu
 from icha.figures.ensembles import draw_members, lines_handles
 from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS, legend_below, model_handle, named_handles
 from icha.figures.select import finite_range_errors, first_line, same_snapshots_by_boundary_elements
-from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, styled
+from icha.figures.style import BLACK, logarithmic_axes, new_panels, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,8 +70,7 @@ def figure(
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    left, right = fig.subplots(1, 2)
+    fig, [(left, right)] = new_panels(3.1)
     lowest, highest, top, named, floor = -0.3, 0.3, 0.0, {}, []
     truths = same_snapshots_by_boundary_elements(campaign, lines)
     for line, truth, look in zip(lines, truths, each_look, strict=True):

@@ -14,7 +14,7 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, S
 from icha.figures.looks import NOT_APPLICABLE_ALONE
 from icha.figures.maps import block_means, circles_in_cell, draw_spots, draw_whole
 from icha.figures.select import is_applicable, run_on_topography
-from icha.figures.style import TWO_COLUMNS, material_label, new_figure, number, panel_label, styled, unit_for
+from icha.figures.style import material_label, new_panels, number, styled, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -132,8 +132,7 @@ def figure(
         solved = None
     view = _view(run, at, surface)
 
-    fig = new_figure(TWO_COLUMNS, 3.35 if solved is None else 6.9)
-    panels = fig.subplots(1 if solved is None else 2, 2, squeeze=False)
+    fig, panels = new_panels(*(3.35, 1) if solved is None else (6.9, 2))
     whole, enlarged = panels[0, 0], panels[0, 1] if solved is None else panels[1, 0]
     image = _draw_spots_over_topography(whole, enlarged, view)
     enlarged.set_title(f"enlarged ×{view.zoom}", loc="right")
@@ -290,11 +289,10 @@ def _draw_solution(panels, view, run, at, solved):
 
 
 def _frame(panels, enlarged, view):
-    """Letters, limits and labels of all panels, and where the enlarged part lies in the others."""
+    """Limits and labels of all panels, and where the enlarged part lies in the others."""
     from matplotlib.patches import Rectangle
 
-    for ax, letter in zip(panels.ravel(), "abcd", strict=False):
-        panel_label(ax, letter)
+    for ax in panels.ravel():
         ax.tick_params(direction="out", top=False, right=False)
         start, width = (view.corner, view.window) if ax is enlarged else (np.zeros(2), view.side)
         ax.set_xlim(start[0], start[0] + width)

@@ -12,24 +12,11 @@ from icha.figures.curves import (
     PRESSURE_LABEL,
     UNLOADING,
     add_legend,
-    draw_crosses,
-    draw_line,
-    draw_ways_back,
+    draw_curves,
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
-from icha.figures.style import (
-    BLACK,
-    DASHES,
-    GREY,
-    TWO_COLUMNS,
-    legend_handle,
-    logarithmic_axes,
-    material_label,
-    new_figure,
-    panel_label,
-    styled,
-)
+from icha.figures.style import BLACK, DASHES, GREY, legend_handle, material_label, new_panels, styled
 from icha.support.input_files import read_columns
 
 if TYPE_CHECKING:
@@ -107,21 +94,14 @@ def figure(
     # Of curves that lie on each other all stay visible: later materials have smaller markers.
     size = {name: max(7.0 * 0.7**k, 1.6) for k, name in enumerate(curves.looks.materials)}
 
-    fig = new_figure(TWO_COLUMNS, 3.5)
-    left, right = fig.subplots(1, 2, sharey=True)
-    for line in curves.lines:
-        labels = line.labels
-        if curves.looks.scale is None:
-            line = line._replace(look=line.look | {"mfc": "none", "ms": size[labels.material]})
-        slope = float(line.runs[0]["rms_slope"])
-        draw_ways_back([(left, lambda p, a, _: (p, a)), (right, lambda p, a, _, slope=slope: (p * slope, a))], line)
-        draw_line(left, line, _points, logarithmic=True, lines=len(curves.lines))
-        draw_line(right, line, _points_at_load, logarithmic=True, lines=len(curves.lines))
-    for line in curves.beside:
-        draw_crosses(left, line, _points, logarithmic=True)
-        draw_crosses(right, line, _points_at_load, logarithmic=True)
-    for ax in (left, right):
-        logarithmic_axes(ax)
+    fig, [(left, right)] = new_panels(3.5, sharey=True)
+    if not curves.looks.scale:
+        own = [
+            line._replace(look=line.look | {"mfc": "none", "ms": size[line.labels.material]}) for line in curves.lines
+        ]
+        curves = curves._replace(lines=own)
+    back = {left: lambda p, area, gap, slope: (p, area), right: lambda p, area, gap, slope: (p * slope, area)}
+    draw_curves(curves, {left: _points, right: _points_at_load}, back=back)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
         _draw_measured(left, right, table, known, colours.get(known["material"], BLACK), DASHES[k % len(DASHES)])
     left.set_xlabel(PRESSURE_LABEL)
@@ -132,8 +112,6 @@ def figure(
     if not curves.looks.scale:
         further = {material_label(dataset, name): _open(colours[name], size[name]) for name in size} | further
     add_legend(fig, [left, right], curves, further)
-    for ax, letter in ((left, "a"), (right, "b")):
-        panel_label(ax, letter)
     return fig
 
 

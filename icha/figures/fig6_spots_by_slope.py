@@ -11,15 +11,7 @@ from icha.figures.declaration import Campaign, Declaration, StudyFigure
 from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale, legend_below
 from icha.figures.maps import circles_in_cell, draw_spots
 from icha.figures.select import is_applicable, pick, study_runs
-from icha.figures.style import (
-    TWO_COLUMNS,
-    new_figure,
-    number,
-    panel_label,
-    slope_label,
-    styled,
-    unit_for,
-)
+from icha.figures.style import new_panels, number, slope_label, styled, unit_for
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -89,14 +81,12 @@ def figure(
     # From dark to bright; the colours of the palette are those of materials.
     colours = dict(zip(slopes, Scale([f"{slope:g}" for slope in slopes]).colours, strict=True))
 
-    fig = new_figure(TWO_COLUMNS, 3.8)
-    panels = fig.subplots(1, 2, sharey=True)
+    fig, [panels] = new_panels(3.8, sharey=True)
     length, unit = unit_for(float(own[slopes[0]]["period"]), "m")
-    for ax, kind, letter in zip(panels, _KINDS, "ab", strict=True):
+    for ax, kind in zip(panels, _KINDS, strict=True):
         value = _draw_slopes(ax, own, kind, colours, length)
         ax.set_aspect("equal")
         ax.set_xlabel(f"x ({unit})")
-        panel_label(ax, letter)
         ax.set_title(f"{_TITLES[kind]} = {number(value)}", loc="right")
     panels[0].set_ylabel(f"y ({unit})")
     names = {

@@ -10,15 +10,14 @@ from icha.datasets import results
 from icha.figures.curves import (
     PRESSURE_LABEL,
     add_legend,
-    draw_crosses,
-    draw_line,
+    draw_curves,
     plausible,
     study_curves,
     whose_theories,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure
 from icha.figures.select import NothingToDraw
-from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
+from icha.figures.style import BLACK, new_panels, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,22 +53,9 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         If there is no such study or no run in it, or nothing in it has a positive load and stiffness (`NothingToDraw`).
     """
     curves = study_curves(campaign, study)
-    fig = new_figure(TWO_COLUMNS, 3.3)
-    left, right = fig.subplots(1, 2)
-    pressures, stiffnesses = [], []
-    for line in curves.lines:
-        p, stiffness = draw_line(left, line, stiffness_points, logarithmic=True, lines=len(curves.lines))
-        draw_line(right, line, _over_pressure, logarithmic=True, lines=len(curves.lines))
-        pressures.append(p)
-        stiffnesses.append(stiffness)
-    for line in curves.beside:
-        p, stiffness = draw_crosses(left, line, stiffness_points, logarithmic=True)
-        draw_crosses(right, line, _over_pressure, logarithmic=True)
-        pressures.append(p)
-        stiffnesses.append(stiffness)
-    logarithmic_axes(left)
-    logarithmic_axes(right, "x")
-    pressures, stiffnesses = np.concatenate(pressures), np.concatenate(stiffnesses)
+    fig, [(left, right)] = new_panels(3.3)
+    (pressures, stiffnesses), _ = draw_curves(curves, {left: stiffness_points, right: _over_pressure})
+    right.set_yscale("linear")
     if not len(pressures):
         raise NothingToDraw(f"study {study}: no stop with a positive load and a positive stiffness to draw")
     x = (plausible(pressures).min() / 1.6, pressures.max() * 1.6)
@@ -82,10 +68,9 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         left.plot(p[shown], theory[shown], **look)
         right.plot(p[shown], theory[shown] / p[shown], **look)
         ratio = np.concatenate([ratio, theory[shown] / p[shown]])
-    for ax, letter in ((left, "a"), (right, "b")):
+    for ax in (left, right):
         ax.set_xlim(x)
         ax.set_xlabel(PRESSURE_LABEL)
-        panel_label(ax, letter)
     left.set_ylim(plausible(stiffnesses).min() / 2, stiffnesses.max() * 2)
     right.set_ylim(0, 1.15 * ratio.max())
     left.set_ylabel(r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")

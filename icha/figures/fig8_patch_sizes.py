@@ -13,7 +13,7 @@ from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, lines_handles
 from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS, legend_below, model_handle
 from icha.figures.select import first_line, same_snapshots_by_boundary_elements
-from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, styled, unit_for
+from icha.figures.style import logarithmic_axes, new_panels, styled, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,8 +56,7 @@ def figure(
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    left, right = fig.subplots(1, 2, sharex=True)
+    fig, [(left, right)] = new_panels(3.1, sharex=True)
     truths = same_snapshots_by_boundary_elements(campaign, lines)
     period = float(lines[0].members[0][0]["period"])
     factor, unit = unit_for(period, "m")

@@ -12,7 +12,7 @@ from icha.figures.declaration import Campaign, Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import NothingToDraw, asked_seeds, is_applicable, snapshot_label, study_runs
-from icha.figures.style import GREY, TWO_COLUMNS, material_label, new_figure, panel_label, styled
+from icha.figures.style import GREY, material_label, new_panels, styled
 from icha.support.statistics import ensemble
 from icha.support.values import Problem
 
@@ -71,8 +71,7 @@ def figure(
     # Materials that differ only in their range are one line, so that their range is not in its name.
     interfaces = dataset.sel(material=list(dict.fromkeys(material for material, *_ in contacts)))
     looks = Looks(campaign, interfaces, contacts)
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    panels = fig.subplots(1, 2)
+    fig, [panels] = new_panels(3.1)
     drawn = []
     for (contact, applicable), points in curves.items():
         name = material_label(interfaces, contact[0]) if looks.scale else looks.name(contact)
@@ -82,10 +81,9 @@ def figure(
         name = None if k else "no adhesion"
         for ax, mean in zip(panels, ensemble(members).mean, strict=True):
             ax.axhline(mean, color=colour, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
-    for ax, letter, label in zip(panels, "ab", (AREA_LABEL, gap_label(dataset)), strict=True):
+    for ax, label in zip(panels, (AREA_LABEL, gap_label(dataset)), strict=True):
         _finish(ax, min(drawn), max(drawn))
         ax.set_ylabel(label)
-        panel_label(ax, letter)
     panels[0].set_title(shown, loc="right")
     counts = [len(members) for points in curves.values() for members, _ in points.values()]
     legend_below(fig, named_handles(panels) | points_handles(counts), scale=looks.scale, panels=panels)

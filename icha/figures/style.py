@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable
 from contextlib import contextmanager
 from functools import cache, wraps
+from string import ascii_lowercase
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -90,6 +91,17 @@ def new_figure(width: float, height: float) -> Figure:
     figure.get_layout_engine().set(w_pad=0.05, h_pad=0.06)
     FigureCanvasAgg(figure)
     return figure
+
+
+def new_panels(
+    height: float, rows: int = 1, columns: int = 2, *, width: float = TWO_COLUMNS, **options: object
+) -> tuple[Figure, np.ndarray]:
+    """A figure and its panels (rows, columns), which are marked as (a), (b), …; `options` as for `Figure.subplots`."""
+    figure = new_figure(width, height)
+    panels = figure.subplots(rows, columns, squeeze=False, **options)
+    for axes, letter in zip(panels.ravel(), ascii_lowercase, strict=False):
+        panel_label(axes, letter)
+    return figure, panels
 
 
 def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
