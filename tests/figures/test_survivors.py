@@ -16,9 +16,7 @@ from icha.figures import (
     fig4_contact_map,
     fig5_multi_slope,
     fig6_spots_by_slope,
-    fig7_stiffness,
     fig13_loops,
-    fig14_pull_off,
     fig15_loss,
 )
 from icha.figures.captions import count_runs
@@ -28,8 +26,8 @@ from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)
 REASON = "asperity model not applicable: 40 % of the load is on summits that no node supports"
-LOADING = (fig2_area_and_gap, fig5_multi_slope, fig7_stiffness)
-LOOPS = (fig13_loops, fig14_pull_off, fig15_loss)
+LOADING = (fig2_area_and_gap, fig5_multi_slope)
+LOOPS = (fig13_loops, fig15_loss)
 
 
 def campaign(failed=None, checks=None, pale=(), lacking=(), run=small.run):
