@@ -5,14 +5,13 @@ read within it (`bounded_memory`), whatever library does the reading.
 """
 
 import csv
+import math
 import os
 import re
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-
-import numpy as np
 
 from icha.support import in_words
 
@@ -206,8 +205,8 @@ def _shown(name):
     return repr(name.decode("utf-8", "replace"))
 
 
-def read_columns(path: str | Path, columns: dict[str, float]) -> list[np.ndarray]:
-    """Read columns of a CSV file, in the file's own order.
+def read_columns(path: str | Path, columns: dict[str, float]) -> list:
+    """Read columns of a CSV file, each an array in the file's own order.
 
     Parameters
     ----------
@@ -219,6 +218,8 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list[np.ndarray
     ValueError
         If the file cannot be read, or a column is missing or holds anything but positive numbers.
     """
+    import numpy as np  # which commands that read no table do not wait for
+
     if flaw := flaw_of_path(path):
         raise ValueError(f"{flaw}; allowed: a CSV file")
     try:
@@ -242,7 +243,7 @@ def _positive(text, where: str) -> float:
     try:
         value = float(text)
     except (TypeError, ValueError):
-        value = np.nan
-    if not (np.isfinite(value) and value > 0):
+        value = math.nan
+    if not 0 < value < math.inf:
         raise ValueError(f"{where}: {text!r}; allowed: numbers greater than 0")
     return value

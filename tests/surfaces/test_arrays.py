@@ -84,11 +84,6 @@ def test_leading_dimensions_of_one_entry_are_passed_over(tmp_path, name):
     assert_read(scan(write_netcdf(tmp_path / name)))
 
 
-def test_the_usual_variable_is_taken_and_said(tmp_path):
-    read = scan(write_netcdf(tmp_path / "scan.nc", several=True))
-    assert read.data == "height" and "data height of several" in read.description
-
-
 @pytest.mark.parametrize("unit", ["px", "pixels", "pica", "point", "hand", "pt", "au", "pc", "li"])
 def test_units_that_no_microscope_writes_are_no_lengths(tmp_path, unit):
     with pytest.raises(UnfitTopography, match="is missing") as raised:

@@ -49,13 +49,6 @@ def test_crop(prepared):
         assert raised.value.key == "crop"
 
 
-def test_low_numbers_touch_first(prepared):
-    heights = np.random.default_rng(1).normal(size=(9, 9))
-    np.testing.assert_allclose(
-        prepared(heights, boundary="free", touches_first="low").surface.heights, -centred(heights), atol=1e-14
-    )
-
-
 @pytest.mark.parametrize("missing", ["refuse", "fill"])
 def test_trends_are_removed_whatever_is_missing(prepared, missing):
     y, x = np.mgrid[:12, :12] * 0.5
@@ -125,16 +118,6 @@ def test_window_leaves_the_middle_and_ends_flat(prepared):
     assert result.rms_slope == pytest.approx(surface.rms_slope) and "0.25 of the side" in result.description
 
 
-def test_periodic_scans_are_taken_as_they_are(prepared):
-    surface = SelfAffineSpectrum(1.0, 0.5, 0.2, 0.8).realise(32, 3)
-    taken = prepared(surface.heights, boundary="periodic", size=(1.0, 1.0))
-    np.testing.assert_allclose(taken.surface.heights, surface.heights, atol=1e-16)
-    assert taken.rms_slope == pytest.approx(1.0, rel=1e-12)
-    with pytest.raises(UnfitTopography, match="needs a square") as raised:
-        prepared(surface.heights[:20], boundary="periodic", size=(1.0, 0.625))
-    assert raised.value.key == "boundary"
-
-
 @pytest.mark.parametrize("grid", [24, 48])
 def test_resampling_of_a_periodic_scan_is_exact(prepared, grid):
     spectrum = SelfAffineSpectrum(1.0, 0.5, 0.2, 0.8)
@@ -198,13 +181,6 @@ def test_square_pixels_keep_the_slope(prepared):
     # Near the edges across long pixels the cosine series is flat, and the scan is not.
     assert np.std(difference[inside]) < 0.02 * square.surface.rms_height
     assert result.rms_slope == pytest.approx(square.rms_slope, rel=0.02)
-
-
-def test_a_crop_of_pixels_that_are_not_square_is_a_square_to_less_than_a_pixel(prepared):
-    heights = rough_at(np.arange(100) * 0.128, np.arange(60) * 0.315)
-    keys = {"boundary": "free", "size": (12.8, 18.9)}
-    cropped = prepared(heights, crop={"x": 1.28, "y": 3.15, "side": 5.0}, **keys).surface
-    assert cropped.grid == 39 and 5.0 - 0.315 < cropped.period < 5.0
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free", "mirror"])
