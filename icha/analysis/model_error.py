@@ -34,14 +34,7 @@ _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
 
 # What a run and a solution must share for their difference to be the model's error, and to which relative accuracy.
-SHARED = (
-    "period",
-    "rms_height",
-    "rms_slope",
-    "contact_modulus",
-    "surface_energy",
-    "interaction_range",
-)
+SHARED = ("period", "rms_height", "rms_slope", "contact_modulus", "surface_energy", "interaction_range")
 _ROUNDING = 1e-6
 # From this part on a cell of a contact map is in contact.
 _HALF = 0.5

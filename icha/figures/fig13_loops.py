@@ -15,13 +15,7 @@ from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure, not_unloaded
 from icha.figures.ensembles import draw_scatter, lines_handles, mark_fewer
-from icha.figures.hysteresis import (
-    BRANCH_DASHES,
-    ROUNDING,
-    looks_of,
-    pull_off_step,
-    unloaded_runs,
-)
+from icha.figures.hysteresis import BRANCH_DASHES, ROUNDING, looks_of, pull_off_step, unloaded_runs
 from icha.figures.looks import MODEL_MARKERS, WAY_BACK_MARKERS, legend_below, words_handle
 from icha.figures.select import asked_seeds, branches, is_applicable, pick, runs_by_boundary_elements, ways_back
 from icha.figures.style import GREY, legend_handle, new_panels, slope_label, styled

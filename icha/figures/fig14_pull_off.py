@@ -12,14 +12,7 @@ from pydantic import Field
 from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, not_unloaded, studies_problems
 from icha.figures.ensembles import points_handles
-from icha.figures.hysteresis import (
-    averages_of,
-    detached_lines,
-    draw_averages,
-    looks_of,
-    say_which_model,
-    several,
-)
+from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model, several
 from icha.figures.looks import legend_below
 from icha.figures.select import pick
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_panels, number, slope_label, styled, unit_for
@@ -54,8 +47,7 @@ class PullOffFigure(StudyFigure):
 
 
 DECLARATION = Declaration(
-    description="Pull-off against rms slope, and against the largest load.",
-    options=PullOffFigure,
+    description="Pull-off against rms slope, and against the largest load.", options=PullOffFigure
 )
 
 _QUANTITIES = {
@@ -70,11 +62,7 @@ _LINE = {"lw": 0.9}
 
 @styled
 def figure(
-    campaign: xr.DataTree,
-    *,
-    study: str,
-    load_studies: Sequence[str] = (),
-    quantity: str = "pull_off_pressure",
+    campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (), quantity: str = "pull_off_pressure"
 ) -> Figure:
     """Draw the pull-off of all runs of the studies, averaged over the seeds.
 

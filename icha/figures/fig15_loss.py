@@ -40,10 +40,7 @@ class LossFigure(FigureOptions):
         yield from studies_problems(campaign, "studies", self.studies)
 
 
-DECLARATION = Declaration(
-    description="Energy lost in a loop against contact area, and its parts.",
-    options=LossFigure,
-)
+DECLARATION = Declaration(description="Energy lost in a loop against contact area, and its parts.", options=LossFigure)
 
 # Parts of the loss, with the look of their bars: none has the colour of a material.
 PARTS = {

@@ -28,9 +28,7 @@ def no_inputs(campaign: Campaign, options: JKRFigure, files: ResultFiles) -> Inp
 
 
 DECLARATION = Declaration(
-    description="Force and radius of one asperity against approach.",
-    options=JKRFigure,
-    inputs=no_inputs,
+    description="Force and radius of one asperity against approach.", options=JKRFigure, inputs=no_inputs
 )
 
 

@@ -54,11 +54,7 @@ _SAME_LOAD = 1e-6
 
 @styled
 def figure(
-    campaign: xr.DataTree,
-    references: xr.Dataset | None = None,
-    model_error: xr.DataTree | None = None,
-    *,
-    study: str,
+    campaign: xr.DataTree, references: xr.Dataset | None = None, model_error: xr.DataTree | None = None, *, study: str
 ) -> Figure:
     """Draw all runs of a study.
 

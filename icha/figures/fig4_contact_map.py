@@ -61,10 +61,7 @@ def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | 
 
 
 DECLARATION = Declaration(
-    description="Contact spots over the topography.",
-    options=MapFigure,
-    inputs=inputs,
-    holds_topography=True,
+    description="Contact spots over the topography.", options=MapFigure, inputs=inputs, holds_topography=True
 )
 
 # The enlarged view shows a quarter of the period, halved as often as it is wider than so many radii of the spots, and

@@ -7,14 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from icha.datasets import results
-from icha.figures.curves import (
-    AREA_LABEL,
-    PRESSURE_LABEL,
-    UNLOADING,
-    add_legend,
-    draw_curves,
-    study_curves,
-)
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, UNLOADING, add_legend, draw_curves, study_curves
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
 from icha.figures.style import BLACK, DASHES, GREY, legend_handle, material_label, new_panels, styled
 from icha.support.input_files import read_columns

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import (
-    PRESSURE_LABEL,
-    add_legend,
-    draw_curves,
-    plausible,
-    study_curves,
-    whose_theories,
-)
+from icha.figures.curves import PRESSURE_LABEL, add_legend, draw_curves, plausible, study_curves, whose_theories
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, new_panels, styled
@@ -31,9 +24,7 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 
 
 DECLARATION = Declaration(
-    description="Contact stiffness against load, with theory.",
-    options=StudyFigure,
-    inputs=inputs,
+    description="Contact stiffness against load, with theory.", options=StudyFigure, inputs=inputs
 )
 
 

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 
 DECLARATION = Declaration(
-    description="Sizes of the contact patches of every material, on the study's first surface.",
-    options=SnapshotFigure,
+    description="Sizes of the contact patches of every material, on the study's first surface.", options=SnapshotFigure
 )
 
 # Patches per plotted point of the density: bins with less are joined with their neighbours.
@@ -33,13 +32,7 @@ _CURVE_POINTS = 300
 
 
 @styled
-def figure(
-    campaign: xr.DataTree,
-    *,
-    study: str,
-    kind: str | None = None,
-    target: float | None = None,
-) -> Figure:
+def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
     """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds.
 
     Parameters

@@ -45,13 +45,7 @@ _LEAST_REACH = 0.05
 
 
 @styled
-def figure(
-    campaign: xr.DataTree,
-    *,
-    study: str,
-    kind: str | None = None,
-    target: float | None = None,
-) -> Figure:
+def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
     """Draw all runs of a study at one snapshot.
 
     Parameters

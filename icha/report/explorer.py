@@ -60,11 +60,7 @@ class Written(NamedTuple):
 
 
 def write_explorer(
-    folder: str | os.PathLike,
-    page: str | os.PathLike,
-    *,
-    only: Mapping[str, Collection] = {},
-    largest: float,
+    folder: str | os.PathLike, page: str | os.PathLike, *, only: Mapping[str, Collection] = {}, largest: float
 ) -> Written:
     """Write the page of a campaign.
 

@@ -34,16 +34,7 @@ from icha.figures.curves import GAP_LABEL, SEPARATION_LABEL, gap_label
 from icha.figures.looks import Scale, material_colours, materials_scale, place_markers, places_scale
 from icha.figures.maps import block_means, circles_in_cell
 from icha.figures.select import NothingToDraw, branches, path_steps, study_runs
-from icha.figures.style import (
-    BLACK,
-    logarithmic_axes,
-    new_figure,
-    number,
-    quantity,
-    save,
-    slope_label,
-    unit_for,
-)
+from icha.figures.style import BLACK, logarithmic_axes, new_figure, number, quantity, save, slope_label, unit_for
 from icha.references.persson import persson_area
 from icha.references.theories import reference_dataset
 from icha.support.statistics import ensemble
