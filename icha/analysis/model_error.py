@@ -85,9 +85,27 @@ def model_error(
         Naming entry, run and pressure: if a run is not there, has no snapshot at that pressure, or is another contact
         than the solution's; if a contact lacks a state that others of its entry have, or has one twice.
     """
-    select = cache(lambda labels: select_run(campaign, labels))
-    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     origins: dict[str, list[dict[str, str]]] = {}
+    select = cache(lambda labels: select_run(campaign, labels))
+    entries = _short_range_entries(select, runs, origins)
+    short_range = set(entries)
+    for entry, states in _finite_range_entries(select, solutions, origins).items():
+        entries[entry] = entries.get(entry, {}) | states
+    if not entries:
+        raise ValueError("a model error needs at least one run or solution by boundary elements")
+    groups = {}
+    for entry, states in entries.items():
+        truth = SHORT_RANGE if entry in short_range else FINITE_RANGE
+        title = f"{_TITLE}, {'study' if entry in short_range else 'entry'} {entry}"
+        described = collected(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
+        groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(described)
+    root = collected(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
+
+
+def _short_range_entries(select, runs, origins):
+    """States of every study, beside runs in the limit of a short range; adds to `origins` attributes of the runs."""
+    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
         run = select(labels._replace(model=ASPERITIES))
@@ -97,8 +115,12 @@ def model_error(
         except ValueError as error:
             raise ValueError(f"{labels}: {error}") from None
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
-    entries = {study: _with_all_loads(states) for study, states in entries.items() if states}
-    short_range = set(entries)
+    return {study: _with_all_loads(states) for study, states in entries.items() if states}
+
+
+def _finite_range_entries(select, solutions, origins):
+    """States of every entry, beside solutions at finite ranges; adds to `origins` attributes of the runs."""
+    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)
         states = entries.setdefault(labels.entry, {})
@@ -110,23 +132,14 @@ def model_error(
                 states[labels] = None
                 continue
             at = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
-            if not np.isclose(float(solution["target_reduced_pressure"]), labels.reduced_pressure, rtol=1e-9):
-                asked = float(solution["target_reduced_pressure"])
+            asked = float(solution["target_reduced_pressure"])
+            if not np.isclose(asked, labels.reduced_pressure, rtol=1e-9):
                 raise ValueError(f"the solution is one of reduced pressure {asked:g}")
             states[labels] = compare_state(run, at, solution)
         except ValueError as error:
             raise ValueError(f"{_name(labels)}: {error}") from None
         origins.setdefault(labels.entry, []).extend((run.attrs, solution.attrs))
-    if not entries:
-        raise ValueError("a model error needs at least one run or solution by boundary elements")
-    groups = {}
-    for entry, states in entries.items():
-        truth = SHORT_RANGE if entry in short_range else FINITE_RANGE
-        title = f"{_TITLE}, {'study' if entry in short_range else 'entry'} {entry}"
-        described = collected(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
-        groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(described)
-    root = collected(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
-    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
+    return entries
 
 
 def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:

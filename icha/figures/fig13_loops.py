@@ -147,17 +147,7 @@ def figure(
         If there is no such study, surface or seed, no run was unloaded, or boundary elements belong to no run of the
         study.
     """
-    runs = unloaded_runs(campaign, study)
-    surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
-    others = [run for _, run in runs_by_boundary_elements(campaign, boundary_elements or study) if ways_back(run)]
-    truths = _truths(study, runs, [*others, *(loops or ())])
-    runs = [(labels, run) for labels, run in runs if labels.surface == surface]
-    if seed is None:
-        seed = next((labels.seed for labels, _ in runs if labels in truths), None)
-    else:
-        pick("seed", seed, list(dict.fromkeys(labels.seed for labels, _ in runs)))
-    dataset = campaign[study].to_dataset()
-    drawn = _loops(dataset, [pair for pair in runs if seed in (None, pair[0].seed)], truths, alone=seed is not None)
+    drawn, surface, seed = _loops(campaign, study, boundary_elements or study, loops or (), surface, seed)
     slopes = sorted({loop.labels.rms_slope for loop in drawn}, reverse=True)
     contacts = {loop.labels._replace(seed=None) for loop in drawn}
     own_rows = len(contacts) > _MOST_LOOPS and 1 < len(slopes) < len(contacts)
@@ -179,22 +169,34 @@ def figure(
     for ax, axis in zip(panels[-1], (_LOADS, _AREAS), strict=True):
         ax.set_xlabel(axis.x_label)
     _say_which(panels[0, 0], surface, seed)
-    handles = _handles(looks, [loop for loop, _ in drawn], marked=len(rows[0]) > 1) | _others(dataset, seed)
+    handles = _handles(looks, [loop for loop, _ in drawn], marked=len(rows[0]) > 1)
+    handles |= _others(campaign[study].to_dataset(), seed)
     legend_below(fig, handles, scale=looks.scale, panels=panels.ravel())
     return fig
 
 
-def _loops(dataset, runs, truths, *, alone):
-    """The loops of all contacts, those to which the asperity model is not applicable apart; `alone`: of one seed."""
+def _loops(campaign, study, beside, loops, surface, seed):
+    """The loops of a surface and seed, those to which the asperity model is not applicable apart; surface and seed."""
+    runs = unloaded_runs(campaign, study)
+    surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
+    others = [run for _, run in runs_by_boundary_elements(campaign, beside) if ways_back(run)]
+    truths = _truths(study, runs, [*others, *loops])
+    runs = [(labels, run) for labels, run in runs if labels.surface == surface]
+    if seed is None:
+        seed = next((labels.seed for labels, _ in runs if labels in truths), None)
+    else:
+        pick("seed", seed, list(dict.fromkeys(labels.seed for labels, _ in runs)))
+    dataset = campaign[study].to_dataset()
     members: dict[tuple, dict[RunLabels, xr.Dataset]] = {}
     for labels, run in runs:
-        members.setdefault((labels._replace(seed=None), is_applicable(run)), {})[labels] = run
+        if seed in (None, labels.seed):
+            members.setdefault((labels._replace(seed=None), is_applicable(run)), {})[labels] = run
     found = []
     for (_, applicable), own in members.items():
         first, of_seeds = next(iter(own)), list(own.values())
-        asked = 1 if alone else asked_seeds(dataset, first)
+        asked = asked_seeds(dataset, first) if seed is None else 1
         found.append(_Loop(first, of_seeds, _ways(of_seeds), truths.get(first, []), asked, applicable))
-    return found
+    return found, surface, seed
 
 
 def _draw_row(row, loops, *, turn):

@@ -65,7 +65,6 @@ def figure(
         If there is no such study or snapshot.
     """
     from icha.analysis.model_error import state_of
-    from icha.references.persson import persson_pressure_density
 
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
@@ -81,42 +80,51 @@ def figure(
         p, densities = pressure_densities(line.members)
         draw_members(right, p, densities, look, **drawn, markevery=3)
         density = densities.mean(axis=0)
-        if len(density):  # before first contact there is no pressure
-            shown = density > 1e-3 * density.max()
-            lowest, highest = min(lowest, p[shown].min()), max(highest, p[shown].max())
-            top = max(top, density.max())
+        shown = p[density > 1e-3 * density.max(initial=0)]  # before first contact there is no pressure
+        lowest, highest = shown.min(initial=lowest), shown.max(initial=highest)
+        top = density.max(initial=top)
         loads = [float(state_of(run, at)["reduced_pressure"]) for run, at in line.members]
         load = float(np.mean(loads))
         distributions = _of_boundary_elements(truth, _solutions(finite_range_errors(model_error, study), line, loads))
         if distributions:
-            name = distributions.name
-            for ax, (at, density) in ((left, distributions.gaps), (right, distributions.pressures)):
-                every = 1 + len(at) // _BESIDE_MARKERS
-                ax.plot(at, density, color=look["color"], marker=MODEL_MARKERS[name], markevery=every, **BESIDE_LINE)
+            _draw_beside(left, right, distributions, look["color"])
             top = max(top, distributions.pressures[1].max(initial=0.0))
-            named[name] = model_handle(name, **BESIDE_LINE)
+            named[distributions.name] = model_handle(distributions.name, **BESIDE_LINE)
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
     say_which_snapshots([left, right], dataset, lines)
-    if load > 0:
-        line = np.linspace(0.002, highest, 300)
-        right.semilogy(line, persson_pressure_density(line, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
+    _finish(left, right, (lowest, highest), top, load)
+    own = model_name(dataset)
+    handles = looks.handles(ls="-", marker=MODEL_MARKERS[own]) | {own: model_handle(own, ls="-", lw=0.8, mfc="white")}
+    handles |= named | lines_handles(len(line.members) for line in lines) | named_handles([right])
+    legend_below(fig, handles, scale=looks.scale, panels=[left, right])
+    return fig
 
+
+def _finish(left, right, pressures, highest, load):
+    """Labels of both panels, and of that of the pressure limits and Persson's theory at a reduced pressure."""
+    from icha.references.persson import persson_pressure_density
+
+    if load > 0:
+        p = np.linspace(0.002, pressures[1], 300)
+        right.semilogy(p, persson_pressure_density(p, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
+    right.set_xlim(1.05 * np.array(pressures))
+    if highest > 0:
+        right.set_ylim(highest * 5e-5, highest * 3)
+    right.axvline(0, color="0.75", lw=0.6, zorder=0)
     left.set_xlabel(r"gap  $u/h_{\mathrm{rms}}$")
     left.set_ylabel(r"$P(u)\; h_{\mathrm{rms}}$")
     right.set_xlabel(r"contact pressure  $p/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
     right.set_ylabel(r"$P(p)\; E^{\ast}h_{\mathrm{rms}}^{\prime}$")
-    right.set_xlim(lowest * 1.05, highest * 1.05)
-    if top > 0:
-        right.set_ylim(top * 5e-5, top * 3)
-    right.axvline(0, color="0.75", lw=0.6, zorder=0)
-    seeds = lines_handles(len(line.members) for line in lines)
-    own = model_name(dataset)
-    models = {own: model_handle(own, ls="-", lw=0.8, mfc="white")} | named
-    handles = looks.handles(ls="-", marker=MODEL_MARKERS[own]) | models | seeds | named_handles([right])
-    legend_below(fig, handles, scale=looks.scale, panels=[left, right])
-    return fig
+
+
+def _draw_beside(left, right, distributions, colour):
+    """Draw the distributions of boundary elements."""
+    marker = MODEL_MARKERS[distributions.name]
+    for ax, (at, density) in ((left, distributions.gaps), (right, distributions.pressures)):
+        every = 1 + len(at) // _BESIDE_MARKERS
+        ax.plot(at, density, color=colour, marker=marker, markevery=every, **BESIDE_LINE)
 
 
 class _Beside(NamedTuple):

@@ -120,26 +120,19 @@ def figure(
     asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
     labels, run = run_on_topography(campaign, study, surface, **asked)
     at = find_snapshot(run, kind, target)
+    solved = None
     if solution is not None:
-        _check_solution(labels, run, at, solution)
-        solved = _Solved(solution["contact"], float(solution["contact_area_fraction"]), FINITE_RANGE)
+        solved = _of_solution(labels, run, at, solution)
     elif truth is not None:
         solved = _of_run(labels, run, at, truth)
-    else:
-        solved = None
     view = _view(run, at, surface)
 
     fig, panels = new_panels(*(3.35, 1) if solved is None else (6.9, 2))
     whole, enlarged = panels[0, 0], panels[0, 1] if solved is None else panels[1, 0]
     image = _draw_spots_over_topography(whole, enlarged, view)
     enlarged.set_title(f"enlarged ×{view.zoom}", loc="right")
-    step = int(run["snapshot_step"].values[at])
-    load = number(float(run["reduced_pressure"].values[step]))
-    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
-    area = rf"$A/A_0$ = {float(run['contact_area_fraction'].values[step]):.3f}"
-    contact = f"{labels.surface}, {material_label(campaign[study].to_dataset(), labels.material)}"
-    warning = "" if is_applicable(run) else f"\n{NOT_APPLICABLE_ALONE}"
-    fig.suptitle(f"{contact}, {load}{warning}", fontsize="medium")
+    area = rf"$A/A_0$ = {float(_state(run, at)['contact_area_fraction']):.3f}"
+    fig.suptitle(_title(campaign[study].to_dataset(), labels, run, at), fontsize="medium")
     if solved is None:
         whole.set_title(area, loc="right")
     else:
@@ -159,35 +152,51 @@ class _Solved(NamedTuple):
     name: str
 
 
+def _state(run, at):
+    from icha.analysis.model_error import state_of
+
+    return state_of(run, at)
+
+
+def _title(dataset, labels, run, at):
+    """Surface, material and load of a snapshot, and whether the model is not applicable."""
+    load = number(float(_state(run, at)["reduced_pressure"]))
+    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
+    warning = "" if is_applicable(run) else f"\n{NOT_APPLICABLE_ALONE}"
+    return f"{labels.surface}, {material_label(dataset, labels.material)}, {load}{warning}"
+
+
 def _of_run(labels, run, at, truth):
     """The state of a run by boundary elements that a run keeps as its snapshot `at`; None if it failed before."""
-    from icha.analysis.model_error import check_same_contact, state_of
     from icha.datasets.campaign import find_snapshot
 
-    try:
-        check_same_contact(run, truth)
-    except ValueError as error:
-        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
+    _check_contact(labels, run, truth)
     asked = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
     try:
-        state = state_of(truth, find_snapshot(truth, *asked))
+        state = _state(truth, find_snapshot(truth, *asked))
     except ValueError:
         return None
     contact = state["contact_map"].rename(row="y", column="x")
     return _Solved(contact, float(state["contact_area_fraction"]), SHORT_RANGE)
 
 
-def _check_solution(labels, run, at, solution):
-    """Raise ValueError unless boundary elements are of the state that is drawn."""
-    from icha.analysis.model_error import check_same_contact, state_of
-
-    try:
-        check_same_contact(run, solution)
-    except ValueError as error:
-        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
-    shown, solved = float(state_of(run, at)["reduced_pressure"]), float(solution["target_reduced_pressure"])
+def _of_solution(labels, run, at, solution):
+    """The state that a solution by boundary elements is of, which must be the one that is drawn."""
+    _check_contact(labels, run, solution)
+    shown, solved = float(_state(run, at)["reduced_pressure"]), float(solution["target_reduced_pressure"])
     if not np.isclose(shown, solved, rtol=1e-6):
         raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g} for a snapshot at {shown:g}")
+    return _Solved(solution["contact"], float(solution["contact_area_fraction"]), FINITE_RANGE)
+
+
+def _check_contact(labels, run, truth):
+    """Raise ValueError unless boundary elements are of the contact that is drawn."""
+    from icha.analysis.model_error import check_same_contact
+
+    try:
+        check_same_contact(run, truth)
+    except ValueError as error:
+        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
 
 
 class _View(NamedTuple):

@@ -84,49 +84,65 @@ def write_report(
     further_software : packages that the campaign needs besides those that every campaign needs.
     """
     folder = Path(path).parent
-    checks, surfaces = list(checks), list(surfaces)
 
     def link(target):
-        return Path(os.path.relpath(target, folder)).as_posix()
+        return None if target is None else Path(os.path.relpath(target, folder)).as_posix()
 
     pictures = _pictures(figures, campaign, link)
     studies = [study_section(campaign, name, comparison) for name in campaign.children]
-    dataset = link(dataset_path) if dataset_path is not None else None
+    surfaces, dataset = list(surfaces), link(dataset_path)
     linked = {name: link(target) for name, target in files.items()}
     page = template("report.html").render(
-        title=campaign.attrs.get("title", "Rough contact campaign"),
-        summary=campaign.attrs.get("summary", ""),
-        attributes=campaign.attrs,
+        **_of_campaign(campaign, studies),
+        **_of_checks(list(checks)),
+        **_of_surfaces(surfaces),
         figures=pictures,
         graph=provenance(studies, surfaces, pictures, model_error, linked, dataset),
-        studies=studies,
-        totals={name: sum(study[name] for study in studies) for name in ("asked", "complete", "failed", "missing")}
-        | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
         entries=[entry_section(node.to_dataset()) for node in _entries(model_error)],
-        surfaces=[surface_row(surface) for surface in surfaces[:MOST_ROWS]],
-        surface_count=len(surfaces),
-        sources=sources(surfaces),
-        spectra=spectra(surfaces),
-        checks=worst(checks),
-        check_count=len(checks),
-        validity=of_dataset(campaign),
-        failed=[check for check in checks if not check.passed],
-        times=link(times_path) if times_path is not None else None,
+        times=link(times_path),
         configuration=configuration,
         dataset=dataset,
         dataset_name=Path(dataset_path).name if dataset_path is not None else None,
         files=linked,
-        results=link(results) if results is not None else None,
+        results=link(results),
         explorer=link(Path(results, EXPLORER)) if results is not None else None,
-        most_rows=MOST_ROWS,
-        folded=_FOLDED,
-        paper=MODEL_PAPER.line,
         citations=citations,
         references=_references(campaign, model_error),
         software={name: _version(name) for name in (*SOFTWARE, *further_software)},
     )
     with whole_file(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _of_campaign(campaign, studies):
+    """What the page says of the campaign as a whole."""
+    totals = {name: sum(study[name] for study in studies) for name in ("asked", "complete", "failed", "missing")}
+    return {
+        "title": campaign.attrs.get("title", "Rough contact campaign"),
+        "summary": campaign.attrs.get("summary", ""),
+        "attributes": campaign.attrs,
+        "studies": studies,
+        "totals": totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
+        "validity": of_dataset(campaign),
+        "most_rows": MOST_ROWS,
+        "folded": _FOLDED,
+        "paper": MODEL_PAPER.line,
+    }
+
+
+def _of_checks(checks):
+    failed = [check for check in checks if not check.passed]
+    return {"checks": worst(checks), "check_count": len(checks), "failed": failed}
+
+
+def _of_surfaces(surfaces):
+    rows = [surface_row(surface) for surface in surfaces[:MOST_ROWS]]
+    return {
+        "surfaces": rows,
+        "surface_count": len(surfaces),
+        "sources": sources(surfaces),
+        "spectra": spectra(surfaces),
+    }
 
 
 def _pictures(figures, campaign, link):
