@@ -714,7 +714,7 @@ def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_ca
         adhesive = next(k for k, name in enumerate(legend(figure)) if "= 50 mJ/m²" in name)
         handle = figure.legends[0].legend_handles[adhesive]
         line = handle if hasattr(handle, "get_color") else handle.get_children()[0]
-        assert to_hex(np.atleast_1d(line.get_color())[0]) == colours["soft"]
+        assert to_hex(np.atleast_1d(line.get_color())[0]) == to_hex(colours["soft"])
         drawn = [line for line in figure.axes[0].get_lines() if line.get_color() == colours["soft"]]
         assert drawn and {line.get_marker() for line in drawn} <= {"o", "+", "1", ".", "None", None}
 
