@@ -153,7 +153,6 @@ def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
     chosen, table = _model(name), RUN | FURTHER[name]
     values = {
         **_of_path(table, path, met, surface.grid),
-        "united_until": path.united_until if chosen.united_by_rule else "",
         **_of_surface(surface, material, seed),
         **of_contact,
         **bin_values("gap", gap_bins(surface)),

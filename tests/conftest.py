@@ -17,7 +17,7 @@ PARTS += ("pyproject.toml", "uv.lock", "README.md")
 SMOKE = "config/campaigns/smoke.yaml"
 # Of its figures, one for each kind of input; and what else may be less for every rule to run all the same.
 FIGURES = ("fig1_jkr", "fig2_area_and_gap", "fig3_distributions", "fig5_multi_slope")
-FIGURES += ("fig10_model_error", "fig12_error_sources", "fig13_loops")
+FIGURES += ("fig10_model_error", "fig13_loops")
 LESS = {"separation_step: 0.3": "separation_step: 0.5", "[1.0e-2, 3.16e-2]\n    unload": "[1.0e-2]\n    unload"}
 # How many random cases a test tries: as many as one waits for, unless --hypothesis-profile asks for thorough ones. They
 # are the same ones each time, so that no change fails by chance.
@@ -73,7 +73,7 @@ def smoke_at_finite_ranges():
     text = (REPOSITORY / SMOKE).read_text(encoding="utf-8")
     assert text.count("figures:\n") == 1
     asked = (REPOSITORY / "tests/finite_ranges.yaml").read_text(encoding="utf-8")
-    return text.replace("figures:\n", f"{asked}figures:\n  fig12_error_sources:\n    entry: adhesionless\n")
+    return text.replace("figures:\n", f"{asked}figures:\n")
 
 
 def smaller_smoke():

@@ -168,8 +168,6 @@ _RULES = {
     "runs/": "run",
     "references/boundary_elements/": "boundary_elements",
     "references/loops/": "boundary_element_loop",
-    "references/error_sources/": "error_sources",
-    "references/one_asperity/": "one_asperity",
     "references/": "reference",
     "dataset/": "campaign_dataset",
     MODEL_ERROR: "model_error",

@@ -21,8 +21,6 @@ from icha.configuration.boundary_elements import (
     BesideStudy,
     BoundaryElementLoops,
     BoundaryElements,
-    ErrorSources,
-    OneAsperity,
 )
 from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
@@ -39,7 +37,9 @@ from icha.support.values import (
 )
 
 # Sections of entries that belong to a study.
-BESIDE_STUDIES = ("finite_range", "boundary_element_loops", "error_sources")
+BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
+# Keys whose values are compared with slopes of runs, or with paths that have them.
+_OF_SLOPES = ("rms_slope", "known_failures")
 # Each of these looks at all runs of its study.
 _FEW = Field(max_length=100)
 # Cells per shortest wavelength: with fewer, boundary elements are refused and asperities warned of; those to recommend.
@@ -60,7 +60,6 @@ class Topography(NamedTuple):
 
     grid: int
     period: float  # m
-    boundary: str
     rms_slope: float | None  # None where no study asks for it
     sha256: str
     full_contact_energy: float  # U_full/E* at rms slope 1, m; NaN where nothing may adhere
@@ -103,12 +102,6 @@ class Campaign(Section):
         default={},
         description="Boundary elements in loading and unloading by name, to compare with the runs of a "
         "study that unloads.",
-    )
-    error_sources: Annotated[dict[Name, ErrorSources], _FEW] = Field(
-        default={}, description="Studies of the sources of the model's error, by name."
-    )
-    one_asperity: OneAsperity | None = Field(
-        default=None, description="One asperity by the model and by boundary elements."
     )
     measurements: Annotated[dict[Name, Measurement], _FEW] = Field(
         default={}, description="Measurements by name, drawn over figure 5. None come with ICHA."
@@ -176,20 +169,17 @@ class Campaign(Section):
         """The entry of a section (surfaces, materials) of which `name` is a variant, or itself."""
         return self._origins.get((section, name), name)
 
-    def boundary(self, surface: str) -> str:
-        """What lies beyond the edges of a surface: `periodic` or `free`."""
-        topography = self.topography(surface)
-        return topography.boundary if topography else "periodic"
+    def is_free(self, surface: str) -> bool:
+        """Whether a surface is a square with free edges; all others are periodic."""
+        return getattr(self.surfaces[surface], "boundary", None) == "free"
 
-    def grid(self, surface: str) -> int:
-        """Nodes along a side of a surface."""
-        topography = self.topography(surface)
-        return topography.grid if topography else self.surfaces[surface].grid
+    def grid(self, surface: str) -> int | None:
+        """Nodes along a side of a surface; None of one from a file that was not inspected."""
+        return getattr(self.topography(surface) or self.surfaces[surface], "grid", None)
 
     def period(self, surface: str) -> float:
-        """Side of a surface, m."""
-        topography = self.topography(surface)
-        return topography.period if topography else self.surfaces[surface].period
+        """Side of a surface whose grid is known, m."""
+        return (self.topography(surface) or self.surfaces[surface]).period
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
         """Kind and value of all states that the runs of a study keep; None where they keep their last one.
@@ -221,7 +211,16 @@ class Campaign(Section):
         ]
 
     def problems(self) -> Iterator[Problem]:
-        """What keeps it from being run although each of its values is allowed by itself."""
+        """What keeps it from being run although each of its values is allowed by itself.
+
+        What depends on measured slopes and on grids of files is left out until these are known.
+        """
+        unknown_slopes = any(MEASURED in study.rms_slopes for study in self.studies.values())
+        for place, value, reason in self._problems():
+            if not (unknown_slopes and any(str(part).startswith(_OF_SLOPES) for part in place)):
+                yield place, value, reason
+
+    def _problems(self):
         for label, study in self.studies.items():
             yield from _within(("studies", label), study.problems(self.snapshots_of(label)))
             yield from _within(("studies", label), self._model_problems(study))
@@ -236,13 +235,18 @@ class Campaign(Section):
         for label, figure in self.figures.drawn().items():
             yield from _within(("figures", label), figure.problems(self))
 
+    def measurement_problems(self) -> Iterator[Problem]:
+        """Tables of measurements that cannot be read."""
+        for label, entry in self.measurements.items():
+            yield from _within(("measurements", label), entry.table_problems())
+
     def _model_problems(self, study: Study) -> Iterator[Problem]:
         """Surfaces of a study that its models cannot press."""
         if BOUNDARY_ELEMENTS not in study.models:
             return
         at = ("models", study.models.index(BOUNDARY_ELEMENTS))
         for name in study.surfaces:
-            if self.boundary(name) != "periodic":
+            if self.is_free(name):
                 reason = f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or "
                 yield at, BOUNDARY_ELEMENTS, reason + "another `boundary`, which makes a surface periodic"
             cells = self._cells_per_short_wave(name)

@@ -10,7 +10,7 @@ from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import MeasuredSurface
 from icha.contact.models import ASPERITIES
-from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels, number_label
+from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
@@ -36,25 +36,13 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
     ]
 
 
-def source_cases(campaign: Campaign) -> list[ContactLabels]:
-    """All studies of the sources of the model's error, entry by entry."""
-    return _cases(campaign, campaign.error_sources)
-
-
 def loop_cases(campaign: Campaign) -> list[ContactLabels]:
     """All boundary elements both ways of a campaign, entry by entry."""
-    return _cases(campaign, campaign.boundary_element_loops)
-
-
-def _cases(campaign: Campaign, entries: dict[str, BesideStudy]) -> list[ContactLabels]:
-    return [ContactLabels(label, *contact) for label, entry in entries.items() for contact in campaign.solved(entry)]
-
-
-def asperity_cases(campaign: Campaign) -> dict[str, float | None]:
-    """Names of the comparisons of one asperity, and their Tabor parameters; None is Hertz's contact."""
-    if campaign.one_asperity is None:
-        return {}
-    return {"hertz": None} | {f"mu{number_label(mu)}": mu for mu in campaign.one_asperity.tabor_parameters}
+    return [
+        ContactLabels(label, *contact)
+        for label, entry in campaign.boundary_element_loops.items()
+        for contact in campaign.solved(entry)
+    ]
 
 
 def surface_settings(campaign: Campaign, name: str) -> dict:
@@ -74,7 +62,7 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
     """
     return {
         "material": campaign.materials[case.material].model_dump(),
-        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study), case.model),
+        "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
         "rms_slope": case.rms_slope,
         "seed": case.seed,
     } | ({} if case.model == ASPERITIES else {"model": case.model})
@@ -84,12 +72,6 @@ def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
     """Everything but the topography that determines a boundary-element solution, in SI units."""
     entry = campaign.finite_range[case.entry]
     return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
-
-
-def source_settings(campaign: Campaign, case: ContactLabels) -> dict:
-    """Everything but the topography that determines a study of the sources of the error, in SI units."""
-    entry = campaign.error_sources[case.entry]
-    return _solver_settings(campaign, entry, case) | {"reduced_pressures": entry.reduced_pressures}
 
 
 def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:

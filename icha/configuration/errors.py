@@ -18,6 +18,11 @@ MOST_TOLD = 50
 _FORMER_KEYS = {
     ("Campaign", "boundary_elements"): "is now `finite_range`; allowed: the same section by that name (`models: "
     "[boundary_elements]` of a study keeps its name)",
+    ("Study", "united_until"): "is no longer a choice: united spots split where their two parts would not overlap "
+    "(keeping them until detachment was farther from boundary elements in 8 of 9 losses); allowed: leave the key out",
+    ("Campaign", "error_sources"): "is no longer a section; allowed: `make error-sources` in a clone",
+    ("Campaign", "one_asperity"): "is no longer a section; allowed: `python -m validation.one_asperity` in a clone",
+    ("Figures", "fig12_error_sources"): "is no longer a figure of campaigns; allowed: `make error-sources` in a clone",
 }
 
 

@@ -108,10 +108,13 @@ class Measurement(Section):
         return self
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Names that lead nowhere in its `icha.configuration.campaign.Campaign`, and a table that cannot be read."""
+        """Names that lead nowhere in its `icha.configuration.campaign.Campaign`."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.material is not None:
             yield from unknown(("material",), self.material, campaign.materials)
+
+    def table_problems(self) -> Iterator[Problem]:
+        """A table that cannot be read."""
         try:
             read_columns(self.path, self.columns)
         except ValueError as error:

@@ -241,13 +241,6 @@ class Study(Section):
         description="What is imposed: the mean separation or the load. Under load control the state jumps where the "
         "curve turns back, and all targets and turning points must be loads.",
     )
-    united_until: Literal["overlap", "detachment"] = Field(
-        default="overlap",
-        description="How long coalesced spots stay united on the way back: until the two spots that they were made of "
-        "would no longer overlap (`overlap`), or until they detach as a whole and fall back into their "
-        "asperities (`detachment`). Only for the model `asperities`; patches of boundary elements split by "
-        "themselves.",
-    )
     max_step: number(STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
     )
@@ -265,18 +258,15 @@ class Study(Section):
         """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
         Path(**self.path_settings(snapshots))
 
-    def path_settings(self, snapshots: list[tuple[str, float]] | None, model: str = ASPERITIES) -> dict:
-        """Arguments of the path of a model's runs (`icha.Path`).
-
-        Those that are left at their defaults are left out, and those that mean nothing to the model.
-        """
+    def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
+        """Arguments of the path of the runs (`icha.Path`) but for those that are left at their defaults."""
         settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
         if self.unload or self.turning_points:
             settings |= {
                 "unload": self.unload,
                 "turning_points": [point.target for point in self.turning_points],
                 "control": self.control,
-            } | ({"united_until": self.united_until} if model == ASPERITIES else {})
+            }
         elif self.control != "separation":
             settings["control"] = self.control
         return settings
@@ -288,9 +278,10 @@ class Study(Section):
 
     def _load_problems(self):
         """Loads that a slope, the smallest for one, makes too large for the model."""
-        if not self.rms_slopes:
+        slopes = [slope for slope in self.rms_slopes if slope != MEASURED]
+        if not slopes:
             return
-        slope = min(self.rms_slopes)
+        slope = min(slopes)
         kept = [] if self.snapshots == EVERY_STOP else self.snapshots
         for key, states in (("snapshots", kept), ("turning_points", self.turning_points)):
             for index, state in enumerate(states or []):

@@ -28,8 +28,6 @@ _OTHERS = {
     "theories and published points": "bush_gibson_thomas_area_fraction",
     SOLUTION: "target_reduced_pressure",
     "boundary elements both ways at a finite range": "dissipated",
-    "sources of the model's error": "variant",
-    "comparison of one asperity": "force_icha",
 }
 
 # A number of the identities of the format may be off by rounding.

@@ -10,16 +10,16 @@ from typing import NamedTuple
 import netCDF4
 import numpy as np
 
-from icha.datasets.results import ERROR_SOURCES, LOOP, ONE_ASPERITY, RUN, SOLUTION, SURFACE, THEORIES
+from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 
 # What stands for what differs among files of the same kind, and how these are called, by the beginning of their path;
 # any other file is a kind of its own.
 _DIFFERENT = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
-_DIFFERENT |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "asperity": "<name>", "model_folder": ""}
+_DIFFERENT |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "model_folder": ""}
 # By the beginning of a path and its number of parts.
 _KINDS = {
     (pattern.partition("/{")[0], len(PurePosixPath(kind).parts)): kind
-    for pattern in (SURFACE, RUN, SOLUTION, LOOP, ERROR_SOURCES, ONE_ASPERITY, THEORIES)
+    for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
     for kind in {pattern.format(**_DIFFERENT | {"model_folder": folder}) for folder in ("", "<model>/")}
 }
 # Numbers that are read at once.

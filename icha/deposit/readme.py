@@ -181,7 +181,7 @@ def _asked(campaign: Campaign) -> dict:
         "adhesive": any(material.surface_energy > 0 for material in campaign.materials.values()),
         "both_ways": any(study.unload or study.turning_points for study in campaign.studies.values()),
         "installed": (*further_software(campaign), "environment")[0],
-        "free": any(campaign.boundary(name) == "free" for name in campaign.surfaces),
+        "free": any(campaign.is_free(name) for name in campaign.surfaces),
     }
 
 

@@ -18,7 +18,7 @@ from icha.support.in_words import counted
 
 TAMAAS = "tamaas"
 # Sections of a campaign that ask for boundary elements at finite ranges.
-BY_TAMAAS = ("finite_range", "boundary_element_loops", "error_sources", "one_asperity")
+BY_TAMAAS = ("finite_range", "boundary_element_loops")
 
 
 def further_software(campaign: Campaign) -> tuple[str, ...]:

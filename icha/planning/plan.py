@@ -131,16 +131,6 @@ def _computed(campaign, results, files) -> Iterator[Item]:
         costs.loop_cost,
         lambda entry, case: entry.separation_step,
     )
-    yield from beside(
-        "error sources",
-        campaign.error_sources,
-        files.error_sources,
-        costs.solution_cost,
-        lambda entry, case: entry.reduced_pressures[-1],
-    )
-    for path, tabor_parameter in files.one_asperity.items():
-        nodes = round(800 * ((tabor_parameter or 1.5) / 4) ** 2)
-        yield there("one asperity", path, costs.solution_cost(nodes, 0.01, adhesive=True))
 
 
 def _gathered(

@@ -84,16 +84,6 @@ def test_other_models_have_a_folder_of_their_own(load):
     assert len({run_sha256(campaign, case) for case in run_cases(campaign)}) == 8
 
 
-def test_the_rule_of_unions_means_nothing_to_boundary_elements(load):
-    back = BOTH | {"studies.one.unload": True}
-    one, other = (load(back | {"studies.one.united_until": rule}).campaign for rule in ("overlap", "detachment"))
-    for case in run_cases(one):
-        same = run_sha256(one, case) == run_sha256(other, case)
-        assert same == (case.model == "boundary_elements")
-        assert ("united_until" in run_settings(one, case)["path"]) == (case.model == "asperities")
-    assert run_settings(one, run_cases(one)[-1])["model"] == "boundary_elements"
-
-
 def test_known_failures_may_be_of_either_model(load):
     failure = {"run": "one/rough/seed1/slope1/boundary_elements/soft", "reason": "why"}
     load(BOTH | {"publication": {"known_failures": [failure]}})

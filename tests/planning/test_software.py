@@ -49,8 +49,6 @@ def test_a_campaign_that_needs_it_is_refused_before_anything_is_computed(tmp_pat
     environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(REPOSITORY)])
     done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True)
     assert done.returncode != 0
-    assert (
-        ", boundary_element_loops, error_sources, one_asperity: solved by Tamaas, which is not installed" in done.stderr
-    )
+    assert "boundary_element_loops: solved by Tamaas, which is not installed" in done.stderr
     assert "`make tamaas` installs it" in done.stderr and "Nothing was computed." in done.stderr
     assert not list((tmp_path / "results").rglob("*.nc"))

@@ -24,8 +24,6 @@ ALL_RULES = {
     "reference",
     "boundary_elements",
     "boundary_element_loop",
-    "error_sources",
-    "one_asperity",
     "run",
     "campaign_dataset",
     "comparison",
@@ -35,7 +33,7 @@ ALL_RULES = {
     "figure",
     "report_page",
 }
-BESIDE_RUNS = {"reference", "boundary_elements", "boundary_element_loop", "error_sources", "one_asperity"}
+BESIDE_RUNS = {"reference", "boundary_elements", "boundary_element_loop"}
 WHAT_FOLLOWS_RUNS = ALL_RULES - {"configuration", "surface"} - BESIDE_RUNS
 
 
@@ -107,19 +105,19 @@ def test_a_fresh_clone_with_unpacked_results_runs_nothing(smoke, tmp_path):
     assert planned(clone) == ({}, [])
 
 
-SOLVERS = {"solve_boundary_elements", "follow_boundary_elements", "find_error_sources", "press_one_asperity"}
+SOLVERS = {"solve_boundary_elements", "follow_boundary_elements"}
 
 
 @pytest.mark.parametrize(
     ("module", "scripts"),
     {
         "boundary_elements/contact": {"run_sweep"},
-        "equilibrium/equilibrium": {"run_sweep", "find_error_sources", "press_one_asperity"},
-        "asperity/jkr": {"run_sweep", "make_references", "find_error_sources", "press_one_asperity"},
-        "half_space/interaction": {"run_sweep", "find_error_sources", "press_one_asperity"},
+        "equilibrium/equilibrium": {"run_sweep"},
+        "asperity/jkr": {"run_sweep", "make_references"},
+        "half_space/interaction": {"run_sweep"},
         "simulation": {"run_sweep"},
-        "path/loading": {"run_sweep", "find_error_sources"},
-        "path/energy_balance": {"run_sweep", "find_error_sources"},
+        "path/loading": {"run_sweep"},
+        "path/energy_balance": {"run_sweep"},
         # Boundary elements know nothing of the model: they are not solved again.
         "references/finite_range": SOLVERS,
         "references/persson": {"make_references"},
@@ -169,7 +167,7 @@ def test_the_spectrum_runs_surfaces_and_all_that_needs_them(project):
     add_statement(project / "icha/surfaces/spectrum.py")
     jobs, _ = planned(project)
     assert jobs["surface"] == 3
-    assert set(jobs) == ALL_RULES - {"configuration", "one_asperity"}
+    assert set(jobs) == ALL_RULES - {"configuration"}
 
 
 @pytest.mark.slow
@@ -216,7 +214,7 @@ def test_boundary_elements_run_without_the_sweeps(project):
     jobs, _ = planned(project)
     assert jobs["boundary_elements"] == 6
     what_follows = {"model_error", "checks", "verdict", "figure", "report_page"}
-    assert set(jobs) == {"boundary_elements", "boundary_element_loop", "error_sources", "one_asperity"} | what_follows
+    assert set(jobs) == {"boundary_elements", "boundary_element_loop"} | what_follows
 
 
 @pytest.mark.slow
@@ -278,7 +276,7 @@ def test_a_value_runs_the_sweeps_that_it_concerns(project):
     jobs, _ = planned(project)
     assert jobs["run"] == 3 + 1
     # A curve of Fuller & Tabor is that of the material.
-    assert jobs["reference"] == 1 and not {"surface", "boundary_elements", "error_sources"} & set(jobs)
+    assert jobs["reference"] == 1 and not {"surface", "boundary_elements"} & set(jobs)
 
 
 @pytest.mark.slow

@@ -123,12 +123,6 @@ RUN = {
         (), "1", "number of maxima of the interpolated surface that are no asperities, as no nodes support them", int
     ),
     "control": Variable((), "1", "what is imposed: separation or load", str),
-    "united_until": Variable(
-        (),
-        "1",
-        "how long united spots stay united on the way back: detachment or overlap; empty for boundary elements",
-        str,
-    ),
 }
 
 # Besides, those of boundary elements ...
