@@ -100,13 +100,7 @@ class Curves(NamedTuple):
 
 
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None) -> Curves:
-    """All runs of a study, and beside asperities its runs by boundary elements, or those of the study of that name.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or no run in it.
-    """
+    """All runs of a study, and beside asperities its runs by boundary elements, or those of the study of that name."""
     members = _by_contact(study_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
     looks = Looks(campaign, dataset, _in_order_of_materials(dataset, [contact for *contact, _ in members]))

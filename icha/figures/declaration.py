@@ -3,6 +3,10 @@
 A module `fig<number>_<words>` of this folder is a figure: it has a `DECLARATION` and a function `figure` that draws it.
 Nothing else knows its name, for `icha.figures.registry` finds it. Reading a configuration imports all of them, so that
 they import libraries for drawing, and modules that need xarray, only where they draw.
+
+The function `figure` takes the data of its `inputs`, and as keywords the `arguments` of its options, which describe
+them. It raises ValueError where the campaign has no such study, run or snapshot, naming what there is, and
+`icha.figures.select.NothingToDraw` where no run of what it shows is complete.
 """
 
 from __future__ import annotations

@@ -136,16 +136,7 @@ def figure(
     campaign : the campaign dataset.
     loops : boundary elements both ways of runs of the study at finite ranges, if there are any; those of other surfaces
         or seeds than the one drawn are left out.
-    study : name of the study; its runs are unloaded, at least in part.
-    boundary_elements : name of a study whose runs by boundary elements are drawn beside; left out, the study itself.
-    surface : which surface; the study's first, if left out.
-    seed : which seed; if left out the first that has boundary elements, or else the mean over all.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study, surface or seed, no run was unloaded, or boundary elements belong to no run of the
-        study.
+    seed : left out, the first that has boundary elements, or else the mean over all.
     """
     drawn, surface, seed = _loops(campaign, study, boundary_elements or study, loops or (), surface, seed)
     slopes = sorted({loop.labels.rms_slope for loop in drawn}, reverse=True)

@@ -64,20 +64,7 @@ _LINE = {"lw": 0.9}
 def figure(
     campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (), quantity: str = "pull_off_pressure"
 ) -> Figure:
-    """Draw the pull-off of all runs of the studies, averaged over the seeds.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    study : name of the study of panel (a).
-    load_studies : names of the studies of panel (b), which differ in their largest load; without any there is no (b).
-    quantity : "pull_off_pressure", "pull_off_over_strength" or "pull_off_over_summits".
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or quantity, or no run of a study was unloaded to complete separation.
-    """
+    """Draw the pull-off of all runs of the studies, averaged over the seeds, against slope and largest load."""
     pick("quantity", quantity, list(_QUANTITIES))
     load_studies = several("load_studies", load_studies) if load_studies else []
     by_slope = detached_lines(campaign, [study], along_slopes=True)

@@ -75,20 +75,7 @@ class LinearFit(NamedTuple):
 
 @styled
 def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy: bool = True) -> Figure:
-    """Draw the loss of all runs of the studies, averaged over the seeds.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    studies : names of the studies; those that differ in their largest load only make up the lines.
-    over_surface_energy : whether the loss is drawn over the surface energy (without runs that have none) or in J/m².
-
-    Raises
-    ------
-    ValueError
-        If there is no such study, no run of a study was unloaded to complete separation, or none has adhesion where
-        the loss is over the surface energy.
-    """
+    """Draw the loss of all runs of the studies, averaged over the seeds, and its parts where there is adhesion."""
     from matplotlib.patches import Patch
 
     studies = several("studies", studies)

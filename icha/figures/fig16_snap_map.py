@@ -92,21 +92,7 @@ def figure(
     rms_slope: float | None = None,
     material: str | None = None,
 ) -> Figure:
-    """Draw the events of one run.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    surface : the surface file's dataset; it must be the topography of the run that is drawn.
-    study : name of the study; its runs are unloaded, at least in part.
-    surface_name, seed, rms_slope, material : which run; what is left out is the study's first. For the material that
-        is the first one with adhesion, if there is any.
-
-    Raises
-    ------
-    ValueError
-        If there is no such run, it was not unloaded, or the surface is another one's.
-    """
+    """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
     asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
     labels, run = run_on_topography(campaign, study, surface, **asked)
     if not ways_back(run):

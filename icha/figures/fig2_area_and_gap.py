@@ -62,14 +62,7 @@ def figure(
     ----------
     campaign : the campaign dataset.
     references : theories and points for the study's first surface (`icha.references.theories`), if any.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements at a finite range, if
-        any.
-    study : name of the study.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or no run in it.
+    model_error : boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any.
     """
     curves = study_curves(campaign, study)
     dataset, entries = campaign[study].to_dataset(), finite_range_errors(model_error, study)

@@ -54,15 +54,8 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements at a finite range of
-        the states that those in the limit of a short range lack, if any.
-    study : name of the study.
-    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or snapshot.
+    model_error : boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any, of the states
+        that those in the limit of a short range lack.
     """
     from icha.analysis.model_error import state_of
 

@@ -105,15 +105,6 @@ def figure(
     surface : the surface file's dataset; it must be the topography of the run that is drawn.
     solution : boundary elements at a finite range (`icha.references.finite_range`) of the state that is drawn, if any.
     truth : the same run by boundary elements in the limit of a short range, with its maps, if there is one.
-    study : name of the study.
-    surface_name, seed, rms_slope, material : which run; what is left out is the study's first. For the material that
-        is the first one with adhesion, if there is any.
-    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such run or snapshot, or the surface or the solution is another one's.
     """
     from icha.datasets.campaign import find_snapshot
 

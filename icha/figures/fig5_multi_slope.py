@@ -72,15 +72,8 @@ def figure(
     ----------
     campaign : the campaign dataset.
     tables : files of measured curves to lay over; in panel (b) only those whose slope is known.
-    study : name of the study.
-    boundary_elements : name of a study whose runs by boundary elements are drawn beside; left out, the study itself.
     measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (what a
         load is divided by to become p/(E* h'rms)), and `material` and `rms_slope`, None where they are not known.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or no run in it, or a table cannot be read.
     """
     curves = study_curves(campaign, study, boundary_elements)
     dataset, colours = campaign[study].to_dataset(), curves.looks.colours

@@ -56,19 +56,7 @@ def figure(
     seed: int | None = None,
     material: str | None = None,
 ) -> Figure:
-    """Draw the spots of all slopes for one surface, seed and material.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    study : name of the study; its snapshots must include one of kind `relative_load` and one of `area_fraction`.
-    surface, seed, material : what is shown; the study's first, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study, run or snapshot.
-    """
+    """Draw the spots of all slopes for one surface, seed and material; those left out are the study's first."""
     from matplotlib.patches import Patch
 
     runs = study_runs(campaign, study)

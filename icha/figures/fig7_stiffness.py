@@ -30,19 +30,7 @@ DECLARATION = Declaration(
 
 @styled
 def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study: str) -> Figure:
-    """Draw all runs of a study.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    references : theory for the study's first surface (`icha.references.theories`), if any.
-    study : name of the study.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or no run in it, or nothing in it has a positive load and stiffness (`NothingToDraw`).
-    """
+    """Draw all runs of a study, and theory for its first surface (`icha.references.theories`), if any."""
     curves = study_curves(campaign, study)
     fig, [(left, right)] = new_panels(3.3)
     (pressures, stiffnesses), _ = draw_curves(curves, {left: stiffness_points, right: _over_pressure})

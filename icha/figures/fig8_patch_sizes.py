@@ -33,19 +33,7 @@ _CURVE_POINTS = 300
 
 @styled
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    study : name of the study.
-    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or snapshot.
-    """
+    """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds."""
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)

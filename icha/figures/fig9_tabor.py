@@ -46,19 +46,7 @@ _LEAST_REACH = 0.05
 
 @styled
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw all runs of a study at one snapshot.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    study : name of the study; its materials should differ in their range of attraction.
-    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or snapshot, or no run with adhesion.
-    """
+    """Draw all runs of a study at one snapshot."""
     curves, bare, shown = _points(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     contacts = [contact for contact, _ in curves]

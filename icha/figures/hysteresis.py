@@ -32,8 +32,6 @@ def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     ------
     NothingToDraw
         If no run is complete, or none was unloaded.
-    ValueError
-        If there is no such study.
     """
     runs = [(labels, run) for labels, run in study_runs(campaign, study, ragged=False) if ways_back(run)]
     if not runs:
@@ -55,8 +53,6 @@ def detached_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     ------
     NothingToDraw
         If there is no such run in the study.
-    ValueError
-        If there is no such study.
     """
     runs = [(labels, run) for labels, run in unloaded_runs(campaign, study) if "hysteresis_loss" in run]
     if not runs:
