@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.looks import (
     ASPERITIES_NAME,
+    BESIDE_LINE,
     FEW_LINES,
     MODEL_MARKERS,
     Looks,
@@ -174,12 +175,23 @@ def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]
     ], looks
 
 
-def say_which_snapshots(panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[Snapshots]) -> None:
-    """Titles of the two panels of a figure of one snapshot."""
-    shown = lines[0].labels
+def add_snapshot_legend(
+    figure: Figure,
+    panels: Sequence[Axes],
+    dataset: xr.Dataset,
+    lines: Sequence[Snapshots],
+    looks: Looks,
+    beside: Iterable[str],
+) -> None:
+    """Add titles and legend of a figure of one snapshot of a study; `beside` names the boundary elements in it."""
+    shown, own = lines[0].labels, model_name(dataset)
     titles = (snapshot_label(*lines[-1].members[0]), name_of_place(dataset, shown.surface, shown.rms_slope))
     for axes, title in zip(panels, titles, strict=True):
         axes.set_title(title, loc="right")
+    handles = looks.handles(ls="-", marker=MODEL_MARKERS[own]) | {own: model_handle(own, ls="-", lw=0.8, mfc="white")}
+    handles |= {name: model_handle(name, **BESIDE_LINE) for name in beside}
+    handles |= lines_handles(len(line.members) for line in lines) | named_handles(panels[1:])
+    legend_below(figure, handles, scale=looks.scale, panels=panels)
 
 
 def whose_theories(dataset: xr.Dataset) -> dict[str, Line2D]:

@@ -10,10 +10,10 @@ import numpy as np
 from icha.datasets import results
 from icha.datasets.labels import place_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.curves import model_name, plausible, say_which_snapshots, snapshot_looks
+from icha.figures.curves import add_snapshot_legend, plausible, snapshot_looks
 from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigure, finite_range_error
-from icha.figures.ensembles import draw_members, lines_handles
-from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS, legend_below, model_handle, named_handles
+from icha.figures.ensembles import draw_members
+from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
 from icha.figures.select import finite_range_errors, first_line, same_snapshots_by_boundary_elements
 from icha.figures.style import BLACK, logarithmic_axes, new_panels, styled
 
@@ -63,7 +63,7 @@ def figure(
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
-    lowest, highest, top, named, floor = -0.3, 0.3, 0.0, {}, []
+    lowest, highest, top, beside, floor = -0.3, 0.3, 0.0, [], []
     truths = same_snapshots_by_boundary_elements(campaign, lines)
     for line, truth, look in zip(lines, truths, each_look, strict=True):
         u, densities = gap_densities(line.members)
@@ -82,16 +82,12 @@ def figure(
         if distributions:
             _draw_beside(left, right, distributions, look["color"])
             top = max(top, distributions.pressures[1].max(initial=0.0))
-            named[distributions.name] = model_handle(distributions.name, **BESIDE_LINE)
+            beside.append(distributions.name)
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
-    say_which_snapshots([left, right], dataset, lines)
     _finish(left, right, (lowest, highest), top, load)
-    own = model_name(dataset)
-    handles = looks.handles(ls="-", marker=MODEL_MARKERS[own]) | {own: model_handle(own, ls="-", lw=0.8, mfc="white")}
-    handles |= named | lines_handles(len(line.members) for line in lines) | named_handles([right])
-    legend_below(fig, handles, scale=looks.scale, panels=[left, right])
+    add_snapshot_legend(fig, [left, right], dataset, lines, looks, dict.fromkeys(beside))
     return fig
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.figures.curves import model_name, say_which_snapshots, snapshot_looks
+from icha.figures.curves import add_snapshot_legend, snapshot_looks
 from icha.figures.declaration import Declaration, SnapshotFigure
-from icha.figures.ensembles import draw_members, lines_handles
-from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS, legend_below, model_handle
+from icha.figures.ensembles import draw_members
+from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
 from icha.figures.select import first_line, same_snapshots_by_boundary_elements
 from icha.figures.style import logarithmic_axes, new_panels, styled, unit_for
 
@@ -56,18 +56,10 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     for ax in (left, right):
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
-    say_which_snapshots([left, right], dataset, lines)
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    own = model_name(dataset)
-    models = {own: {"ls": "-", "lw": 0.8, "mfc": "white"}}
-    if any(truth.members for truth in truths):
-        models[SHORT_RANGE] = BESIDE_LINE
-    seeds = lines_handles(len(line.members) for line in lines)
-    handles = looks.handles(ls="-", marker=MODEL_MARKERS[own]) | {
-        name: model_handle(name, **look) for name, look in models.items()
-    }
-    legend_below(fig, handles | seeds, scale=looks.scale, panels=[left, right])
+    beside = [SHORT_RANGE] if any(truth.members for truth in truths) else []
+    add_snapshot_legend(fig, [left, right], dataset, lines, looks, beside)
     return fig
 
 
