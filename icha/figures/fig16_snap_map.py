@@ -82,19 +82,9 @@ _LEAST_SIZE = 1.6
 
 
 @styled
-def figure(
-    campaign: xr.DataTree,
-    surface: xr.Dataset,
-    *,
-    study: str,
-    surface_name: str | None = None,
-    seed: int | None = None,
-    rms_slope: float | None = None,
-    material: str | None = None,
-) -> Figure:
+def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: object) -> Figure:
     """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
-    asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
-    labels, run = run_on_topography(campaign, study, surface, **asked)
+    labels, run = run_on_topography(campaign, study, surface, **which)
     if not ways_back(run):
         raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
     events = _events(run)

@@ -90,12 +90,9 @@ def figure(
     truth: xr.Dataset | None = None,
     *,
     study: str,
-    surface_name: str | None = None,
-    seed: int | None = None,
-    rms_slope: float | None = None,
-    material: str | None = None,
     kind: str | None = None,
     target: float | None = None,
+    **which: object,
 ) -> Figure:
     """Draw the spots of one snapshot of one run.
 
@@ -105,11 +102,11 @@ def figure(
     surface : the surface file's dataset; it must be the topography of the run that is drawn.
     solution : boundary elements at a finite range (`icha.references.finite_range`) of the state that is drawn, if any.
     truth : the same run by boundary elements in the limit of a short range, with its maps, if there is one.
+    which : which run of the study (`icha.figures.select.run_on_topography`).
     """
     from icha.datasets.campaign import find_snapshot
 
-    asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
-    labels, run = run_on_topography(campaign, study, surface, **asked)
+    labels, run = run_on_topography(campaign, study, surface, **which)
     at = find_snapshot(run, kind, target)
     solved = None
     if solution is not None:

@@ -140,7 +140,7 @@ def pick_run(
 
 
 def run_on_topography(
-    campaign: xr.DataTree, study: str, topography: xr.Dataset, **asked
+    campaign: xr.DataTree, study: str, topography: xr.Dataset, *, surface_name: str | None = None, **which: object
 ) -> tuple[RunLabels, xr.Dataset]:
     """The run that `pick_run` finds, if a surface file's dataset is its topography.
 
@@ -151,7 +151,7 @@ def run_on_topography(
     ValueError
         If there is no such study or run, or the surface is another one's.
     """
-    labels, run = pick_run(campaign, study, **asked)
+    labels, run = pick_run(campaign, study, surface=surface_name, **which)
     same = np.isclose(float(topography["period"]), float(run["period"]), rtol=1e-9)
     if not same or int(topography["grid"]) != int(run["grid"]):
         raise ValueError(f"{labels}: the surface given has another period or grid")
