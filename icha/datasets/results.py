@@ -23,7 +23,7 @@ EXPLORER = "explore.html"
 RUN_TIMES = "run_times.tsv"
 CONFIGURATION = "config.used.yaml"
 DEPOSIT = "publish/{campaign}-{version}"
-# As measured by benchmarks/storage.py (docs/reference/dataset.md): smaller arrays lose by being cut into chunks what
+# As measured (docs/reference/dataset.md, "How files are kept"): smaller arrays lose by being cut into chunks what
 # compression gains.
 LEAST_COMPRESSED = 1024
 # Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
