@@ -76,14 +76,6 @@ def test_the_exact_loops_close_and_lose_what_the_jumps_release(material):
     assert float(run["detachment_pressure"]) == pytest.approx(last, rel=1e-7, abs=1e-12)
 
 
-def test_loops_of_free_squares_are_along_the_separation_that_does_the_work():
-    ((labels, run), *_) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
-    gap = (run["mean_separation"] + run["rms_height"]).assign_attrs(run["mean_gap"].attrs)
-    free = run.assign(boundary=run["boundary"].copy(data="free"), mean_gap=gap)
-    ((_, shown),) = unloaded_runs(campaign_tree([(labels, free)]), "one")
-    np.testing.assert_allclose(shown["reduced_separation"], run["reduced_separation"])
-
-
 # --- figure 13 --------------------------------------------------------------------------------------------------
 
 
@@ -123,11 +115,19 @@ def test_fig13_without_adhesion_has_one_way_and_no_pull_off():
 
 def test_rounding_is_no_tension():
     run = separate.run("hertz", 0.5)
-    tiny = {name: run[name].copy(data=run[name].values) for name in ("nominal_pressure", "reduced_pressure")}
+    tiny = {name: run[name].copy(deep=True) for name in ("nominal_pressure", "reduced_pressure")}
     for values in tiny.values():
         values.values[-2] = -1e-52
     figure = fig13_loops.figure(one("hertz", **tiny), study="one")
     assert not marks(figure.axes[0]) and not figure.axes[0].child_axes and "pull-off" not in legend(figure)
+
+
+def test_loops_of_free_squares_are_along_the_separation_that_does_the_work():
+    ((labels, run), *_) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
+    gap = (run["mean_separation"] + run["rms_height"]).assign_attrs(run["mean_gap"].attrs)
+    free = run.assign(boundary=run["boundary"].copy(data="free"), mean_gap=gap)
+    ((_, shown),) = unloaded_runs(campaign_tree([(labels, free)]), "one")
+    np.testing.assert_allclose(shown["reduced_separation"], run["reduced_separation"])
 
 
 def test_fig13_shows_one_surface_and_seed(tree):
@@ -478,16 +478,12 @@ def two_cycles():
     return campaign_tree([(labels, whole)]), deep, shallow
 
 
-def test_of_more_cycles_fig13_shows_all_and_the_last_pull_off():
+def test_of_more_cycles_figures_show_the_first_way_in_and_the_last_way_back(surface):
     tree, deep, shallow = two_cycles()
     axes = fig13_loops.figure(tree, study="one").axes[0]
     assert [len(lines) for lines in curves(axes)] == [2, 2]
     (pull_off,) = marks(axes)
     assert pull_off.get_ydata()[0] == shallow["reduced_pressure"].values.min() > deep["reduced_pressure"].values.min()
-
-
-def test_of_more_cycles_fig16_shows_the_first_way_in_and_the_last_way_back(surface):
-    tree, deep, shallow = two_cycles()
     formed, broke = (np.count_nonzero(run["event_kind"] == kind) for run, kind in ((deep, 0), (shallow, 1)))
     assert formed > broke > 0
     names = legend(fig16_snap_map.figure(tree, surface, study="one"))

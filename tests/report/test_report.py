@@ -177,10 +177,8 @@ def test_runs_that_come_back_have_tables_of_pull_off_and_loss(write):
     assert loss["soft"]["Jumping off, %"] == "100.0" and loss["hertz"]["Jumping off, %"] == "–"
     assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["over Δγ"] == "–"
     over = np.array([float(run["hysteresis_loss"]) / 0.05 for run in runs])
-    assert (
-        loss["soft"]["over Δγ"]
-        == scientific(over.mean()) + f"<br>({scientific(over.min())} … {scientific(over.max())})"
-    )
+    mean, low, high = (scientific(each) for each in (over.mean(), over.min(), over.max()))
+    assert loss["soft"]["over Δγ"] == f"{mean}<br>({low} … {high})".replace("-", "−")
     assert "Unions, %" not in loss["soft"], "what is nowhere lost has no column"
     formed, broken = loss["soft"]["Contacts formed, broken"].split("<br>")
     assert formed == broken == f"{np.mean([float(run['spot_count'].max()) for run in runs]):.4g}"
@@ -192,9 +190,8 @@ def test_statistics_are_of_the_first_loading(write):
     assert "1 of 1 failed" in text and "✗ failed" in text and "slopes/rough" in text
     run, spots = cyclic.run(seed=2, material="soft", between=4), int(small.run(seed=2)["spot_count"][-1])
     assert spots > 0
-    row = re.search(
-        r"<tr><th>loops: rough, seed 2, slope 1, soft</th>(.*?)</tr>", text[text.index('id="statistics"') :]
-    )
+    statistics = text[text.index('id="statistics"') :]
+    row = re.search(r"<tr><th>loops: rough, seed 2, slope 1, soft</th>(.*?)</tr>", statistics)
     cells = re.findall(r"<td[^>]*>(.*?)</td>", row.group(1))
     assert cells[:3] == [str(run.sizes["step"]), str(int(run["asperity_count"])), str(spots)]
 
