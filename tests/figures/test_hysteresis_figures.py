@@ -360,10 +360,9 @@ def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
     assert line.same_seeds
     assert line.x.tolist() == [1, 3] and line.y.tolist() == [4, 20]
     # Two seeds: 12.706 standard errors, half the difference of both; of the logarithm, for losses are positive.
-    np.testing.assert_allclose(
-        np.log(line.over.band(positive=True)[1][:, 1] / line.y), 12.7062047 * np.array([2 / 4, 10 / 20]), rtol=1e-7
-    )
-    assert np.all(line.over.band(positive=True)[0] > 0)
+    low, high = line.over.band(positive=True)
+    np.testing.assert_allclose(np.log(high[:, 1] / line.y), 12.7062047 * np.array([2 / 4, 10 / 20]), rtol=1e-7)
+    assert np.all(low > 0)
     assert line.over.count[:, 0].tolist() == [2, 2]
     apart = averages([{1: (2.0, 10.0)}, {2: (3.0, 8.0)}])
     assert not apart.same_seeds and apart.y.tolist() == [10, 8] and np.isnan(apart.over.band(positive=True)).all()
