@@ -11,9 +11,9 @@ from small_rough_solution import MATERIALS, PRESSURE
 
 from icha.asperity.cohesive_zone import longest_spacing, strength_number
 from icha.asperity.material import Material
-from icha.references.failures import NotSolved
 from icha.references.finite_range import (
     LOAD_TOLERANCE,
+    NotSolved,
     contact_state,
     finite_range_solution,
     perimeter_correction,

@@ -5,8 +5,7 @@ import pytest
 
 import icha
 from icha.asperity.material import Material
-from icha.references.failures import NotSolved
-from icha.references.finite_range import GapContact
+from icha.references.finite_range import GapContact, NotSolved
 from icha.references.finite_range_loops import finite_range_loop
 from validation.surfaces import paraboloid
 
