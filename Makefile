@@ -23,8 +23,8 @@ help:
 	@echo "make validation  run campaign validation (two hours) and write the tables and figures of docs/validation.md"
 	@echo "make hysteresis  run campaign hysteresis (forty minutes) and write the tables and figures of docs/hysteresis.md"
 	@echo "make tamaas  install Tamaas as well, for boundary elements at finite ranges (campaign validation, tests)"
-	@echo "make test    run the tests that one waits for (four minutes): physics, every rule, wrong input"
-	@echo "make test-all  run them and all others: thousands of random cases, kills, resumption, Slurm, browser, deposits"
+	@echo "make test    run the quick tests (three minutes): physics, every rule, wrong input"
+	@echo "make test-all  run them with more random cases, and all others: kills, resumption, Slurm, browser, deposits"
 	@echo "make random-cases  two thousand random runs, of which make test-all has a hundred (another one: SERIES=7)"
 	@echo "make audit   ask whether vulnerabilities of the locked packages are known (part of test-all; needs network)"
 	@echo "make wheel   build the sdist, and from it the wheel, in dist/"
@@ -89,11 +89,13 @@ short-range error-sources: tamaas
 	python -m validation.$(subst -,_,$@) $(OPTIONS)
 
 test: tamaas
-	pytest -n $(CORES) --dist worksteal -m "not slow"
+	pytest -n $(CORES) --dist worksteal -m "not slow" $(THOROUGH)
 
-# Tests of random cases are run again, with more of them. One process more than there are cores, for many tests wait.
+# The quick tests with more random cases, and with what they cover of the physics (pyproject.toml, tool.coverage); then
+# the slow ones, in one process more than there are cores, since many of them wait.
+test-all: THOROUGH = --hypothesis-profile thorough --cov --cov-report=term
 test-all: test audit
-	pytest -n $$(($(CORES) + 1)) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough --series $(SERIES)
+	pytest -n $$(($(CORES) + 1)) --dist loadfile -m slow --series $(SERIES)
 
 random-cases: SERIES = 1-20
 random-cases: environment
