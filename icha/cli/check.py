@@ -7,7 +7,7 @@ import typer
 
 from icha.cli.project import FAILED, WRONG
 from icha.cli.terminal import say
-from icha.deposit.deposit_files import CHECKSUMS
+from icha.deposit.verify import CHECKSUMS
 from icha.support.in_words import counted
 from icha.support.printable import printable
 

@@ -7,8 +7,6 @@ import datetime
 import re
 import unicodedata
 from collections.abc import Callable, Iterator
-from functools import lru_cache
-from itertools import combinations
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
@@ -17,55 +15,17 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, mod
 from icha.datasets.labels import RunLabels
 from icha.support.values import Problem, Section, Text, distinct
 
-# How a deposit may stand to something else: the relation types of DataCite 4.5 that Zenodo knows, too.
-RELATIONS = (
-    "IsCitedBy",
-    "Cites",
-    "IsSupplementTo",
-    "IsSupplementedBy",
-    "IsContinuedBy",
-    "Continues",
-    "IsDescribedBy",
-    "Describes",
-    "HasMetadata",
-    "IsMetadataFor",
-    "IsNewVersionOf",
-    "IsPreviousVersionOf",
-    "IsPartOf",
-    "HasPart",
-    "IsReferencedBy",
-    "References",
-    "IsDocumentedBy",
-    "Documents",
-    "IsCompiledBy",
-    "Compiles",
-    "IsVariantFormOf",
-    "IsOriginalFormOf",
-    "IsIdenticalTo",
-    "IsReviewedBy",
-    "Reviews",
-    "IsDerivedFrom",
-    "IsSourceOf",
-    "IsRequiredBy",
-    "Requires",
-    "Obsoletes",
-    "IsObsoletedBy",
+# Relations of a deposit to other works: the types of DataCite 4.5 that Zenodo knows, too.
+RELATIONS = tuple(
+    "IsCitedBy Cites IsSupplementTo IsSupplementedBy IsContinuedBy Continues IsDescribedBy Describes HasMetadata "
+    "IsMetadataFor IsNewVersionOf IsPreviousVersionOf IsPartOf HasPart IsReferencedBy References IsDocumentedBy "
+    "Documents IsCompiledBy Compiles IsVariantFormOf IsOriginalFormOf IsIdenticalTo IsReviewedBy Reviews IsDerivedFrom "
+    "IsSourceOf IsRequiredBy Requires Obsoletes IsObsoletedBy".split()
 )
-# Kinds of what is related, by DataCite's names.
-RESOURCES = (
-    "Book",
-    "BookChapter",
-    "ConferencePaper",
-    "Dataset",
-    "Dissertation",
-    "Image",
-    "JournalArticle",
-    "Other",
-    "Preprint",
-    "Report",
-    "Software",
-    "Text",
-    "Workflow",
+# Kinds of related works, by DataCite's names.
+RESOURCES = tuple(
+    "Book BookChapter ConferencePaper Dataset Dissertation Image JournalArticle Other Preprint Report Software Text "
+    "Workflow".split()
 )
 _DOI = re.compile(r"10\.[0-9]{4,9}/.+", re.DOTALL)
 _ARXIV = re.compile(r"arXiv:([0-9]{4}\.[0-9]{4,5}|[a-z-]+(\.[A-Z]{2})?/[0-9]{7})(v[0-9]+)?")
@@ -75,8 +35,6 @@ _ROR_SITE = re.compile(r"https?://ror\.org/", re.IGNORECASE)
 # The digits of Crockford's base 32.
 _BASE_32 = "0123456789abcdefghjkmnpqrstvwxyz"
 _ROR = re.compile(rf"0([{_BASE_32}]{{6}})([0-9]{{2}})")
-# Entries of a list of which each is compared with all others.
-_MOST_ENTRIES = 1000
 _FIRST_DAY, _LAST_DAY = "1900-01-01", "2199-12-31"
 
 
@@ -102,24 +60,19 @@ def _prose(value: Any) -> Any:
     return _readable(value, "\n", "text, with or without line breaks")
 
 
-def _once(what: str, same: Callable[[Any, Any], bool], shown: Callable[[Any], str]) -> AfterValidator:
-    """Refuse a list with two entries that mean the same."""
+def _once(what: str, key: Callable[[Any], tuple], shown: Callable[[Any], str]) -> AfterValidator:
+    """Refuse a list with two entries that have the same key, whatever their capitals and spaces."""
 
     def check(entries):
-        if len(entries) > _MOST_ENTRIES:
-            raise ValueError(f"has {len(entries)} entries; allowed: {_MOST_ENTRIES} at most")
-        for entry, other in combinations(entries, 2):
-            if same(entry, other):
-                raise ValueError(f"{shown(other)!r} is given twice; allowed: every {what} once")
+        seen = set()
+        for entry in entries:
+            same = tuple(" ".join(str(part or "").split()).casefold() for part in key(entry))
+            if same in seen:
+                raise ValueError(f"{shown(entry)!r} is given twice; allowed: every {what} once")
+            seen.add(same)
         return entries
 
     return AfterValidator(check)
-
-
-@lru_cache(maxsize=2 * _MOST_ENTRIES)
-def _alike(*names: str | None) -> tuple[str, ...]:
-    """Names as they are compared: capitals, spaces and the encoding of accents make no other name."""
-    return tuple(" ".join(unicodedata.normalize("NFC", name or "").split()).casefold() for name in names)
 
 
 def _orcid(value: str) -> str:
@@ -210,13 +163,9 @@ def _community(value: Any) -> str:
     return value
 
 
-def _day_as_text(value: Any) -> Any:
-    """The text of a day, or of a time, that YAML has made one."""
-    return value.isoformat() if isinstance(value, datetime.date) else value
-
-
 def _date(value: Any) -> str:
-    """Refuse what is not a day of the calendar, or one of another age."""
+    """Refuse what is not a day of the calendar, or one of another age; YAML makes a date of its text."""
+    value = value.isoformat() if isinstance(value, datetime.date) else value
     try:
         if not isinstance(value, str) or not re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", value):
             raise ValueError
@@ -238,29 +187,28 @@ def _version(value: Any) -> str:
     return value
 
 
-def _text(pattern: str, example: str):
+def _schema(pattern: str, example: str):
     return WithJsonSchema({"type": "string", "pattern": pattern, "examples": [example]})
 
 
 Orcid = Annotated[
-    str, BeforeValidator(_orcid), _text(r"^(https://orcid\.org/)?\d{4}-\d{4}-\d{4}-\d{3}[\dX]$", "0000-0002-1825-0097")
+    str,
+    BeforeValidator(_orcid),
+    _schema(r"^(https://orcid\.org/)?\d{4}-\d{4}-\d{4}-\d{3}[\dX]$", "0000-0002-1825-0097"),
 ]
 Ror = Annotated[
-    str, BeforeValidator(_ror), _text(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$", "https://ror.org/03yrm5c26")
+    str, BeforeValidator(_ror), _schema(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$", "https://ror.org/03yrm5c26")
 ]
-Doi = Annotated[str, BeforeValidator(_doi), _text(r"10\.\d{4,9}/", "10.1007/s11249-017-0900-2")]
-Identifier = Annotated[str, BeforeValidator(_identifier), _text(r"^\S+$", "10.1007/s11249-017-0900-2")]
+Doi = Annotated[str, BeforeValidator(_doi), _schema(r"10\.\d{4,9}/", "10.1007/s11249-017-0900-2")]
+Identifier = Annotated[str, BeforeValidator(_identifier), _schema(r"^\S+$", "10.1007/s11249-017-0900-2")]
 FunderId = Annotated[
     str,
     BeforeValidator(_funder),
-    _text(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$|10\.\d{4,9}/", "https://ror.org/00k4n6c32"),
+    _schema(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$|10\.\d{4,9}/", "https://ror.org/00k4n6c32"),
 ]
-Community = Annotated[str, BeforeValidator(_community), _text(r"^[a-z0-9_-]+$", "contact-mechanics")]
-# Of validators before, the last one comes first.
-Date = Annotated[
-    str, BeforeValidator(_date), BeforeValidator(_day_as_text), _text(r"^\d{4}-\d{2}-\d{2}$", "2026-01-31")
-]
-Version = Annotated[str, BeforeValidator(_version), _text(r"^[0-9A-Za-z][0-9A-Za-z.+_-]*$", "1.0.0")]
+Community = Annotated[str, BeforeValidator(_community), _schema(r"^[a-z0-9_-]+$", "contact-mechanics")]
+Date = Annotated[str, BeforeValidator(_date), _schema(r"^\d{4}-\d{2}-\d{2}$", "2026-01-31")]
+Version = Annotated[str, BeforeValidator(_version), _schema(r"^[0-9A-Za-z][0-9A-Za-z.+_-]*$", "1.0.0")]
 
 
 Line = Annotated[Text, BeforeValidator(_line)]
@@ -347,49 +295,27 @@ class KnownFailure(Section):
     )
 
 
-def _same_author(one: Author, other: Author) -> bool:
-    """Whether two entries are one: the same ORCID, or the same name and no ORCIDs that tell them apart."""
-    if one.orcid and other.orcid:
-        return one.orcid == other.orcid
-    return _alike(one.family_names, one.given_names, one.name) == _alike(
-        other.family_names, other.given_names, other.name
-    )
-
-
-def _same_funding(one: Funding, other: Funding) -> bool:
-    """Whether two entries are one: the same award of the same funder."""
-    if one.funder_id and other.funder_id:
-        same_funder = one.funder_id.lower() == other.funder_id.lower()
-    else:
-        same_funder = _alike(one.funder) == _alike(other.funder)
-    if one.award_number and other.award_number:
-        return same_funder and _alike(one.award_number) == _alike(other.award_number)
-    return same_funder and _award(one) == _award(other)
-
-
-def _award(funding: Funding) -> tuple[str, ...]:
-    return _alike(funding.award_number, funding.award_title, funding.award_url)
-
-
-def _same_relation(one: RelatedIdentifier, other: RelatedIdentifier) -> bool:
-    """Whether two entries say the same of the same thing; capitals make no other DOI or arXiv identifier."""
-
-    def said(related):
-        identifier = related.identifier
-        return related.relation, identifier if _URL.fullmatch(identifier) else identifier.lower()
-
-    return said(one) == said(other)
-
-
-Authors = Annotated[list[Author], _once("author", _same_author, lambda author: author.full_name)]
-Fundings = Annotated[list[Funding], _once("award of a funder", _same_funding, lambda funding: funding.funder)]
+Authors = Annotated[
+    list[Author],
+    _once("author", lambda each: (each.orcid or each.full_name,), lambda each: each.full_name),
+]
+Fundings = Annotated[
+    list[Funding],
+    _once(
+        "award of a funder",
+        lambda each: (each.funder_id or each.funder, each.award_number or (each.award_title, each.award_url)),
+        lambda each: each.funder,
+    ),
+]
 Related = Annotated[
     list[RelatedIdentifier],
-    _once("relation to an identifier", _same_relation, lambda related: f"{related.relation} {related.identifier}"),
+    _once(
+        "relation to an identifier",
+        lambda each: (each.relation, each.identifier),
+        lambda each: f"{each.relation} {each.identifier}",
+    ),
 ]
-Failures = Annotated[
-    list[KnownFailure], _once("run", lambda one, other: one.run == other.run, lambda failure: failure.run)
-]
+Failures = Annotated[list[KnownFailure], _once("run", lambda each: (each.run,), lambda each: each.run)]
 
 
 class Publication(Section):

@@ -6,12 +6,12 @@ import re
 import pytest
 import yaml
 from conftest import REPOSITORY
+from icha.deposit.citation import citation_cff, datacite_metadata, web_address, zenodo_metadata
 from outside_validators import sealed, validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import RELATIONS, RESOURCES, RelatedIdentifier
 from icha.datasets.model_paper import MODEL_PAPER
-from icha.deposit.citation import citation_cff, datacite_metadata, web_address, zenodo_metadata
 from icha.models import asperities
 
 

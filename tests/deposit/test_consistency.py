@@ -3,12 +3,12 @@
 import pytest
 import small_campaign as small
 from bare_campaign import CAMPAIGN
+from icha.deposit.consistency import refuse_mixed
 
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
 from icha.configuration.settings import campaign_sha256, run_sha256
 from icha.datasets.files import write_dataset
-from icha.deposit.consistency import refuse_mixed
 from icha.planning.results import campaign_files
 from icha.support.checksums import asked_of, sha256_as_written, write_checksum
 

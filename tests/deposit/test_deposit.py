@@ -25,6 +25,10 @@ import small_campaign as small
 import xarray as xr
 import yaml
 from conftest import REPOSITORY, copy_project, snakemake_command
+from icha.deposit.deposit import make_deposit
+from icha.deposit.deposit_files import verify_deposit, whole_deposit
+from icha.deposit.dictionary import data_dictionary, kind_of
+from icha.deposit.source import committed_source
 from PIL import Image, PngImagePlugin
 from traces import traces
 from typer.testing import CliRunner
@@ -37,10 +41,6 @@ from icha.configuration.publication import KnownFailure
 from icha.configuration.settings import campaign_sha256
 from icha.deposit import deposit as deposits
 from icha.deposit import dictionary
-from icha.deposit.deposit import make_deposit
-from icha.deposit.deposit_files import verify_deposit, whole_deposit
-from icha.deposit.dictionary import data_dictionary, kind_of
-from icha.deposit.source import committed_source
 from icha.planning.plan import whole_cost
 from icha.support.checksums import write_checksum
 

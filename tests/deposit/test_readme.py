@@ -9,6 +9,7 @@ import pytest
 import small_campaign as small
 import xarray as xr
 from conftest import REPOSITORY
+from icha.deposit.licences import known_licence
 from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 from publications import ALL, COMMIT, LEAST
@@ -17,7 +18,6 @@ from icha.analysis.checks import check_campaign
 from icha.configuration.load import load_configuration
 from icha.configuration.publication import Author, Funding, KnownFailure
 from icha.datasets.campaign_file.write import write_campaign
-from icha.deposit.licences import known_licence
 from icha.deposit.readme import markdown, readme
 from icha.planning.costs import Cost
 

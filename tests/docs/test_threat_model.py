@@ -6,8 +6,7 @@ from conftest import REPOSITORY
 from typer.main import get_command
 
 from icha.cli import app
-from icha.deposit.deposit_files import LARGEST_TEXT
-from icha.deposit.strangers_files import LIMITS
+from icha.deposit.verify import LARGEST_TEXT, LIMITS
 
 PAGE = (REPOSITORY / "docs/threat_model.md").read_text(encoding="utf-8")
 
