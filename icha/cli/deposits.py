@@ -51,11 +51,11 @@ def verify(deposit: Deposit, large: Large = False) -> None:
 @contextlib.contextmanager
 def _whole(deposit: Path, large: bool) -> Iterator[Path]:
     """Provide the folder of a deposit that is there, verified, and unpacked if it is a zip."""
-    from icha.deposit.verify import LIMITS, NO_LIMITS, whole_deposit
+    from icha.deposit.verify import whole_deposit
 
     if not deposit.exists():
         raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")
-    with whole_deposit(deposit, NO_LIMITS if large else LIMITS) as folder:
+    with whole_deposit(deposit, large=large) as folder:
         yield folder
 
 

@@ -8,7 +8,6 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal
-from urllib.parse import quote
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
@@ -27,15 +26,14 @@ RESOURCES = tuple(
     "Book BookChapter ConferencePaper Dataset Dissertation Image JournalArticle Other Preprint Report Software Text "
     "Workflow".split()
 )
-_DOI = re.compile(r"10\.[0-9]{4,9}/.+", re.DOTALL)
+# Characters of a web address (RFC 3986).
+_ADDRESS = r"[^\s<>\"{}|\\^`\x00-\x1f\u200b-\u200f]+"
+_DOI = re.compile(rf"10\.[0-9]{{4,9}}/{_ADDRESS}")
 _ARXIV = re.compile(r"arXiv:([0-9]{4}\.[0-9]{4,5}|[a-z-]+(\.[A-Z]{2})?/[0-9]{7})(v[0-9]+)?")
-_URL = re.compile(r"https?://[^\s/]+\..+", re.DOTALL)
-_DOI_SITE = re.compile(r"https?://(dx\.)?doi\.org/", re.IGNORECASE)
-_ROR_SITE = re.compile(r"https?://ror\.org/", re.IGNORECASE)
+_URL = re.compile(rf"https?://[^\s/]+\.{_ADDRESS}")
 # The digits of Crockford's base 32.
 _BASE_32 = "0123456789abcdefghjkmnpqrstvwxyz"
-_ROR = re.compile(rf"0([{_BASE_32}]{{6}})([0-9]{{2}})")
-_FIRST_DAY, _LAST_DAY = "1900-01-01", "2199-12-31"
+_ROR = re.compile(rf"(https?://ror\.org/)?0([{_BASE_32}]{{6}})([0-9]{{2}})")
 
 
 def _readable(value: Any, breaks: str, allowed: str) -> Any:
@@ -76,87 +74,62 @@ def _once(what: str, key: Callable[[Any], tuple], shown: Callable[[Any], str]) -
 
 
 def _orcid(value: str) -> str:
-    """Refuse an ORCID of the wrong form or with a wrong check digit (ISO 7064 mod 11-2); an address is taken for it."""
-    plain = re.sub(r"^https?://orcid\.org/", "", value) if isinstance(value, str) else value
-    example = "allowed: four groups of four digits of which the last is a check digit, such as '0000-0002-1825-0097'"
-    if not isinstance(plain, str) or not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain):
-        raise ValueError(f"is no ORCID; {example}")
-    digits = plain.replace("-", "")
+    """Refuse an ORCID of the wrong form or with a wrong check digit (ISO 7064 mod 11-2); its address is accepted."""
+    plain = re.sub(r"^https?://orcid\.org/", "", str(value))
     total = 0
-    for digit in digits[:-1]:
-        total = (total + int(digit)) * 2
-    check = (12 - total % 11) % 11
-    if digits[-1] != ("X" if check == 10 else str(check)):
-        raise ValueError(f"is no ORCID: its check digit is wrong; {example}")
+    for digit in plain.replace("-", "")[:-1]:
+        total = (total + int(digit)) * 2 if digit.isdecimal() else 0
+    check = "0123456789X"[(12 - total % 11) % 11]
+    if not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain) or plain[-1] != check:
+        raise ValueError(
+            "is no ORCID, or its check digit is wrong; allowed: such as "
+            "'0000-0002-1825-0097'"
+        )
     return plain
 
 
 def _ror(value: Any) -> str:
     """Refuse what is no identifier of the Research Organization Registry, by its check digits (ISO 7064 mod 97-10)."""
-    plain = _ROR_SITE.sub("", value).lower() if isinstance(value, str) else ""
-    example = "allowed: one of https://ror.org, such as 'https://ror.org/03yrm5c26'"
-    found = _ROR.fullmatch(plain)
-    if not found:
-        raise ValueError(f"is no ROR identifier; {example}")
-    number = 0
-    for digit in found[1]:
+    found, number = _ROR.fullmatch(str(value).lower()), 0
+    for digit in found[2] if found else "":
         number = 32 * number + _BASE_32.index(digit)
-    if int(found[2]) != 98 - number * 100 % 97:
-        raise ValueError(f"is no ROR identifier: its check digits are wrong; {example}")
-    return f"https://ror.org/{plain}"
-
-
-def _addressable(value: str) -> str:
-    """Refuse characters that a web address cannot have (RFC 3986)."""
-    for char in value:
-        if char in ' <>"{}|\\^`':
-            raise ValueError(f"holds {char!r}, which no web address can; allowed: none, or {quote(char)!r} for it")
-        if char.isspace() or not char.isprintable():
-            raise ValueError(f"holds {char!r}, which no web address can; allowed: visible characters")
-    return value
+    if not found or int(found[3]) != 98 - number * 100 % 97:
+        raise ValueError(
+            "is no ROR identifier, or its check digits are wrong; allowed: one of https://ror.org, such as "
+            "'https://ror.org/03yrm5c26'"
+        )
+    return f"https://ror.org/0{found[2]}{found[3]}"
 
 
 def _plain_doi(value: Any) -> str | None:
-    plain = re.sub(r"^doi:", "", _DOI_SITE.sub("", value)) if isinstance(value, str) else ""
-    return _addressable(plain) if _DOI.fullmatch(plain) else None
+    """Return the DOI that a text or an address of doi.org is; None if it is none."""
+    plain = re.sub(r"(?i)^(https?://(dx\.)?doi\.org/|doi:)", "", str(value))
+    return plain if _DOI.fullmatch(plain) else None
 
 
 def _doi(value: Any) -> str:
-    """Refuse what is no DOI; take its address for itself."""
-    plain = _plain_doi(value)
-    if plain is None:
-        raise ValueError("is no DOI; allowed: a DOI such as '10.1007/s11249-017-0900-2'")
-    return plain
+    if doi := _plain_doi(value):
+        return doi
+    raise ValueError("is no DOI; allowed: a DOI such as '10.1007/s11249-017-0900-2'")
 
 
 def _identifier(value: Any) -> str:
-    """Refuse what is neither a DOI nor an arXiv identifier nor a web address; take a DOI's address for itself."""
-    plain = _plain_doi(value)
-    if plain is not None:
-        return plain
+    if doi := _plain_doi(value):
+        return doi
     if isinstance(value, str) and (_ARXIV.fullmatch(value) or _URL.fullmatch(value)):
-        return _addressable(value)
+        return value
     raise ValueError(
         "is no identifier; allowed: a DOI such as '10.1007/s11249-017-0900-2', 'arXiv:1234.56789', or a web address"
     )
 
 
 def _funder(value: Any) -> str:
-    """Refuse what is neither a ROR identifier nor a DOI; take a DOI's address for itself."""
-    if isinstance(value, str) and (_ROR_SITE.match(value) or _ROR.fullmatch(value.lower())):
-        return _ror(value)
-    plain = _plain_doi(value)
-    if plain is None:
-        raise ValueError(
-            "is neither a ROR identifier nor a DOI; allowed: one of them, such as 'https://ror.org/00k4n6c32' or "
-            "'10.13039/501100000780'"
-        )
-    return plain
+    """Refuse what is neither a DOI nor a ROR identifier."""
+    return _plain_doi(value) or _ror(value)
 
 
 def _community(value: Any) -> str:
-    """Refuse what cannot name a community of Zenodo."""
-    if not isinstance(value, str) or not re.fullmatch(r"[a-z0-9_-]+", value):
+    if not re.fullmatch(r"[a-z0-9_-]+", str(value)):
         raise ValueError(
             "is no community of Zenodo; allowed: what its address ends with: lower-case letters, digits, - and _"
         )
@@ -165,20 +138,18 @@ def _community(value: Any) -> str:
 
 def _date(value: Any) -> str:
     """Refuse what is not a day of the calendar, or one of another age; YAML makes a date of its text."""
-    value = value.isoformat() if isinstance(value, datetime.date) else value
+    value = value.isoformat() if isinstance(value, datetime.date) else str(value)
     try:
-        if not isinstance(value, str) or not re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", value):
+        if not re.fullmatch(r"(19|20|21)[0-9]{2}-[0-9]{2}-[0-9]{2}", value):
             raise ValueError
         datetime.date.fromisoformat(value)
     except ValueError:
-        raise ValueError("is no date; allowed: year, month and day, such as 2026-01-31") from None
-    if not _FIRST_DAY <= value <= _LAST_DAY:
-        raise ValueError(f"is no day of a publication; allowed: from {_FIRST_DAY} to {_LAST_DAY}")
+        raise ValueError("is no date; allowed: year, month and day from 1900 to 2199, such as 2026-01-31") from None
     return value
 
 
 def _version(value: Any) -> str:
-    """Refuse a version that cannot be part of a folder's name; a number is refused, for 1.10 would become 1.1."""
+    """Refuse a version that cannot be part of a folder's name; a number is refused, since 1.10 would become 1.1."""
     if not isinstance(value, str) or not re.fullmatch(r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?", value):
         raise ValueError(
             "is no version; allowed: letters, digits and . + - _ between them, in quotes if it looks like a number, "
@@ -187,30 +158,19 @@ def _version(value: Any) -> str:
     return value
 
 
-def _schema(pattern: str, example: str):
-    return WithJsonSchema({"type": "string", "pattern": pattern, "examples": [example]})
+def _example(check: Callable[[Any], str], example: str):
+    """Type of a text that is checked, with an example for the schema."""
+    return Annotated[str, BeforeValidator(check), WithJsonSchema({"type": "string", "examples": [example]})]
 
 
-Orcid = Annotated[
-    str,
-    BeforeValidator(_orcid),
-    _schema(r"^(https://orcid\.org/)?\d{4}-\d{4}-\d{4}-\d{3}[\dX]$", "0000-0002-1825-0097"),
-]
-Ror = Annotated[
-    str, BeforeValidator(_ror), _schema(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$", "https://ror.org/03yrm5c26")
-]
-Doi = Annotated[str, BeforeValidator(_doi), _schema(r"10\.\d{4,9}/", "10.1007/s11249-017-0900-2")]
-Identifier = Annotated[str, BeforeValidator(_identifier), _schema(r"^\S+$", "10.1007/s11249-017-0900-2")]
-FunderId = Annotated[
-    str,
-    BeforeValidator(_funder),
-    _schema(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$|10\.\d{4,9}/", "https://ror.org/00k4n6c32"),
-]
-Community = Annotated[str, BeforeValidator(_community), _schema(r"^[a-z0-9_-]+$", "contact-mechanics")]
-Date = Annotated[str, BeforeValidator(_date), _schema(r"^\d{4}-\d{2}-\d{2}$", "2026-01-31")]
-Version = Annotated[str, BeforeValidator(_version), _schema(r"^[0-9A-Za-z][0-9A-Za-z.+_-]*$", "1.0.0")]
-
-
+Orcid = _example(_orcid, "0000-0002-1825-0097")
+Ror = _example(_ror, "https://ror.org/03yrm5c26")
+Doi = _example(_doi, "10.1007/s11249-017-0900-2")
+Identifier = _example(_identifier, "10.1007/s11249-017-0900-2")
+FunderId = _example(_funder, "https://ror.org/00k4n6c32")
+Community = _example(_community, "contact-mechanics")
+Date = _example(_date, "2026-01-31")
+Version = _example(_version, "1.0.0")
 Line = Annotated[Text, BeforeValidator(_line)]
 Prose = Annotated[Text, BeforeValidator(_prose)]
 
@@ -235,10 +195,8 @@ class Author(Section):
                 f"{self.model_dump(exclude_none=True)} is neither a person nor an organisation; allowed: family_names "
                 "and given_names of a person, or name of an organisation"
             )
-        if not person and self.orcid is not None:
-            raise ValueError("an organisation has no ORCID; allowed: orcid beside family_names and given_names")
-        if person and self.ror is not None and self.affiliation is None:
-            raise ValueError("a person has no ROR; allowed: ror beside affiliation, the institution that it identifies")
+        if (self.orcid and not person) or (self.ror and person and not self.affiliation):
+            raise ValueError("allowed: orcid of a person; ror of an organisation, or beside a person's affiliation")
         return self
 
     @property

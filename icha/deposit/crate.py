@@ -58,8 +58,6 @@ _FORMATS = {
     ".yaml": "application/yaml",
     "": "text/plain",
 }
-# Kinds of related works that are cited; others are used or mentioned.
-_PUBLICATIONS = "Book BookChapter ConferencePaper Dissertation JournalArticle Preprint Report Text".split()
 
 
 class Job(NamedTuple):
@@ -152,7 +150,6 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
         for address, (name, number) in _RUN_PROFILES.items()
     ]
     profiles.append(_add(crate, _WORKFLOW_PROFILE, "CreativeWork", name="Workflow RO-Crate", version="1.0"))
-    funders, grants = _funding(crate, publication)
     _set(
         crate.root_dataset,
         name=publication.title,
@@ -165,18 +162,8 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
         conformsTo=profiles,
         keywords=publication.keywords,
         identifier=publication.doi and web_address(publication.doi),
-        funder=funders,
-        funding=grants,
+        citation=_add_paper(crate),
     )
-    related: dict[str, list[Entity]] = {"citation": [_add_paper(crate)]}
-    for each in publication.related_identifiers:
-        cited = each.resource is None or each.resource in _PUBLICATIONS
-        key = "isBasedOn" if each.relation == "IsDerivedFrom" else "citation" if cited else "mentions"
-        # A dataset, too, is no more than a work here: what is called a Dataset is part of the crate.
-        kind = "ScholarlyArticle" if each.resource in _PUBLICATIONS else "CreativeWork"
-        address = web_address(each.identifier)
-        related.setdefault(key, []).append(_add(crate, address, kind, name=each.identifier, identifier=address))
-    _set(crate.root_dataset, **related)
 
 
 def _add_author(crate: ROCrate, author: Author) -> Entity:
@@ -209,26 +196,6 @@ def _add_paper(crate: ROCrate) -> Entity:
 
 def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
     return _add(crate, address or f"#organisation/{quote(name)}", "Organization", name=name, url=address)
-
-
-def _funding(crate: ROCrate, publication: Publication) -> tuple[list[Entity], list[Entity]]:
-    """Funders, and their grants where they are named."""
-    funders, grants = {}, {}
-    for each in publication.funding:
-        funder = _add_organisation(crate, each.funder, each.funder_id and web_address(each.funder_id))
-        funders[funder.id] = funder
-        award = each.award_number or each.award_title
-        if award:
-            grant = _add(
-                crate,
-                web_address(each.award_url) if each.award_url else f"#grant/{quote(each.funder)}/{quote(award)}",
-                "Grant",
-                name=each.award_title or award,
-                identifier=award,
-                funder=funder,
-            )
-            grants[grant.id] = grant
-    return list(funders.values()), list(grants.values())
 
 
 def _add_file(crate: ROCrate, path: str, file: Path, sha256: str) -> File:

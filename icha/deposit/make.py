@@ -68,7 +68,6 @@ def make_deposit(
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.published()
-    _refuse_names(files)
     _refuse_unknown_failures(results, publication)
     _refuse_changed(results, files)
     part = folder.with_name(f".{folder.name}.part")
@@ -79,7 +78,8 @@ def make_deposit(
             shutil.copyfile(results / file, part / file)
             (part / file).chmod(0o644)
         source.export(part / SOURCE)
-        _describe(part, files, publication, campaign, source.revision, cost)
+        _refuse_names(files_of(part))
+        _describe(part, files, campaign, source.revision, cost)
         checksums = {path: sha256_of(part / path) for path in files_of(part)}
         write_crate(part, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
         checksums[CRATE] = sha256_of(part / CRATE)
@@ -97,7 +97,7 @@ def make_deposit(
 
 
 def _refuse_names(files: Iterable[str]) -> None:
-    """Refuse names that `verify` would refuse; only files that the configuration names can have them."""
+    """Refuse names that `verify` would refuse."""
     if wrong := [f"  {file!r} {problem}" for file in files if (problem := problem_with_name(file))]:
         raise ValueError("not published, because of these names; rename the files:\n" + "\n".join(wrong))
 
@@ -154,13 +154,10 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
         )
 
 
-def _describe(
-    part: Path, files: Sequence[str], publication: Publication, campaign: Campaign, revision: str, cost: Cost
-) -> None:
+def _describe(part: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
     """Write the files by which the deposit describes itself."""
-    licence = known_licence(publication.license)
-    dictionary = data_dictionary(part, files)
-    _write(part / "LICENSE.txt", licence.page(SOURCE))
+    publication, dictionary = campaign.published(), data_dictionary(part, files)
+    _write(part / "LICENSE.txt", known_licence(publication.license).page(SOURCE))
     _write(part / "CITATION.cff", citation_cff(publication, revision))
     for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
         _write(part / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
@@ -169,9 +166,7 @@ def _describe(
     # Opened and not loaded, since the dataset may be large and the page shows little of it.
     with xr.open_datatree(part / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
         page = readme(
-            publication,
-            campaign=campaign,
-            licence=licence,
+            campaign,
             revision=revision,
             dataset=dataset,
             checks=read_checks(part / "checks.json"),

@@ -10,7 +10,7 @@ import yaml
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.publication import Author, Funding, Publication
+from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
 from icha.datasets.model_paper import MODEL_PAPER
 from icha.deposit.verify import ZENODO, read_text
 
@@ -273,6 +273,7 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
     The publisher is known only with the DOI; else it is `:tba`, DataCite's word for what will be known later.
     """
     licence = known_licence(publication.license)
+    paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
     published = publication.doi is not None and publication.doi.startswith(_ZENODO_DOI)
     return _given(
         {
@@ -306,30 +307,11 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
                         "resourceTypeGeneral": related.resource,
                     }
                 )
-                for related in publication.related_identifiers
+                for related in (*publication.related_identifiers, paper)
             ],
-            "relatedItems": [_datacite_paper()],
             "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
         }
     )
-
-
-def _datacite_paper() -> dict[str, Any]:
-    """The paper of the model."""
-    return {
-        "relatedItemType": "Preprint",
-        "relationType": "Cites",
-        "relatedItemIdentifier": {
-            "relatedItemIdentifier": f"arXiv:{MODEL_PAPER.arxiv}",
-            "relatedItemIdentifierType": "arXiv",
-        },
-        "publicationYear": str(MODEL_PAPER.year),
-        "titles": [{"title": MODEL_PAPER.title}],
-        "creators": [
-            {"name": f"{family}, {given}", "nameType": "Personal", "givenName": given, "familyName": family}
-            for given, family in MODEL_PAPER.authors
-        ],
-    }
 
 
 def _datacite_creator(author: Author) -> dict[str, Any]:

@@ -43,8 +43,8 @@ _GIT_ENVIRONMENT = {
     "GIT_OPTIONAL_LOCKS": "0",
     "GIT_TERMINAL_PROMPT": "0",
 }
-# Modes of git for an executable file, a link, a submodule.
-_EXECUTABLE, _LINK, _SUBMODULE = "100755", "120000", "160000"
+# Mode of git for an executable file.
+_EXECUTABLE = "100755"
 # Longest list of names in a message.
 _MOST_NAMES = 20
 
@@ -76,26 +76,19 @@ def program_source(project: str | os.PathLike) -> Source:
 
 def _committed_source(project: Path) -> Source:
     """The source at the commit that is checked out; the project may be a folder of a larger repository."""
-    if _git(project, "rev-parse", "--is-inside-work-tree") != b"true\n":
-        raise ValueError(
-            f"{project}: is not under git, so the program that made the data cannot be identified; needed: a clone of "
-            "the repository, or `git init`, `git add` and `git commit` of this folder"
-        )
     commit = (_git(project, "rev-parse", "--verify", "--quiet", "HEAD^{commit}") or b"").decode("ascii").strip()
     if not commit:
-        raise ValueError(f"{project}: nothing is committed yet; needed: `git add` and `git commit`")
-    files = _committed_files(project)
-    if "Snakefile" not in files:
-        raise ValueError(f"{project}: its Snakefile is not committed; needed: `git add` and `git commit`")
-    if odd := [name for name, (mode, _) in files.items() if mode in (_LINK, _SUBMODULE)]:
         raise ValueError(
-            f"{project}: a deposit holds files only; needed: the files themselves in place of these links and "
-            f"submodules:\n{_listed(odd)}"
+            f"{project}: is not under git, or nothing is committed yet, so the program that made the data cannot be "
+            "identified; needed: a clone of the repository, or `git init`, `git add` and `git commit` of this folder"
         )
+    files = _committed_files(project)
     committed = {name: blob for name, (_, blob) in files.items() if not name.startswith(_CONFIGURATIONS)}
     there = [name for name in committed if (project / name).is_file() and not (project / name).is_symlink()]
-    # Git itself makes the objects, since attributes may ask for other line ends in the folder than are committed.
-    blobs = _git(project, "hash-object", "--stdin-paths", entered="".join(f"{name}\n" for name in there)) or b""
+    # A deposit holds neither links nor submodules. Git itself makes the objects to compare with, since attributes may
+    # ask for other line ends in the folder than are committed. It takes paths from the top of the repository.
+    above = (_git(project, "rev-parse", "--show-prefix") or b"").decode("utf-8").rstrip("\n")
+    blobs = _git(project, "hash-object", "--stdin-paths", entered="".join(f"{above}{name}\n" for name in there)) or b""
     present = dict(zip(there, blobs.decode("ascii").split(), strict=True))
     wrong = [f"changed: {name}" for name, blob in committed.items() if present.get(name) != blob]
     wrong += [f"not committed: {name}" for name in _program_files(project) if name not in files]
@@ -113,22 +106,15 @@ def _committed_files(project: Path) -> dict[str, tuple[str, str]]:
     for entry in (_git(project, "ls-tree", "-r", "-z", "HEAD") or b"").split(b"\0")[:-1]:
         facts, name = entry.split(b"\t", 1)
         mode, _, blob = facts.decode("ascii").split()
-        files[_file_name(project, name)] = mode, blob
+        files[name.decode("utf-8", errors="replace")] = mode, blob
     return files
 
 
 def _program_files(project: Path) -> list[str]:
     """Files of the program, committed or not, except those that the project's own .gitignore names."""
     command = ("ls-files", "-z", "--cached", "--others", "--exclude-per-directory=.gitignore", "--", *PROGRAM)
-    names = [_file_name(project, name) for name in (_git(project, *command) or b"").split(b"\0")[:-1]]
+    names = (_git(project, *command) or b"").decode("utf-8", errors="replace").split("\0")[:-1]
     return sorted(name for name in names if (project / name).exists() or (project / name).is_symlink())
-
-
-def _file_name(project: Path, name: bytes) -> str:
-    text = name.decode("utf-8", errors="replace")
-    if not text.isprintable() or "\\" in text or "\ufffd" in text:
-        raise ValueError(f"{project}: the name of file {name!r} has characters that archives do not agree on")
-    return text
 
 
 def _export_committed(project: Path, files: dict[str, tuple[str, str]], folder: Path) -> None:

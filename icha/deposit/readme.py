@@ -27,7 +27,7 @@ from icha.datasets.model_paper import MODEL_PAPER
 from icha.datasets.places import slopes_of
 from icha.datasets.results import ERROR_SOURCES, LOOP, ONE_ASPERITY, RUN, SOLUTION, SURFACE, THEORIES
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
-from icha.deposit.metadata import Licence, acknowledgement, paragraphs, web_address
+from icha.deposit.metadata import acknowledgement, known_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.software import further_software
@@ -179,28 +179,9 @@ def _range(variable) -> tuple[float | int | None, float | int | None]:
     return min(smallest, default=None), max(largest, default=None)
 
 
-class StudyDesign(NamedTuple):
-    """The cells of a study, and how many of them have which status."""
-
-    name: str
-    models: tuple[str, ...]
-    surfaces: tuple[str, ...]
-    seeds: tuple[int, ...]
-    rms_slopes: tuple[float, ...]
-    materials: tuple[str, ...]
-    status: Mapping[str, int]
-
-    @property
-    def runs(self) -> int:
-        """Number of the runs that were asked for."""
-        return sum(self.status.values()) - self.status[STATUS_MEANINGS[NOT_IN_DESIGN]]
-
-
 def readme(
-    publication: Publication,
-    *,
     campaign: Campaign,
-    licence: Licence,
+    *,
     revision: str,
     dataset: xr.DataTree,
     checks: Sequence[Check],
@@ -213,20 +194,19 @@ def readme(
 
     Parameters
     ----------
-    publication : metadata with version, date, authors, title, summary and licence.
-    campaign, dataset, checks, model_error : what was asked for, and its results.
-    licence : that of the data.
+    campaign, dataset, checks, model_error : what was asked for, with complete metadata, and its results.
     revision : that of the source.
     dictionary : the variables of all files.
     sizes : bytes of every file, by its path in the deposit.
     cost : what computing the whole campaign is expected to take.
     """
+    publication = campaign.published()
     text = _template().render(
         publication=publication,
         citation=_citation(publication),
         paper=MODEL_PAPER,
         summary=paragraphs(publication.summary),
-        licence=licence,
+        licence=known_licence(publication.license),
         revision=revision,
         variables=_short_dictionary(dictionary, campaign.name),
         cost=cost,
@@ -307,7 +287,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
     meaning = "0 if the run reached the end of its path, else 1"
     return {
         "designs": designs,
-        "partial": [study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
+        "partial": [study["name"] for study in designs if study["status"][STATUS_MEANINGS[NOT_IN_DESIGN]]],
         "incomplete": [
             {"labels": labels, "steps": steps, "failure": failure, "reason": known.get(str(labels), "")}
             for labels, (steps, failure) in incomplete.items()
@@ -329,12 +309,15 @@ def _citation(publication: Publication) -> str:
     return f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set."
 
 
-def _study_designs(dataset: xr.DataTree) -> list[StudyDesign]:
+def _study_designs(dataset: xr.DataTree) -> list[dict]:
+    """Labels of every study, and the number of its cells with each status."""
     designs = []
     for name, study in dataset.children.items():
-        labels = (tuple(slopes_of(study) if each == "rms_slope" else study[each].values.tolist()) for each in LABELS)
         counts = Counter(study["status"].values.ravel().tolist())
-        designs.append(StudyDesign(name, *labels, {text: counts[k] for k, text in enumerate(STATUS_MEANINGS)}))
+        status = {text: counts[k] for k, text in enumerate(STATUS_MEANINGS)}
+        runs = sum(counts.values()) - counts[NOT_IN_DESIGN]
+        labels = {each: slopes_of(study) if each == "rms_slope" else study[each].values.tolist() for each in LABELS}
+        designs.append({"name": name, "status": status, "runs": runs, **labels})
     return designs
 
 

@@ -152,7 +152,7 @@ def _outcome(deposit: Path, run: str) -> tuple[int, str]:
 
 def with_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
     """Return the paths of runs and of their surfaces, as far as the deposit has these."""
-    surfaces = ("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
+    surfaces = dict.fromkeys("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
     return [*runs, *(path for path in surfaces if (deposit / path).is_file())]
 
 

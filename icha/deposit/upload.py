@@ -16,8 +16,7 @@ ZENODO = "https://zenodo.org"
 SANDBOX = "https://sandbox.zenodo.org"
 # For the connection, and for an answer, as checksums of large files take the server its time; in s.
 _TIMEOUT = (20, 900)
-_BUSY = (429, 503)
-_FAILING = (*_BUSY, 500, 502, 504)
+_FAILING = (429, 500, 502, 503, 504)
 # Longest text of a server that is shown, in characters.
 _LONGEST = 300
 _SCOPES = "deposit:write and deposit:actions"
@@ -62,16 +61,8 @@ class Draft(NamedTuple):
     files: tuple[Uploaded, ...]
 
 
-class _Patience(Retry):
-    """Repeat requests that failed for the moment; those that are not idempotent only if the server postponed them."""
-
-    def is_retry(self, method, status_code, has_retry_after=False):
-        postponed = method == "POST" and status_code in _BUSY and bool(self.total)
-        return postponed or super().is_retry(method, status_code, has_retry_after)
-
-
-# Waits 0, 2, 4, 8, 16 s, or as long as the server asks for, up to five minutes.
-_PATIENCE = _Patience(
+# What can be repeated waits 0, 2, 4, 8, 16 s, or as long as the server asks for, up to five minutes.
+_PATIENCE = Retry(
     total=5, backoff_factor=1, status_forcelist=_FAILING, redirect=0, raise_on_status=False, retry_after_max=300
 )
 
@@ -208,9 +199,7 @@ class Zenodo:
         except requests.RequestException as error:
             raise ZenodoError(f"{self.address} cannot be reached, or breaks off: {self._plain(error)}") from None
         if answer.is_redirect:
-            raise ZenodoError(
-                f"{self.address} redirects to {self._plain(answer.headers['Location'])}; use that one"
-            )
+            raise ZenodoError(f"{self.address} redirects to {self._plain(answer.headers['Location'])}; use that one")
         if not answer.ok:
             raise ZenodoError(self._refusal(path, answer))
         try:

@@ -8,13 +8,11 @@ import contextlib
 import os
 import re
 import shutil
-import stat
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 from icha.support import in_words
 from icha.support.checksums import sha256_of
@@ -34,29 +32,13 @@ COMPUTED = (
 LARGEST_TEXT = 64_000_000
 # Most bytes of a name that common file systems accept: of one part, of a path.
 _LONGEST_PART, _LONGEST_PATH = 255, 1000
+# Limits for a deposit from a stranger, which the option `LARGE` of the commands lifts: number of files; factor by which
+# a zip may grow when it is extracted, and bytes that it may have in any case. ICHA does not compress deposits; whoever
+# compresses one again gains a factor of about three.
+MOST_FILES, MOST_GROWTH, ALLOWANCE = 200_000, 50, 100_000_000
+LARGE = "--large"
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _BLOCK = 1 << 20
-
-
-class Limits(NamedTuple):
-    """Limits for a deposit from a stranger.
-
-    Attributes
-    ----------
-    files : largest number of files.
-    ratio : largest factor by which a zip may grow when it is extracted, beside `allowance`.
-    allowance : bytes that a zip may have in any case when it is extracted.
-    """
-
-    files: float
-    ratio: float
-    allowance: int
-
-
-# ICHA does not compress deposits; whoever compresses one again gains a factor of about three.
-LIMITS = Limits(files=200_000, ratio=50, allowance=100_000_000)
-# The option of the commands that lifts the limits.
-LARGE, NO_LIMITS = "--large", Limits(float("inf"), float("inf"), 0)
 
 
 class Damaged(ValueError):
@@ -64,34 +46,39 @@ class Damaged(ValueError):
 
 
 @contextlib.contextmanager
-def whole_deposit(path: str | os.PathLike, limits: Limits = LIMITS) -> Iterator[Path]:
+def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[Path]:
     """Verify a deposit and provide its folder; a zip is extracted into a temporary one.
+
+    Parameters
+    ----------
+    path : its folder or its zip.
+    large : whether to accept more files and bytes than is good from a stranger.
 
     Raises
     ------
     Damaged
         If files differ from their checksums, are missing or were added, or if the deposit cannot be read safely.
     OSError
-        If there is no room to extract the zip.
+        If a zip cannot be extracted, for instance because there is no room.
     """
     path = Path(path)
     with contextlib.ExitStack() as opened:
         folder = path
         if not path.is_dir():
-            folder = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="icha-deposit-")))
-            _extract(path, folder, limits)
-        if problems := list(_problems(folder, limits)):
+            empty = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="icha-deposit-")))
+            folder = _extract(path, empty, large)
+        if problems := list(_problems(folder, large)):
             raise Damaged(*problems)
         yield folder
 
 
-def verify_deposit(path: str | os.PathLike, limits: Limits = LIMITS) -> list[str]:
-    """List what is wrong with a deposit, a folder or a zip, one line each; the list is empty if it is whole.
+def verify_deposit(path: str | os.PathLike, *, large: bool = False) -> list[str]:
+    """List what is wrong with a deposit, one line each; the list is empty if it is whole. Parameters: `whole_deposit`.
 
     Folders without files do not count, as in git and in the list of checksums.
     """
     try:
-        with whole_deposit(path, limits):
+        with whole_deposit(path, large=large):
             return []
     except Damaged as damaged:
         return list(damaged.args)
@@ -132,67 +119,47 @@ def problem_with_name(name: str) -> str:
     return ""
 
 
-def _extract(path: Path, folder: Path, limits: Limits) -> None:
-    """Extract a zip that has a single folder into an empty folder; links and devices cannot arise."""
+def _extract(path: Path, folder: Path, large: bool) -> Path:
+    """Extract a zip into an empty folder and return the single folder in it; links become files, and nothing leads out.
+
+    Python's zipfile leaves out what leads out of the folder, and reads no more bytes of a file than are declared.
+    """
+    name = printable(path.name)
     if not path.is_file():
-        raise Damaged(f"{printable(path.name)}: is neither a folder nor a file")
+        raise Damaged(f"{name}: is neither a folder nor a file")
     try:
         with zipfile.ZipFile(path) as archive:
-            entries = archive.infolist()
-            if problems := _problems_with_entries(entries, path.stat().st_size, limits):
-                raise Damaged(*problems)
-            needed, free = sum(entry.file_size for entry in entries), shutil.disk_usage(folder).free
-            if needed > free:
+            entries, packed = archive.infolist(), path.stat().st_size
+            unpacked, free = sum(entry.file_size for entry in entries), shutil.disk_usage(folder).free
+            if len(entries) > MOST_FILES and not large:
+                raise Damaged(_too_many(len(entries)))
+            if unpacked > MOST_GROWTH * packed + ALLOWANCE and not large:
+                raise Damaged(
+                    f"{name}: unpacks from {in_words.size(packed)} to {in_words.size(unpacked)}; allowed: "
+                    f"{MOST_GROWTH} times its size and {in_words.size(ALLOWANCE)}, or more with {LARGE}"
+                )
+            if unpacked > free:
                 raise OSError(
-                    f"{folder.parent}: {in_words.size(needed)} are needed to extract {path.name}, and "
+                    f"{folder.parent}: {in_words.size(unpacked)} are needed to extract {name}, and "
                     f"{in_words.size(free)} are free; set TMPDIR to a folder with more room"
                 )
-            for entry in entries:
-                if not entry.is_dir():
-                    file = folder / entry.filename.partition("/")[2]
-                    file.parent.mkdir(parents=True, exist_ok=True)
-                    with archive.open(entry) as content, file.open("xb") as copy:
-                        shutil.copyfileobj(content, copy, _BLOCK)
-    except FileExistsError as error:
-        # The same name twice, or a file that is also the folder of another one.
-        raise Damaged(f"{printable(Path(error.filename).relative_to(folder))}: is there more than once") from None
-    except (zipfile.BadZipFile, NotADirectoryError, IsADirectoryError) as error:
-        raise Damaged(f"{printable(path.name)}: not a readable zip archive: {printable(error)}") from None
-    except (NotImplementedError, RuntimeError, EOFError, zlib.error) as error:  # encrypted, unknown method, cut off
-        raise Damaged(f"{printable(path.name)}: cannot be extracted: {printable(error)}") from None
+            archive.extractall(folder)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
+        # Damaged, or encrypted, or compressed by an unknown method.
+        raise Damaged(f"{name}: not a readable zip archive: {printable(error)}") from None
+    held = sorted(os.listdir(folder))
+    if len(held) != 1 or not (folder / held[0]).is_dir():
+        raise Damaged(f"{name}: holds {printable(', '.join(held[:5]) or 'nothing')}; allowed: a single folder")
+    return folder / held[0]
 
 
-def _problems_with_entries(entries: list[zipfile.ZipInfo], size: int, limits: Limits) -> list[str]:
-    """List what is wrong with the contents of a zip of `size` bytes, by its list of contents alone."""
-    if len(entries) > limits.files:
-        return [_too_many(f"{len(entries):,}", limits)]
-    problems = []
-    for entry in entries:
-        names = (entry.orig_filename, entry.filename)
-        if problem := next(filter(None, (problem_with_name(name.removesuffix("/")) for name in names)), ""):
-            problems.append(f"{printable(entry.orig_filename)}: the name {problem}")
-        elif stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
-            problems.append(f"{printable(entry.filename)}: is a link, a device or another special file")
-    tops = sorted({entry.filename.partition("/")[0] for entry in entries})
-    if len(tops) != 1 or any("/" not in entry.filename for entry in entries):
-        held = ", ".join([printable(top) for top in tops[:5]] + ["…"] * (len(tops) > 5))
-        problems.append(f"holds {held or 'nothing'}; allowed: a single folder, the deposit")
-    unpacked = sum(entry.file_size for entry in entries)
-    if unpacked > limits.ratio * size + limits.allowance:
-        problems.append(
-            f"unpacks from {in_words.size(size)} to {in_words.size(unpacked)}; allowed: {limits.ratio} times its size "
-            f"and {in_words.size(limits.allowance)}, or more with {LARGE}"
-        )
-    return problems
+def _too_many(count: int) -> str:
+    return f"holds {count:,} files or more; allowed: {MOST_FILES:,}, or more with {LARGE}"
 
 
-def _too_many(count: str, limits: Limits) -> str:
-    return f"holds {count} files; allowed: {limits.files:,}, or more with {LARGE}"
-
-
-def _problems(folder: Path, limits: Limits) -> Iterator[str]:
+def _problems(folder: Path, large: bool) -> Iterator[str]:
     """Compare the files in a folder with its list of checksums."""
-    found, special = _inspect(folder, limits)
+    found, special = _inspect(folder, large)
     yield from (f"{printable(name)}: {problem}" for name, problem in special.items())
     if CHECKSUMS not in found:
         yield f"{CHECKSUMS}: is missing, so this is no whole deposit"
@@ -221,7 +188,7 @@ def _problems(folder: Path, limits: Limits) -> Iterator[str]:
         yield f"{printable(name)}: was added: it is not in {CHECKSUMS}"
 
 
-def _inspect(folder: Path, limits: Limits) -> tuple[set[str], dict[str, str]]:
+def _inspect(folder: Path, large: bool) -> tuple[set[str], dict[str, str]]:
     """List the files below a folder, and what is wrong with names and kinds of others; links are not followed."""
     found: set[str] = set()
     problems: dict[str, str] = {}
@@ -238,6 +205,6 @@ def _inspect(folder: Path, limits: Limits) -> tuple[set[str], dict[str, str]]:
                 problems[name] = f"the name {problem}"
             else:
                 found.add(name)
-            if len(found) + len(problems) > limits.files:
-                raise Damaged(_too_many(f"more than {limits.files:,}", limits))
+            if len(found) + len(problems) > MOST_FILES and not large:
+                raise Damaged(_too_many(len(found) + len(problems)))
     return found, dict(sorted(problems.items()))
