@@ -425,17 +425,6 @@ def _campaigns(results) -> list[str]:
     if not rows:
         return []
     parts.append(table(["", "time", "memory", "of the time"], rows))
-    if costs := results.get("costs"):
-        lines = []
-        for group, what in (("fitted", "to which the model was fitted"), ("others", "to which it was not fitted")):
-            ratios = [case["ratios"]["time"] for case in costs["cases"] if case["group"] == group]
-            if ratios:
-                within = sum(0.5 <= ratio <= 2 for ratio in ratios)
-                lines.append(
-                    f"- {len(ratios)} cases {what}: expected over measured time {min(ratios):.2f} to "
-                    f"{max(ratios):.2f}, {within} within a factor of two"
-                )
-        parts += ["How good the estimates of `icha describe` are (`benchmarks/costs.py`):", "\n".join(lines) + "."]
     return parts
 
 

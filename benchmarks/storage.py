@@ -22,10 +22,10 @@ import netCDF4
 import numpy as np
 
 import icha
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import write_dataset
 from icha.datasets.labels import RunLabels
-from icha.datasets.storage import LEAST_COMPRESSED
+from icha.datasets.results import LEAST_COMPRESSED
 from icha.datasets.surface_file import write_surface
 
 REPEATS = 3

@@ -19,7 +19,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "generated_reference",
 ]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "tables"]
 source_suffix = {".md": "markdown"}
 
 # Links `[text](page.md#heading)` work on the site and where the files are browsed.

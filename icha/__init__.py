@@ -8,7 +8,7 @@ _HOME = {
     "Surface": "surfaces.surface",
     "Material": "asperity.material",
     "Path": "path.targets",
-    "read_scan": "configuration.read_scan",
+    "read_scan": "configuration.topographies",
     "simulate": "simulation",
     "ConvergenceError": "simulation",
 }
@@ -25,7 +25,7 @@ __all__ = [
 
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported
     from icha.asperity.material import Material
-    from icha.configuration.read_scan import read_scan
+    from icha.configuration.topographies import read_scan
     from icha.path.targets import Path
     from icha.simulation import ConvergenceError, simulate
     from icha.surfaces.spectrum import SelfAffineSpectrum

@@ -21,8 +21,7 @@ from icha.contact.model import ContactModel
 from icha.contact.models import ASPERITIES, MODELS
 from icha.contact.observables import summit_counts
 from icha.datasets.attributes import COMPUTED, discovery
-from icha.datasets.bins import bin_values
-from icha.datasets.build import build, described, joined, of, stacked
+from icha.datasets.build import bin_values, build, described, joined, of, stacked
 from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
 from icha.models.applicability import asperity_applicability
@@ -34,8 +33,7 @@ from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD
 from icha.path.waypoints import Waypoint
 from icha.support.rules import ALL_MODELS, Integer
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
-from icha.surfaces.summit_coverage import SummitCoverage
-from icha.surfaces.summits import locate_summits
+from icha.surfaces.summits import SummitCoverage, locate_summits
 from icha.surfaces.surface import Surface
 
 # Snapshots farther up, in h_rms, are far above any contact.
@@ -155,7 +153,6 @@ def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
     chosen, table = _model(name), RUN | FURTHER[name]
     values = {
         **_of_path(table, path, met, surface.grid),
-        "united_until": path.united_until if chosen.united_by_rule else "",
         **_of_surface(surface, material, seed),
         **of_contact,
         **bin_values("gap", gap_bins(surface)),

@@ -8,7 +8,7 @@ import cyclic_campaign as cyclic
 import small_campaign as small
 import xarray as xr
 
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 

@@ -47,12 +47,12 @@ def stable_radius(d):
     return brentq(lambda a: approach(a) - d, JUMP_OFF_RADIUS, 50)
 
 
-def contact_of(heights, positions=((0.5, 0.5),), radii=None, *, period=FAR, material=STICKY, until="detachment"):
+def contact_of(heights, positions=((0.5, 0.5),), radii=None, *, period=FAR, material=STICKY):
     """Asperities of given heights and places, measured from the middle of the cell if it is not one alone."""
     heights = np.array(heights, float)
     positions = np.array(positions, float) + period / 2
     radii = np.ones(len(heights)) if radii is None else np.array(radii, float)
-    return InteractingAsperities(JKR(material), Asperities(positions, heights, radii, period), RMS_HEIGHT, until)
+    return InteractingAsperities(JKR(material), Asperities(positions, heights, radii, period), RMS_HEIGHT)
 
 
 def travelled(contact, stops, **settings):
@@ -96,8 +96,8 @@ def equal_pair():
     return contact, travelled(contact, [0.005], unload=True)
 
 
-def pair(lower, distance, until, material=STICKY):
-    return contact_of([HEIGHT, HEIGHT - lower], [[-distance / 2, 0], [distance / 2, 0]], until=until, material=material)
+def pair(lower, distance, material=STICKY):
+    return contact_of([HEIGHT, HEIGHT - lower], [[-distance / 2, 0], [distance / 2, 0]], material=material)
 
 
 def small():
@@ -108,4 +108,4 @@ def small():
 @cache
 def united_run():
     """A small sticky surface on which two spots unite, pressed and pulled off."""
-    return icha.simulate(*small(), Path([5e-2], unload=True, united_until="detachment"))
+    return icha.simulate(*small(), Path([5e-2], unload=True))

@@ -8,14 +8,12 @@ import small_campaign as small
 
 import icha
 from icha.analysis.common_loads import compare_campaign
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
-from icha.references.error_sources.variants import error_sources
 from icha.references.finite_range import finite_range_solution
 from icha.references.finite_range_loops import finite_range_loop
-from icha.references.one_asperity import hertz_asperity, one_asperity
 from icha.references.theories import reference_dataset
 from icha.surfaces.moments import spectral_moments
 
@@ -67,9 +65,6 @@ def write_all(folder: Path) -> list[Path]:
         "boundary_elements": finite_range_solution(surface, HARD, 1e-2, seed=1),
         "boundary_elements_adhesive": finite_range_solution(surface, STICKY, 1e-2, seed=1),
         "loop": finite_range_loop(surface, STICKY, largest_reduced_pressure=1e-2, separation_step=0.3, seed=1),
-        "error_sources": error_sources(surface, HARD, [1e-2], seed=1),
-        "hertz_asperity": hertz_asperity(),
-        "one_asperity": one_asperity(1.5, approaches=[3.0, 1.5], period=10.0),
     }
     for name, data in datasets.items():
         write_dataset(data.assign_attrs(ATTRIBUTES), folder / f"{name}.nc")

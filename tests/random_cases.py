@@ -170,7 +170,6 @@ def _paths(draw, height):
     if way == "in":
         return path
     path["unload"] = True
-    path["united_until"] = draw(st.sampled_from(["overlap", "detachment"]))
     if way == "cycle":
         path["turning_points"] = [draw(_TURNS), (kind.removesuffix("s"), stops[-1])]
     if way == "under load" and kind == "reduced_pressures" and path["snapshots"] != [("area_fraction", 0.02)]:

@@ -7,9 +7,8 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from icha.asperity.material import Material
-from icha.configuration.cases import run_cases
+from icha.configuration.cases import run_cases, run_settings
 from icha.configuration.load import load_configuration
-from icha.configuration.settings import run_settings
 from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path as LoadingPath
 from icha.simulation import simulate

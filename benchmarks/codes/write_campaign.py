@@ -8,7 +8,7 @@ from pathlib import Path
 
 from make_runs import labels
 
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 
 folder, count = Path(sys.argv[1]), int(sys.argv[2])
 runs = labels(count)

@@ -17,11 +17,9 @@ from scipy.stats import wasserstein_distance
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS
 from icha.contact.models import ASPERITIES
 from icha.datasets.attributes import DERIVED, collected, why_no_result
-from icha.datasets.bins import bin_values
-from icha.datasets.build import described, variable
+from icha.datasets.build import bin_values, described, variable
 from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spots_of
-from icha.datasets.labels import LABELS, RunLabels, SolutionLabels
-from icha.datasets.places import arrange_slopes, labels_at, place_of, slope_dims
+from icha.datasets.labels import LABELS, RunLabels, SolutionLabels, arrange_slopes, labels_at, place_of, slope_dims
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
 from icha.datasets.variables.model_error import ASKED, BINS, FINITE_RANGE, MODEL_ERROR, SHORT_RANGE
 from icha.datasets.variables.terms import MATERIAL, Variable

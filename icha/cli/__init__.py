@@ -9,11 +9,10 @@ from icha.cli.deposits import reproduce, upload, verify
 from icha.cli.describe import describe
 from icha.cli.explore import explore
 from icha.cli.new import new
-from icha.cli.project import told
+from icha.cli.project import say, told
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
-from icha.cli.terminal import say
 
 app = typer.Typer(
     no_args_is_help=True,

@@ -5,36 +5,15 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, WRONG
-from icha.cli.terminal import say
+from icha.cli.project import FAILED, WRONG, say
 from icha.deposit.verify import CHECKSUMS
-from icha.support.in_words import counted
-from icha.support.printable import printable
-
-# What of a campaign is no netCDF file, by its name.
-_BY_NAME = {
-    "*.yaml": "configuration; `icha describe` checks it",
-    "checks.json": "findings of the checks of a campaign, which its report shows; it has none of its own",
-    "verdict.txt": "verdict on the checks of a campaign; it has none of its own",
-    "belongs_to.txt": "record of the configuration file that results belong to; it has no checks of its own",
-    "report.html": "report; it has no checks of its own",
-    "explore.html": "page of `icha explore`; it has no checks of its own",
-    "run_times.tsv": "times of the jobs; it has no checks of its own",
-    "*.*.json": "checksum of a result; `icha run` compares it",
-    "*.png": "figure; it has no checks of its own",
-    "*.pdf": "figure; it has no checks of its own",
-    "*.log": "log of a job; it has no checks of its own",
-    "*.jsonl": "time and memory of a job; it has no checks of its own",
-    CHECKSUMS: "checksums of a deposit; `icha verify` checks its folder",
-}
+from icha.support.in_words import counted, printable
 
 
 def check(
     files: Annotated[list[Path], typer.Argument(help="Runs, surfaces, campaign datasets or other results.")],
 ) -> None:
     """Check files: documented names, dimensions, units and attributes, and the physics that every result must satisfy.
-
-    Of results without checks of their own it says what they are.
 
     Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is none that ICHA writes. All
     files are checked in any case.
@@ -43,8 +22,8 @@ def check(
 
     status = 0
     for file in files:
-        if told := _without_checks(file):
-            say(f"{file}: {told}")
+        if (file.suffix == ".zip" and file.is_file()) or (file / CHECKSUMS).is_file():
+            say(f"{file}: deposit; `icha verify` checks it")
             continue
         try:
             kind, data = kind_of(file)
@@ -69,17 +48,6 @@ def check(
             say(f"{file}: {kind}, all is well{numbers}")
     if status:
         raise typer.Exit(status)
-
-
-def _without_checks(file: Path) -> str | None:
-    """What a file is by its name, and who checks it; None of netCDF files and of what ICHA does not write."""
-    if not file.exists():
-        return None
-    if file.suffix == ".zip" or (file / CHECKSUMS).is_file():
-        return "deposit; `icha verify` checks it"
-    if file.is_dir():
-        return None
-    return next((told for pattern, told in _BY_NAME.items() if file.match(pattern)), None)
 
 
 def _checked(kind, data):

@@ -14,13 +14,10 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.options import Anyway, Cores, Large
-from icha.cli.project import FAILED, Mistake, shown
+from icha.cli.project import FAILED, Anyway, Cores, Large, Mistake, confirmed, say, shown
 from icha.cli.run import run
-from icha.cli.terminal import confirmed, say
 from icha.support import in_words
-from icha.support.in_words import counted
-from icha.support.printable import printable
+from icha.support.in_words import counted, printable
 
 TOKEN = "ZENODO_TOKEN"
 _MOST_PROBLEMS = 100

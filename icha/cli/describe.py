@@ -6,18 +6,22 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.options import Config, Cores, Folder, core_count
 from icha.cli.project import (
+    Config,
+    Cores,
+    Folder,
     Mistake,
     configuration_path,
+    core_count,
+    markup,
     profile_settings,
     project,
     read_configuration,
+    say,
     shown,
     workflow_folder,
 )
 from icha.cli.scans import about_scan, check_picture, draw_scans
-from icha.cli.terminal import markup, say
 from icha.support import in_words
 from icha.support.in_words import counted
 
@@ -52,7 +56,7 @@ def describe(
 def _tell_of_scans(campaign, plot: Path | None) -> None:
     """Tell of the measured surfaces that are pressed, and draw them if asked."""
     from icha.configuration.cases import run_cases
-    from icha.configuration.measured_surfaces import MeasuredSurface
+    from icha.configuration.surfaces import MeasuredSurface
 
     pressed = {case.surface: campaign.surfaces[case.surface] for case in run_cases(campaign)}
     measured = {name: section for name, section in pressed.items() if isinstance(section, MeasuredSurface)}
@@ -91,9 +95,8 @@ def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: 
 
     from icha.deposit.metadata import licence_problem
     from icha.planning.belonging import belongs_to_another
-    from icha.planning.needs import wanting
+    from icha.planning.needs import missing_software, wanting
     from icha.planning.plan import plan
-    from icha.planning.software import missing_software
     from icha.planning.validity import expected_validity
     from icha.support.checksums import damaged
 

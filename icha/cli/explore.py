@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import Mistake
-from icha.cli.terminal import say
+from icha.cli.project import Mistake, say
 from icha.support.in_words import counted
 
 

@@ -15,19 +15,23 @@ from typing import Annotated
 import typer
 
 from icha.cli.describe import tell
-from icha.cli.options import Anyway, Config, Cores, Folder, core_count
 from icha.cli.project import (
     DEFAULT,
     FAILED,
+    Anyway,
+    Config,
+    Cores,
+    Folder,
     Mistake,
     configuration_path,
+    core_count,
     profile_settings,
     project,
     read_configuration,
+    say,
     shown,
     workflow_folder,
 )
-from icha.cli.terminal import say
 from icha.support.atomic_files import in_the_way
 from icha.support.in_words import counted
 
@@ -109,9 +113,7 @@ def run(
         return
     from rich.console import Console
 
-    from icha.cli.events import Watch
-    from icha.cli.live import LiveView, PlainView
-    from icha.planning.constants import FITTED
+    from icha.cli.live import LiveView, PlainView, Watch
     from icha.planning.plan import expected_seconds, plan, time_on
     from icha.planning.validity import expected_validity
 
@@ -122,7 +124,7 @@ def run(
         _ask_if_wanting(items, asked, core_count(cores), folder / "results" / campaign.name, settings)
     if not set(asked) - set(TARGETS):
         _say_what_holds(expected_validity(campaign))
-    watch = Watch(expected_seconds(items, f"results/{campaign.name}"), environment=FITTED.workflow.environment)
+    watch = Watch(expected_seconds(items, f"results/{campaign.name}"))
     if plain or not console.is_terminal:
         view = PlainView(watch, campaign.name, folder, say)
     else:
@@ -304,7 +306,7 @@ def _follow(command: list[str], workflow: Path, log: Path, watch, view) -> tuple
 
 
 def _listen(reading: int, watch, view, stopped: list) -> None:
-    from icha.cli.events import reason_of
+    from icha.cli.live import reason_of
 
     with open(reading, encoding="utf-8") as events:
         for line in events:
@@ -321,7 +323,7 @@ def _listen(reading: int, watch, view, stopped: list) -> None:
 
 def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, promised: float | None) -> None:
     """Print what has become of the campaign, and in how many seconds of those that were promised."""
-    from icha.cli.events import reason_of
+    from icha.cli.live import reason_of
     from icha.planning.plan import failed_runs
     from icha.support import in_words
     from icha.support.atomic_files import why_not_writable

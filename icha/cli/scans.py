@@ -1,11 +1,16 @@
-"""What is told and drawn of a scan before anything is computed with it."""
+"""Scans: what is told and drawn of them before anything is computed, and their section in a new campaign."""
 
+import json
+import os
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from icha.cli.project import Mistake
 from icha.support import in_words
-from icha.support.printable import printable
+from icha.support.in_words import printable
+from icha.support.input_files import flaw_of_path
 
 # Endings of the pictures that can be drawn.
 PICTURES = (".png", ".pdf", ".svg")
@@ -156,3 +161,123 @@ def _short(length):
     from icha.figures.style import quantity
 
     return quantity(float(f"{length:.2g}"), "m")
+
+
+# What stands in the place of what is left to fill in while the rest is checked, in SI units and in a configuration.
+_GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
+_GUESSED = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
+_EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
+# Bytes that show whether anything is in a file.
+_BEGINNING = 2**16
+
+
+class MeasuredSection(NamedTuple):
+    """What a new campaign has of a scan.
+
+    name, path : of the surface, and of its file from the configuration. lines : what the file says, and what it does
+    not. to_fill_in : why, by key. filled_in : values with which the rest can be checked. periodic : whether it is a
+    Fourier series. advice : keys that are advised, as a configuration has them. scan : its
+    `icha.surfaces.measured.resolution.ScanResolution`.
+    """
+
+    name: str
+    path: str
+    lines: list[str]
+    to_fill_in: dict[str, str]
+    filled_in: dict[str, str]
+    periodic: bool
+    advice: dict[str, str]
+    scan: Any
+
+
+def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSection:
+    """Read the file of a measured topography for its section in a configuration of a folder.
+
+    Raises
+    ------
+    Mistake
+        If it can be read by no setting, or has no topography that can be used.
+    """
+    import numpy as np
+
+    from icha.surfaces.measured.resolution import scan_resolution
+    from icha.surfaces.measured.settings import UnfitTopography
+
+    _check_file(path)
+    scan, assumed, missing, sides = _read(path, data)
+    rows, columns = scan.heights.shape
+    gaps = int(np.count_nonzero(~np.isfinite(scan.heights)))
+    boundary, detrend = ("periodic", "none") if scan.format == "fourier" else ("free", "tilt")
+    how = {"format": "auto", "boundary": boundary, "data": data, "detrend": detrend, "missing": "fill"} | assumed
+    try:
+        resolution = scan_resolution(path, how)
+    except UnfitTopography as error:
+        raise Mistake(f"--measured {path}: {error.key} {error}") from None
+
+    taken = data if data is not None else scan.data
+    lines = [f"data: {json.dumps(taken)}"] if taken else []
+    lines.append(f"# {columns} x {rows} points{_what_is_known(scan, missing, sides)}")
+    for key in missing:
+        empty = " (empty: that of the heights)" if key == "lateral_unit" else ""
+        lines.append(f"{key}:        # to fill in, since the file does not say it{empty}: such as {_EXAMPLES[key]}")
+    if gaps:
+        lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
+    advice = {} if missing else in_yaml(resolution.advice)
+    name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
+    if boundary != "periodic":
+        missing = missing | {"boundary": "what lies beyond the edges: free, window, mirror or periodic"}
+    guessed = _GUESSED | {"size": [f"{columns} um", f"{rows} um"]}
+    filled_in = {key: guessed[key] for key in missing}
+    path = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    return MeasuredSection(name, path, lines, missing, filled_in, boundary == "periodic", advice, resolution)
+
+
+def _check_file(path):
+    if flaw := flaw_of_path(path):
+        raise Mistake(f"--measured {path}: {flaw}; allowed: a file that holds a topography")
+    with path.open("rb") as file:
+        if not file.read(_BEGINNING).strip():
+            raise Mistake(f"--measured {path}: the file is empty; allowed: one that holds a topography")
+
+
+def _read(path, data):
+    """The scan, what was assumed to read it and what is missing of it, by key; its sides, if their unit is missing."""
+    from icha.surfaces.measured.scan import load_scan
+    from icha.surfaces.measured.settings import Preparation, UnfitTopography
+
+    assumed, missing = {}, {}
+    while True:
+        try:
+            scan = load_scan(path, Preparation("auto", "free", data, **assumed))
+            break
+        except UnfitTopography as error:
+            if error.key not in _GUESSES or error.key in assumed:
+                how = "; say which by --data NAME" if error.key == "data" else ""
+                raise Mistake(f"--measured {path}: {error.key} {error}{how}") from None
+            assumed[error.key] = _GUESSES[error.key]
+            missing[error.key] = str(error)
+    if "size" in missing:
+        # Pixels are square, as a rule.
+        rows, columns = scan.heights.shape
+        assumed["size"] = columns * 1e-6, rows * 1e-6
+    elif "height_unit" in missing:
+        # Coordinates without a unit would count in that of the heights, which is not known either.
+        bare = load_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
+        if bare.size != scan.size:
+            missing["lateral_unit"] = "is missing, and the file does not say it; left out, it is that of the heights"
+            return scan, assumed, missing, bare.size
+    return scan, assumed, missing, None
+
+
+def _what_is_known(scan, missing, sides) -> str:
+    """Size and heights of a scan; `sides` are in the file's coordinates, if it gives these without their unit."""
+    import numpy as np
+
+    known = ""
+    if sides is not None:
+        known += f" over {sides[0]:.4g} x {sides[1]:.4g} in its coordinates"
+    elif "size" not in missing:
+        known += f" over {scan.size[0] * 1e6:.4g} um x {scan.size[1] * 1e6:.4g} um"
+    if "height_unit" not in missing:
+        known += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
+    return known

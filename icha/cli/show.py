@@ -5,11 +5,10 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import Mistake
+from icha.cli.project import Mistake, say
 from icha.cli.scans import check_picture
-from icha.cli.terminal import say
 from icha.datasets.attributes import why_no_result
-from icha.support.printable import printable
+from icha.support.in_words import printable
 
 _BARS = " ▁▂▃▄▅▆▇█"
 _WIDTH = 60
@@ -146,8 +145,7 @@ def _show_surface(surface, file) -> None:
 
 
 def _show_campaign(tree, file) -> None:
-    from icha.datasets.labels import LABELS
-    from icha.datasets.places import labels_at
+    from icha.datasets.labels import LABELS, labels_at
 
     say(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
     say(printable(" ".join(str(tree.attrs.get("summary", "")).split())))

@@ -16,7 +16,7 @@ def _length(value: str | None) -> float | None:
 
 
 def _si(value: str, si_unit: str, example: str) -> float:
-    from icha.support.units import to_si
+    from icha.support.values import to_si
 
     try:
         return to_si(value, si_unit)
@@ -153,7 +153,7 @@ def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope, mode
         _refuse_too_large(grid, period / short, model)
         return SelfAffineSpectrum(period, rolloff, short, hurst, slope).realise(grid, seed)
     if file.suffix == ".npy":
-        from icha.surfaces.measured.height_map import read_height_map
+        from icha.surfaces.measured.array_files import read_height_map
 
         try:
             found = Surface(read_height_map(file, 1.0), period)

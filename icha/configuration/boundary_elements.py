@@ -1,20 +1,17 @@
-"""Sections of boundary elements: beside runs, both ways, for the sources of the error, of one asperity."""
+"""Sections of boundary elements at a finite range: beside runs, and in loading and unloading."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    field_validator,
-)
+from pydantic import AfterValidator, Field
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
+from icha.configuration.studies import MEASURED
 from icha.contact.models import ASPERITIES
 from icha.path.limits import STEP
 from icha.path.states import ReducedPressure
-from icha.support.rules import GRID, REFINEMENT, TOLERANCE, Real
+from icha.support.rules import GRID, REFINEMENT, TOLERANCE
 from icha.support.values import (
     Label,
     Name,
@@ -32,29 +29,24 @@ from icha.support.values import (
     unknown,
 )
 
+_Labels = list_of_names("Some of the study's.", Label)
+
 
 class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
     study: Name = Field(description="Name of the study on whose topographies they are solved.")
-    surfaces: list_of_names("Surfaces, from those of the study. Left out: all.", Label) | None = Field(
-        default=None, description="Surfaces, from those of the study. Left out: all."
-    )
+    surfaces: _Labels | None = Field(default=None, description="Surfaces, from those of the study. Left out: all.")
     seeds: Seeds | None = Field(default=None, description="Seeds, from those of the study. Left out: all.")
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
         default=None, description="Rms slopes, from those of the study. Left out: all."
     )
-    materials: list_of_names("Materials, from those of the study. Left out: all.", Label) | None = Field(
+    materials: _Labels | None = Field(
         default=None,
         description="Materials, from those of the study. Left out: all. With adhesion the grid must resolve their "
         "`interaction_range`.",
     )
     tolerance: number(TOLERANCE) = Field(default=1e-8, description="Relative error at which the solver may stop.")
-
-    @property
-    def coarsest(self) -> int:
-        """Smallest number of cells per cell of the surface's grid."""
-        return self.refinement
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """What of the study is not there, or cannot be solved; of an `icha.configuration.campaign.Campaign`."""
@@ -73,17 +65,19 @@ class BesideStudy(Section):
                 if value not in known:
                     yield (key, index), value, f"is not in study {self.study!r}; allowed: {listed(there)}"
         contacts = campaign.solved(self)
-        if not contacts:
+        if not contacts and MEASURED not in study.rms_slopes:
             yield (), self.study, "has none of the chosen combinations; allowed: combinations that the study has"
         materials: dict[str, dict[str, None]] = {}
         for each in contacts:
             materials.setdefault(each.surface, {})[each.material] = None
         for name in materials:
-            if campaign.boundary(name) != "periodic":
+            if campaign.is_free(name):
                 reason = (
                     "has a surface without periods; allowed: studies of periodic surfaces, as boundary elements are"
                 )
                 yield ("study",), self.study, f"{reason} ({name!r} is not)"
+                continue
+            if campaign.grid(name) is None:
                 continue
             yield from self._unresolved(campaign, name, materials[name])
             nodes = campaign.grid(name) * self.refinement
@@ -93,7 +87,7 @@ class BesideStudy(Section):
 
     def _unresolved(self, campaign, surface, materials):
         """Those of some materials whose attraction the grid of a surface does not resolve."""
-        spacing = campaign.period(surface) / (campaign.grid(surface) * self.coarsest)
+        spacing = campaign.period(surface) / (campaign.grid(surface) * self.refinement)
         for label in materials:
             material = Material(**campaign.materials[label].model_dump())
             if problem := resolution_problem(material, spacing):
@@ -134,36 +128,3 @@ class BoundaryElementLoops(BesideStudy):
             reason = "has no reduced pressures as targets; allowed: a study with them; unloading begins at the last one"
             yield ("study",), self.study, reason
         yield from super()._study_problems(campaign, study)
-
-
-class ErrorSources(BesideStudy):
-    """Variants between the model and boundary elements, each of which changes one thing."""
-
-    reduced_pressures: Loads
-    refinement: integer(REFINEMENT) = Field(
-        default=2,
-        description="Cells per cell of the surface's grid, along a side. Even, since half as many are tried as well.",
-    )
-
-    @field_validator("refinement")
-    @classmethod
-    def _half_of_it_can_be_tried(cls, value):
-        if value % 2:
-            raise ValueError("is odd; allowed: 2, 4, … 16")
-        return value
-
-    @property
-    def coarsest(self) -> int:
-        """Smallest number of cells per cell of the surface's grid."""
-        return self.refinement // 2
-
-
-class OneAsperity(Section):
-    """One asperity by the model and by boundary elements, where the answer is known."""
-
-    tabor_parameters: Annotated[
-        list[number(Real(least=1.5, most=6))], Field(min_length=1), AfterValidator(increasing)
-    ] = Field(
-        description="Tabor parameters, increasing. The grid of the boundary elements grows with their square; at 4 it "
-        "has 800 nodes along a side and takes some minutes. Hertz's contact is always computed."
-    )

@@ -6,43 +6,24 @@ is wrong with it is worded in `icha.configuration.errors`; the JSON schema is ge
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    PrivateAttr,
-)
+from pydantic import AfterValidator, Field, PrivateAttr
 
-from icha.configuration.boundary_elements import (
-    BesideStudy,
-    BoundaryElementLoops,
-    BoundaryElements,
-    ErrorSources,
-    OneAsperity,
-)
-from icha.configuration.figures import Figures
-from icha.configuration.materials import MaterialSection
-from icha.configuration.measurements import Measurement
+from icha.configuration.boundary_elements import BesideStudy, BoundaryElementLoops, BoundaryElements
+from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
-from icha.configuration.studies import Study
-from icha.configuration.surfaces import AnySurface, SelfAffineSurface
-from icha.configuration.values import MEASURED
+from icha.configuration.studies import MEASURED, Study
+from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
-from icha.support.values import (
-    ROUNDING,
-    Name,
-    Problem,
-    Section,
-    Text,
-    distinct,
-)
+from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections of entries that belong to a study.
-BESIDE_STUDIES = ("finite_range", "boundary_element_loops", "error_sources")
+BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
+# Keys whose values are compared with slopes of runs, or with paths that have them.
+_OF_SLOPES = ("rms_slope", "known_failures")
 # Each of these looks at all runs of its study.
 _FEW = Field(max_length=100)
 # Cells per shortest wavelength: with fewer, boundary elements are refused and asperities warned of; those to recommend.
@@ -63,7 +44,6 @@ class Topography(NamedTuple):
 
     grid: int
     period: float  # m
-    boundary: str
     rms_slope: float | None  # None where no study asks for it
     sha256: str
     full_contact_energy: float  # U_full/E* at rms slope 1, m; NaN where nothing may adhere
@@ -106,12 +86,6 @@ class Campaign(Section):
         default={},
         description="Boundary elements in loading and unloading by name, to compare with the runs of a "
         "study that unloads.",
-    )
-    error_sources: Annotated[dict[Name, ErrorSources], _FEW] = Field(
-        default={}, description="Studies of the sources of the model's error, by name."
-    )
-    one_asperity: OneAsperity | None = Field(
-        default=None, description="One asperity by the model and by boundary elements."
     )
     measurements: Annotated[dict[Name, Measurement], _FEW] = Field(
         default={}, description="Measurements by name, drawn over figure 5. None come with ICHA."
@@ -179,20 +153,17 @@ class Campaign(Section):
         """The entry of a section (surfaces, materials) of which `name` is a variant, or itself."""
         return self._origins.get((section, name), name)
 
-    def boundary(self, surface: str) -> str:
-        """What lies beyond the edges of a surface: `periodic` or `free`."""
-        topography = self.topography(surface)
-        return topography.boundary if topography else "periodic"
+    def is_free(self, surface: str) -> bool:
+        """Whether a surface is a square with free edges; all others are periodic."""
+        return getattr(self.surfaces[surface], "boundary", None) == "free"
 
-    def grid(self, surface: str) -> int:
-        """Nodes along a side of a surface."""
-        topography = self.topography(surface)
-        return topography.grid if topography else self.surfaces[surface].grid
+    def grid(self, surface: str) -> int | None:
+        """Nodes along a side of a surface; None of one from a file that was not inspected."""
+        return getattr(self.topography(surface) or self.surfaces[surface], "grid", None)
 
     def period(self, surface: str) -> float:
-        """Side of a surface, m."""
-        topography = self.topography(surface)
-        return topography.period if topography else self.surfaces[surface].period
+        """Side of a surface whose grid is known, m."""
+        return (self.topography(surface) or self.surfaces[surface]).period
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
         """Kind and value of all states that the runs of a study keep; None where they keep their last one.
@@ -208,23 +179,29 @@ class Campaign(Section):
 
     def solved(self, entry: BesideStudy) -> list[Contact]:
         """The contacts for which an entry beside a study asks."""
+        lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
+        asked = [None if values is None else set(values) for values in lists]
 
-        def among(wanted):
-            return (lambda value: True) if wanted is None else set(wanted).__contains__
+        def is_asked_for(contact):
+            seedless = not self.surfaces[contact.surface].random
+            return all(
+                values is None or value in values or (seedless and name == "seed")
+                for name, value, values in zip(Contact._fields, contact, asked, strict=True)
+            )
 
-        surface, seed = among(entry.surfaces), among(entry.seeds)
-        rms_slope, material = among(entry.rms_slopes), among(entry.materials)
-        return [
-            each
-            for each in self._contacts[entry.study]
-            if surface(each.surface)
-            and (seed(each.seed) or not self.surfaces[each.surface].random)
-            and rms_slope(each.rms_slope)
-            and material(each.material)
-        ]
+        return list(filter(is_asked_for, self._contacts[entry.study]))
 
     def problems(self) -> Iterator[Problem]:
-        """What keeps it from being run although each of its values is allowed by itself."""
+        """What keeps it from being run although each of its values is allowed by itself.
+
+        What depends on measured slopes and on grids of files is left out until these are known.
+        """
+        unknown_slopes = any(MEASURED in study.rms_slopes for study in self.studies.values())
+        for place, value, reason in self._problems():
+            if not (unknown_slopes and any(str(part).startswith(_OF_SLOPES) for part in place)):
+                yield place, value, reason
+
+    def _problems(self):
         for label, study in self.studies.items():
             yield from _within(("studies", label), study.problems(self.snapshots_of(label)))
             yield from _within(("studies", label), self._model_problems(study))
@@ -239,55 +216,49 @@ class Campaign(Section):
         for label, figure in self.figures.drawn().items():
             yield from _within(("figures", label), figure.problems(self))
 
+    def measurement_problems(self) -> Iterator[Problem]:
+        """Tables of measurements that cannot be read."""
+        for label, entry in self.measurements.items():
+            yield from _within(("measurements", label), entry.table_problems())
+
     def _model_problems(self, study: Study) -> Iterator[Problem]:
-        """Surfaces of a study that its models cannot press."""
+        """Surfaces of a study that boundary elements cannot press."""
         if BOUNDARY_ELEMENTS not in study.models:
             return
         at = ("models", study.models.index(BOUNDARY_ELEMENTS))
         for name in study.surfaces:
-            if self.boundary(name) != "periodic":
+            surface = self.surfaces[name]
+            if self.is_free(name):
                 reason = f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or "
                 yield at, BOUNDARY_ELEMENTS, reason + "another `boundary`, which makes a surface periodic"
-            cells = self._cells_per_short_wave(name)
-            if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
+            if surface.cells_per_short_wave < _LEAST_CELLS * (1 - ROUNDING):
+                cells = f"{surface.cells_per_short_wave:.3g}"
                 reason = (
-                    f"need at least {_LEAST_CELLS} grid cells per shortest wavelength, and {name!r} has {cells:.3g}; "
-                    f"allowed: asperities, or a `grid` of {self._grid_of_cells(name, _LEAST_CELLS)} or more for "
-                    f"{name!r} (recommended: {self._grid_of_cells(name, _ADVISABLE_CELLS)})"
+                    f"need at least {_LEAST_CELLS} grid cells per shortest wavelength, and {name!r} has {cells}; "
+                    f"allowed: asperities, or a `grid` of {surface.grid_of_cells(_LEAST_CELLS)} or more for {name!r} "
+                    f"(recommended: {surface.grid_of_cells(_ADVISABLE_CELLS)})"
                 )
                 yield at, BOUNDARY_ELEMENTS, reason
-
-    def _cells_per_short_wave(self, surface: str) -> float | None:
-        """Grid cells per shortest wavelength of a self-affine surface; None of another."""
-        section = self.surfaces[surface]
-        return section.cells_per_short_wave if isinstance(section, SelfAffineSurface) else None
-
-    def _grid_of_cells(self, surface: str, cells: int) -> int:
-        """The least grid of a self-affine surface with so many cells per shortest wavelength."""
-        section = self.surfaces[surface]
-        return math.ceil(cells * section.period / section.short_wavelength * (1 - ROUNDING))
 
     def warnings(self) -> list[str]:
         """What is allowed but not advisable."""
         found = []
-        by_patches = {
-            name for each in self.studies.values() if BOUNDARY_ELEMENTS in each.models for name in each.surfaces
-        }
-        for name in dict.fromkeys(name for study in self.studies.values() for name in study.surfaces):
-            surface = self.surfaces[name]
-            origin = self.origin("surfaces", name)
+        studies = self.studies.values()
+        by_patches = {name for each in studies if BOUNDARY_ELEMENTS in each.models for name in each.surfaces}
+        for name in dict.fromkeys(name for study in studies for name in study.surfaces):
+            surface, origin = self.surfaces[name], self.origin("surfaces", name)
             variant = "" if origin == name else f" (variant {name})"
-            cells = self._cells_per_short_wave(name)
-            if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
+            cells = surface.cells_per_short_wave
+            if cells < _LEAST_CELLS * (1 - ROUNDING):
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
                     f"{variant}; recommended: {_ADVISABLE_CELLS}, at least {_LEAST_CELLS}"
                 )
-            elif cells is not None and cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_patches:
+            elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_patches:
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
                     f"wavelength{variant}, with which areas are off by a few per cent; recommended: "
-                    f"{self._grid_of_cells(name, _ADVISABLE_CELLS)} or more"
+                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)} or more"
                 )
         return found
 

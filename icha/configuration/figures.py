@@ -1,13 +1,124 @@
-"""The section of figures: one key for every figure that there is."""
+"""Section `figures`, one key for every figure, and `measurements`, contact areas of others that are drawn over them."""
 
-from typing import Any
+from collections.abc import Iterator
+from typing import Annotated, Any
 
-from pydantic import Field, create_model
+from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
 from icha.datasets.results import ResultFiles
 from icha.figures.declaration import Campaign, FigureOptions, Inputs
 from icha.figures.registry import DECLARATIONS
-from icha.support.values import Section
+from icha.support.input_files import read_columns
+from icha.support.values import File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
+
+
+def _drawable(value: str) -> str:
+    """Refuse formulas in a label that no figure can draw."""
+    if "$" not in value:
+        return value
+    # Imports matplotlib, for which no other label waits.
+    from matplotlib.cbook import is_math_text
+    from matplotlib.mathtext import MathTextParser
+
+    try:
+        if is_math_text(value):
+            MathTextParser("path").parse(value)
+    except Exception as error:  # of its parser, of Python for a thousand braces
+        last = (str(error).strip().splitlines() or [type(error).__name__])[-1]
+        allowed = r"allowed: formulas between two $ as matplotlib reads them, or \$ for the sign"
+        raise ValueError(f"holds a formula that cannot be drawn ({last}); {allowed}") from None
+    return value
+
+
+class Column(Section):
+    """A column of a table of measurements."""
+
+    column: Text = Field(description="Heading of the column.")
+    unit: Annotated[str, Field(strict=True)] = Field(
+        description="Unit of its numbers: `1` or `percent` for ratios, a unit of pressure for nominal pressures."
+    )
+
+
+class Measurement(Section):
+    """Measured contact areas, drawn over the figure of the study that they belong to."""
+
+    path: File = Field(description="CSV file with a line of headings. Relative to the configuration file.")
+    label: Annotated[Text, Field(max_length=200), AfterValidator(_drawable)] = Field(
+        description="Its name in the legend; formulas stand between two `$`."
+    )
+    citation: Text = Field(description="Where the numbers come from; printed in the report.")
+    study: Name = Field(description="Name of the study that it is compared with.")
+    load: Column = Field(
+        description="Load: reduced pressures p/(E* h'rms) (unit `1`) or nominal pressures (unit `kPa`, …), which need "
+        "material and rms_slope."
+    )
+    area: Column = Field(description="Contact area fraction A/A0 (unit `1` or `percent`).")
+    material: Name | None = Field(default=None, description="Material that was measured; a load in Pa needs it.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope that was measured; a load in Pa needs it.")
+
+    @field_validator("load")
+    @classmethod
+    def _load_is_ratio_or_pressure(cls, value):
+        for si_unit in ("1", "Pa"):
+            try:
+                conversion_factor(value.unit, si_unit)
+                return value
+            except ValueError:
+                pass
+        raise ValueError(f"unit {value.unit!r}; allowed: '1' or a unit of pressure, such as 'kPa'")
+
+    @field_validator("area")
+    @classmethod
+    def _area_is_ratio(cls, value):
+        try:
+            conversion_factor(value.unit, "1")
+        except ValueError as error:
+            raise ValueError(f"unit: {error}; allowed: '1' or 'percent'") from None
+        return value
+
+    @property
+    def load_is_pressure(self) -> bool:
+        """Whether the load column holds nominal pressures."""
+        try:
+            conversion_factor(self.load.unit, "1")
+        except ValueError:
+            return True
+        return False
+
+    @property
+    def columns(self) -> dict[str, float]:
+        """Headings of the columns of load and area, and the factors that turn them into SI units."""
+        load = conversion_factor(self.load.unit, "Pa" if self.load_is_pressure else "1")
+        area = conversion_factor(self.area.unit, "1")
+        return {self.load.column: float(load), self.area.column: float(area)}
+
+    @field_validator("area")
+    @classmethod
+    def _columns_differ(cls, value, info):
+        if "load" in info.data and info.data["load"].column == value.column:
+            raise ValueError(f"column {value.column!r} is that of the load; allowed: another one")
+        return value
+
+    @model_validator(mode="after")
+    def _pressure_can_be_reduced(self):
+        if self.load_is_pressure and (self.material is None or self.rms_slope is None):
+            raise ValueError(
+                f"load in {self.load.unit!r} without material and rms_slope; allowed: both given, or loads of unit '1'"
+            )
+        return self
+
+    def problems(self, campaign: Any) -> Iterator[Problem]:
+        """Names that lead nowhere in its `icha.configuration.campaign.Campaign`."""
+        yield from unknown(("study",), self.study, campaign.studies)
+        if self.material is not None:
+            yield from unknown(("material",), self.material, campaign.materials)
+
+    def table_problems(self) -> Iterator[Problem]:
+        """A table that cannot be read."""
+        try:
+            read_columns(self.path, self.columns)
+        except ValueError as error:
+            yield ("path",), self.path, str(error)
 
 
 class _Drawn(Section):

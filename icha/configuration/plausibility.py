@@ -6,9 +6,13 @@ An unusual value is refused unless the list `confirmed` of the campaign names it
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
+from icha.configuration.campaign import Campaign
+from icha.configuration.surfaces import SelfAffineSurface
+from icha.contact.models import ASPERITIES
 from icha.support import in_words
-from icha.support.units import to_number, to_si
-from icha.support.values import Problem, listed
+from icha.support.values import Problem, listed, to_number, to_si
+from icha.surfaces.moments import self_affine_full_contact_energy
 
 CONFIRMED = "confirmed"
 # Where keys of that name are quantities; in all other sections they are not, or are names of what is in these.
@@ -45,22 +49,13 @@ _WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
 _SLOPE = Usual("1", "1e-4", "5", "from superpolished mirrors, 1e-3, to fracture surfaces, about 1")
 # Why a measured slope may be unusual.
 _OF_SLOPE = "as units, size, or a number for missing points make it"
+_OF_ENERGY = "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2"
+_OF_RANGE = "chemical bonds reach less than 1 nm, van der Waals forces some nm, what grids resolve some 100 nm"
 # By key. Wide on purpose: what is asked for by reason lies in it, a wrong prefix of a unit as a rule does not.
 USUAL = {
     "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond against something rigid, 1150 GPa"),
-    "surface_energy": Usual(
-        "J/m^2",
-        "0.001 mJ/m^2",
-        "3 J/m^2",
-        "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2",
-        True,
-    ),
-    "interaction_range": Usual(
-        "m",
-        "0.05 nm",
-        "1 um",
-        "chemical bonds reach less than 1 nm, van der Waals forces some nm, what grids resolve some 100 nm",
-    ),
+    "surface_energy": Usual("J/m^2", "0.001 mJ/m^2", "3 J/m^2", _OF_ENERGY, or_zero=True),
+    "interaction_range": Usual("m", "0.05 nm", "1 um", _OF_RANGE),
     "period": _SIDE,
     "size": _SIDE,
     "rolloff_wavelength": _WAVE,
@@ -145,3 +140,37 @@ def needless_confirmations(unusual: Collection[Unusual], confirmed: Any) -> Iter
 
 def _keys(confirmed):
     return [key for key in confirmed if isinstance(key, str)] if isinstance(confirmed, list) else []
+
+
+_RATIO = Usual(
+    "1",
+    f"{FULL_CONTACT_BELOW:g}",
+    "inf",
+    "below, full contact has the lower energy and the asperity model is not applicable: press a rougher surface or a "
+    "stiffer material, or use `models: [boundary_elements]`",
+)
+
+
+def full_contact_energy(campaign: Campaign, surface: str) -> float:
+    """U_full/E* of a surface at rms slope 1, m."""
+    section = campaign.surfaces[surface]
+    if isinstance(section, SelfAffineSurface):
+        return self_affine_full_contact_energy(*section.lengths_and_hurst)
+    return campaign.topography(surface).full_contact_energy
+
+
+def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
+    """The stickiest run of asperities of every study in which full contact has the lower energy."""
+    for name, study in campaign.studies.items():
+        if ASPERITIES not in study.models:
+            continue
+        ratios = {}
+        for contact in campaign.contacts(name):
+            material = campaign.materials[contact.material]
+            energy = full_contact_energy(campaign, contact.surface) * contact.rms_slope**2
+            ratios[contact] = full_contact_energy_ratio(energy, material.contact_modulus, material.surface_energy)
+        lowest = min(ratios, key=ratios.get)
+        if ratios[lowest] < FULL_CONTACT_BELOW:
+            place = f"{lowest.material} on {lowest.surface} at rms slope {lowest.rms_slope:.3g}"
+            value = f"asperities with U_full/dgamma = {ratios[lowest]:.3g}"
+            yield Unusual(("studies", name, "models"), value, _RATIO, f"for {place}")

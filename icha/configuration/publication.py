@@ -81,10 +81,7 @@ def _orcid(value: str) -> str:
         total = (total + int(digit)) * 2 if digit.isdecimal() else 0
     check = "0123456789X"[(12 - total % 11) % 11]
     if not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain) or plain[-1] != check:
-        raise ValueError(
-            "is no ORCID, or its check digit is wrong; allowed: such as "
-            "'0000-0002-1825-0097'"
-        )
+        raise ValueError("is no ORCID, or its check digit is wrong; allowed: such as '0000-0002-1825-0097'")
     return plain
 
 

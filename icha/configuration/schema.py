@@ -64,8 +64,6 @@ _HEADINGS = {
     "TurningPoint": "`studies.<name>.turning_points`, each",
     "BoundaryElements": "`finite_range.<name>`",
     "BoundaryElementLoops": "`boundary_element_loops.<name>`",
-    "ErrorSources": "`error_sources.<name>`",
-    "OneAsperity": "`one_asperity`",
     "Measurement": "`measurements.<name>`",
     "Column": "`measurements.<name>.load` and `.area`",
     "Figures": "`figures`",

@@ -1,10 +1,12 @@
 """Section `studies`: surfaces, materials, and the path along which one is pressed against the other."""
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
+    BeforeValidator,
     Field,
     WithJsonSchema,
     WrapValidator,
@@ -12,14 +14,12 @@ from pydantic import (
     model_validator,
 )
 
-from icha.configuration.materials import MaterialSection
-from icha.configuration.surfaces import SURFACE_KINDS
-from icha.configuration.values import SCALAR_SCHEMA, Slope, Slopes, Values, scalar
+from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import ASPERITIES, MODELS
 from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
 from icha.path.targets import Path
-from icha.support.rules import NUMBER, Real
+from icha.support.rules import NUMBER, SLOPE, Real
 from icha.support.values import (
     Flag,
     Length,
@@ -36,7 +36,51 @@ from icha.support.values import (
     list_of_names,
     number,
     stops,
+    to_number,
 )
+
+# The slope of a topography as it was measured.
+MEASURED = "measured"
+
+
+def _slope(value: Any) -> float | str:
+    try:
+        slope = to_number(value)
+    except ValueError as error:
+        if value == MEASURED:
+            return value
+        raise ValueError(f"{error}; allowed: {SLOPE.allowed}, or {MEASURED}") from None
+    if not SLOPE.holds(slope):
+        raise ValueError(f"is out of range; allowed: {SLOPE.allowed}, or {MEASURED}")
+    return slope
+
+
+_ONE_SLOPE = {"anyOf": [{"type": "number", "minimum": SLOPE.least, "maximum": SLOPE.most}, {"const": MEASURED}]}
+Slope = Annotated[Any, BeforeValidator(_slope), WithJsonSchema(_ONE_SLOPE)]
+Slopes = Annotated[
+    list[Slope],
+    BeforeValidator(lambda value: [value] if value == MEASURED else value),
+    Field(min_length=1),
+    AfterValidator(distinct),
+    WithJsonSchema({"anyOf": [{"const": MEASURED}, {"type": "array", "minItems": 1, "items": _ONE_SLOPE}]}),
+]
+SCALAR_SCHEMA = {"type": ["string", "number", "boolean"]}
+
+
+def scalar(value: Any) -> Any:
+    """Refuse what is no single value."""
+    if not isinstance(value, str | int | float):
+        raise ValueError("is no single value; allowed: a number, a text, true or false")
+    return value
+
+
+Values = Annotated[
+    list[Annotated[Any, AfterValidator(scalar)]],
+    BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
+    Field(min_length=1),
+    AfterValidator(distinct),
+    WithJsonSchema({"anyOf": [SCALAR_SCHEMA, {"type": "array", "minItems": 1, "items": SCALAR_SCHEMA}]}),
+]
 
 
 class Targets(Section):
@@ -198,13 +242,6 @@ class Study(Section):
         description="What is imposed: the mean separation or the load. Under load control the state jumps where the "
         "curve turns back, and all targets and turning points must be loads.",
     )
-    united_until: Literal["overlap", "detachment"] = Field(
-        default="overlap",
-        description="How long coalesced spots stay united on the way back: until the two spots that they were made of "
-        "would no longer overlap (`overlap`), or until they detach as a whole and fall back into their "
-        "asperities (`detachment`). Only for the model `asperities`; patches of boundary elements split by "
-        "themselves.",
-    )
     max_step: number(STEP) = Field(
         default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
     )
@@ -218,53 +255,38 @@ class Study(Section):
             return self.targets.states
         return [snapshot.target for snapshot in self.snapshots]
 
-    def check_path(self, snapshots: list[tuple[str, float]] | None) -> None:
-        """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
-        Path(**self.path_settings(snapshots))
-
-    def path_settings(self, snapshots: list[tuple[str, float]] | None, model: str = ASPERITIES) -> dict:
-        """Arguments of the path of a model's runs (`icha.Path`).
-
-        Those that are left at their defaults are left out, and those that mean nothing to the model.
-        """
+    def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
+        """Arguments of the path of the runs (`icha.Path`) but for those that are left at their defaults."""
         settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
         if self.unload or self.turning_points:
             settings |= {
                 "unload": self.unload,
                 "turning_points": [point.target for point in self.turning_points],
                 "control": self.control,
-            } | ({"united_until": self.united_until} if model == ASPERITIES else {})
+            }
         elif self.control != "separation":
             settings["control"] = self.control
         return settings
 
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
         """What keeps it from being run with these snapshots (`Campaign.snapshots_of`)."""
-        yield from self._load_problems()
-        yield from self._path_problems(snapshots)
-
-    def _load_problems(self):
-        """Loads that a slope, the smallest for one, makes too large for the model."""
-        if not self.rms_slopes:
-            return
-        slope = min(self.rms_slopes)
+        # The smallest slope makes the largest reduced pressure.
+        slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
+        most = MAX_REDUCED_PRESSURE * slope
         kept = [] if self.snapshots == EVERY_STOP else self.snapshots
         for key, states in (("snapshots", kept), ("turning_points", self.turning_points)):
             for index, state in enumerate(states or []):
-                if (state.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
-                    yield (
-                        (key, index, "relative_load"),
-                        state.relative_load,
-                        f"at rms slope {slope:g} is a reduced pressure of {state.relative_load / slope:g}; "
-                        f"allowed: relative loads up to {MAX_REDUCED_PRESSURE * slope:g}",
-                    )
+                load = state.relative_load or 0
+                if load > most:
+                    reason = f"at rms slope {slope:g} is a reduced pressure of {load / slope:g}"
+                    yield (key, index, "relative_load"), load, f"{reason}; allowed: relative loads up to {most:g}"
+        if self.unload or self.turning_points or self.control != "separation":
+            yield from self._path_problems(snapshots)
 
     def _path_problems(self, snapshots):
         """What keeps the way back from being a path."""
-        if not (self.unload or self.turning_points or self.control != "separation"):
-            return
         try:
-            self.check_path(snapshots)
+            Path(**self.path_settings(snapshots))
         except ValueError as error:
             key, _, reason = str(error).partition(": ")
             name, _, index = key.partition("[")

@@ -1,24 +1,216 @@
-"""Section `surfaces`, but for measured ones."""
+"""Sections `surfaces` and `materials`: what is pressed against what."""
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import (
-    Field,
-    field_validator,
-)
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
-from icha.configuration.measured_surfaces import MeasuredSurface
-from icha.support.rules import GRID, HURST
-from icha.support.units import conversion_factor
+from icha.support import in_words
+from icha.support.rules import GRID, HURST, LENGTH, Integer, Real
 from icha.support.values import (
+    PATTERN,
     ROUNDING,
     File,
     Length,
+    Modulus,
     Section,
+    SurfaceEnergy,
+    Text,
+    conversion_factor,
     integer,
     number,
+    quantity,
+    to_si,
 )
+
+
+class MaterialSection(Section):
+    """Elastic half-space and interface."""
+
+    model_config = ConfigDict(title="Material")
+
+    contact_modulus: Modulus = Field(description="Composite elastic modulus E*.")
+    surface_energy: SurfaceEnergy = Field(description="Energy of adhesion Δγ per area; `0 J/m^2` is adhesionless.")
+    interaction_range: Length = Field(
+        description="Range ε of the attraction, which sets the separation at which asperities jump into contact. It "
+        "gives a surface of rms curvature 1/R the Tabor parameter μ = (RΔγ²/E*²)^(1/3)/ε."
+    )
+
+
+def _unit_of_length(value: Any) -> float:
+    """Metres of a unit such as `um`, or of a multiple of one such as `0.1 mm`."""
+    allowed = "allowed: a unit of length, such as 'um', or a multiple of one, such as '0.1 mm'"
+    if not isinstance(value, str):
+        raise ValueError(f"is not a unit; {allowed}")
+    is_multiple = value.strip()[:1] in tuple("+-.0123456789")
+    try:
+        metres = to_si(value, "m") if is_multiple else float(conversion_factor(value, "m"))
+    except ValueError as error:
+        raise ValueError(f"{error}; {allowed}") from None
+    if not LENGTH.holds(metres):
+        raise ValueError(f"is not in {LENGTH.interval} m; {allowed}")
+    return metres
+
+
+UnitOfLength = Annotated[
+    float, BeforeValidator(_unit_of_length), WithJsonSchema({"type": "string", "examples": ["um", "0.1 mm"]})
+]
+Position = quantity(Real("m", least=0), "20 um")
+
+
+def _sides(value: Any) -> tuple[float, float]:
+    """The sides of a scan along x and y, m: one length, or a list of two."""
+    sides = value if isinstance(value, list | tuple) else [value, value]
+    allowed = "allowed: one length, such as '90 um', or a list of two: along x and y"
+    if len(sides) != 2:
+        raise ValueError(f"has {len(sides)} entries; {allowed}")
+    try:
+        metres = tuple(to_si(side, "m") for side in sides)
+    except ValueError as error:
+        raise ValueError(f"{error}; {allowed}") from None
+    if not all(map(LENGTH.holds, metres)):
+        raise ValueError(f"is not in {LENGTH.interval} m; {allowed}")
+    return metres
+
+
+_LENGTH_SCHEMA = {"type": "string", "pattern": PATTERN, "examples": ["90 um"]}
+Sides = Annotated[
+    tuple[float, float],
+    BeforeValidator(_sides),
+    WithJsonSchema(
+        {"anyOf": [_LENGTH_SCHEMA, {"type": "array", "items": _LENGTH_SCHEMA, "minItems": 2, "maxItems": 2}]}
+    ),
+]
+
+
+class Crop(Section):
+    """The square that is cut out of a scan."""
+
+    x: Position = Field(description="Distance of its left edge from that of the scan.")
+    y: Position = Field(description="Distance of its first row from that of the scan.")
+    side: Length = Field(description="Its side.")
+
+    def __repr__(self):
+        """How messages call it."""
+        side, x, y = map(in_words.length, (self.side, self.x, self.y))
+        return f"a square of {side} at x = {x}, y = {y}"
+
+
+class MeasuredSurface(Section):
+    """A measured topography, prepared as the keys say. The mean height is always removed."""
+
+    random: ClassVar[bool] = False
+    # Nothing is known of the waves of a file.
+    cells_per_short_wave: ClassVar[float] = math.inf
+
+    kind: Literal["measured"] = Field(description="Topography from a measurement.")
+    path: File = Field(description="File of the topography. Relative to the configuration file.")
+    format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = Field(
+        default="auto",
+        description="Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y "
+        "z per line in any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a format "
+        "of a microscope that SurfaceTopography can read). `auto` decides by the ending of the file's name "
+        "and, for text, by the number of columns.",
+    )
+    columns: Annotated[list[integer(Integer(1))], Field(min_length=3, max_length=3)] | None = Field(
+        default=None,
+        description="Which columns of a text are x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has "
+        "more than three numbers.",
+    )
+    data: Text | None = Field(
+        default=None,
+        description="Which data to use, if the file has several: name of the variable (netcdf), path of the dataset "
+        "(hdf5), name of the channel (instrument). Left out: the only one, or the default of the file.",
+    )
+    first_axis: Literal["y", "x"] = Field(
+        default="y",
+        description="First axis of the array in npy, netcdf, hdf5 and matrix files: `y`, so that a row is a line along "
+        "x, or `x`. Not used where the dimensions in the file are named x and y.",
+    )
+    height_unit: UnitOfLength | None = Field(
+        default=None,
+        description="Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file has it; replaces what the "
+        "file says.",
+    )
+    lateral_unit: UnitOfLength | None = Field(
+        default=None,
+        description="Unit of the coordinates x and y; for fourier, of 1/q. Left out: what the file says, or the unit "
+        "of the heights.",
+    )
+    size: Sides | None = Field(
+        default=None,
+        description="Size of the whole scan: one length, or two, along x and y. The size of a pixel is this divided by "
+        "the number of pixels. Needed unless the file has it; replaces what the file says.",
+    )
+    touches_first: Literal["high", "low"] = Field(
+        default="high",
+        description="Which points touch first: those with the largest numbers in the file (`high`), or with the "
+        "smallest (`low`).",
+    )
+    missing: Literal["refuse", "fill"] = Field(
+        default="refuse",
+        description="What to do with points without a height: `refuse` the file, or `fill` them by the solution of "
+        "Laplace's equation.",
+    )
+    crop: Crop | None = Field(
+        default=None, description="The square that is used. Left out: the largest one, in the middle."
+    )
+    detrend: Literal["none", "tilt", "curvature"] | None = Field(
+        default=None,
+        description="What is removed besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid "
+        "(`curvature`). Left out: `tilt`, or `none` for a periodic topography.",
+    )
+    cutoff: Length | None = Field(
+        default=None,
+        description="Cut-off wavelength: shorter waves are taken out, before the edges are treated, by a Gaussian "
+        "S-filter (ISO 25178-3, areal filter of ISO 16610-61) with this nesting index, which halves waves of this "
+        "length. At least 4 pixels. Left out: nothing is filtered.",
+    )
+    boundary: Literal["periodic", "window", "mirror", "free"] = Field(
+        description="What lies beyond the edges: `periodic`: the topography repeats as it is; `window`: its heights "
+        "fall smoothly to their mean towards the edges, and it repeats; `mirror`: the topography and its "
+        "mirror images form a periodic cell of twice the side; `free`: nothing, that is, one square on a "
+        "half-space that extends beyond it."
+    )
+    taper: number(Real(above=0, most=0.5)) | None = Field(
+        default=None,
+        description="With `window`: the part of the side, at each edge, over which heights fall. Left out: 0.1.",
+    )
+    grid: integer(GRID) | None = Field(
+        default=None,
+        description="Nodes along a side of the prepared surface, which is resampled by Fourier interpolation; a "
+        "coarser grid loses the shortest waves. Left out: as many as the scan has (`mirror`: twice as "
+        "many).",
+    )
+
+    @model_validator(mode="after")
+    def _keys_fit_the_boundary(self):
+        if self.boundary == "periodic" and self.detrend not in (None, "none"):
+            raise ValueError(
+                f"detrend: {self.detrend!r} would break the periodicity; allowed: detrend none, or another boundary"
+            )
+        if self.boundary == "periodic" and self.crop is not None:
+            raise ValueError("crop: a part of a periodic topography is not periodic; allowed: another boundary")
+        if self.taper is not None and self.boundary != "window":
+            raise ValueError(f"taper: is for boundary window, this one is {self.boundary}; allowed: leave it out")
+        if self.format == "fourier" and self.boundary != "periodic":
+            raise ValueError(f"boundary: {self.boundary!r} for a Fourier series, which is periodic; allowed: periodic")
+        if self.format == "fourier" and self.missing == "fill":
+            raise ValueError("missing: a Fourier series has no missing points; allowed: leave it out")
+        return self
+
+    @property
+    def preparation(self) -> dict:
+        """What `icha.surfaces.measured.settings.Preparation` takes: everything but kind and path, in SI units."""
+        settings = self.model_dump(exclude={"kind", "path"})
+        settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
+        settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
+        if self.cutoff is None:
+            # Known by its absence, so that results without it stay valid.
+            del settings["cutoff"]
+        if self.columns is None:
+            del settings["columns"]
+        return settings
 
 
 class SelfAffineSurface(Section):
@@ -44,35 +236,32 @@ class SelfAffineSurface(Section):
     )
 
     @property
+    def lengths_and_hurst(self) -> tuple[float, float, float, float]:
+        """Period, roll-off and shortest wavelength (m), and the Hurst exponent."""
+        return self.period, self.rolloff_wavelength, self.short_wavelength, self.hurst
+
+    @property
     def cells_per_short_wave(self) -> float:
         """Grid cells per shortest wavelength."""
         return self.grid * self.short_wavelength / self.period
 
-    @field_validator("rolloff_wavelength")
-    @classmethod
-    def _q0_not_below_ql(cls, value, info):
-        period = info.data.get("period")
-        if period is not None and value > period * (1 + ROUNDING):
-            raise ValueError(f"is longer than the period (q0 < qL); allowed: at most {period:g} m")
-        return value
+    def grid_of_cells(self, cells: int) -> int:
+        """The least grid with so many cells per shortest wavelength."""
+        return math.ceil(cells * self.period / self.short_wavelength * (1 - ROUNDING))
 
-    @field_validator("short_wavelength")
+    @field_validator("rolloff_wavelength", "short_wavelength", "grid")
     @classmethod
-    def _q1_above_q0(cls, value, info):
-        rolloff = info.data.get("rolloff_wavelength")
-        if rolloff is not None and value >= rolloff * (1 - ROUNDING):
-            raise ValueError(
-                f"is not shorter than the roll-off wavelength (q1 <= q0); allowed: less than {rolloff:g} m"
-            )
-        return value
-
-    @field_validator("grid")
-    @classmethod
-    def _grid_holds_the_spectrum(cls, value, info):
-        period, short = info.data.get("period"), info.data.get("short_wavelength")
-        if period is None or short is None:
-            return value
-        if value * short / period < 2 * (1 - ROUNDING):
+    def _waves_fit_into_one_another(cls, value, info):
+        """Order of the wave vectors qL <= q0 < q1, and a grid that holds them."""
+        period, rolloff, short = map(info.data.get, ("period", "rolloff_wavelength", "short_wavelength"))
+        if info.field_name == "rolloff_wavelength":
+            if period is not None and value > period * (1 + ROUNDING):
+                raise ValueError(f"is longer than the period (q0 < qL); allowed: at most {period:g} m")
+        elif info.field_name == "short_wavelength":
+            if rolloff is not None and value >= rolloff * (1 - ROUNDING):
+                reason = "is not shorter than the roll-off wavelength (q1 <= q0)"
+                raise ValueError(f"{reason}; allowed: less than {rolloff:g} m")
+        elif None not in (period, short) and value * short / period < 2 * (1 - ROUNDING):
             least = math.ceil(2 * period / short * (1 - ROUNDING))
             raise ValueError(
                 f"gives {value * short / period:.3g} grid cells per shortest wavelength, but at least 2 are needed; "
@@ -85,30 +274,23 @@ class FileSurface(Section):
     """A periodic height map from a file, for example a surface that others have published."""
 
     random: ClassVar[bool] = False
+    # Nothing is known of the waves of a file.
+    cells_per_short_wave: ClassVar[float] = math.inf
 
     kind: Literal["file"] = Field(description="Surface read from a file.")
     path: File = Field(
         description="File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a "
         "variable `height`. Relative to the configuration file. Heights point towards the elastic body."
     )
-    height_unit: Annotated[str, Field(strict=True)] = Field(
+    height_unit: UnitOfLength = Field(
         description="Unit of the heights in the file, such as `um`. All studies scale the heights to their rms slopes."
     )
     period: Length = Field(description="Side L of the periodic cell.")
 
-    @field_validator("height_unit")
-    @classmethod
-    def _is_a_length(cls, value):
-        try:
-            conversion_factor(value, "m")
-        except ValueError as error:
-            raise ValueError(f"{error}; allowed: a unit of length, such as 'um'") from None
-        return value
-
     @property
     def metres_per_unit(self) -> float:
         """The unit of the heights, in m."""
-        return float(conversion_factor(self.height_unit, "m"))
+        return self.height_unit
 
 
 # By the value of their key `kind`.

@@ -1,12 +1,19 @@
 """The builder of datasets: values by name, and a table of the vocabulary that describes them."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from icha.datasets.variables.terms import Table, Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Lower and upper edge of a bin, as CF has bounds.
+BOUND = "bound"
 
 
 def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
@@ -23,6 +30,8 @@ def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> 
     ValueError
         If a value has no description.
     """
+    import xarray as xr  # which takes a while, and the vocabulary needs no more than `bin_table`
+
     variables = described(table, values)
     coordinates = {name: variables.pop(name) for name in table if name in variables and table[name].coordinate}
     return xr.Dataset(variables, coordinates, attrs)
@@ -37,6 +46,8 @@ def described(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]
 
 def variable(description: Variable, values: Any) -> xr.Variable:
     """A variable with the dimensions, type and attributes of its description."""
+    import xarray as xr
+
     dtype = object if description.dtype is str else description.dtype
     return xr.Variable(description.dims, np.asarray(values, dtype), description.attributes)
 
@@ -70,3 +81,35 @@ def joined(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: 
     names = [name for name, own in table.items() if own.dims == (dim,) and name != index]
     values = {name: np.concatenate([np.empty(0), *(row[name] for row in rows)]) for name in names}
     return values | {index: np.repeat(np.arange(len(rows)), [len(row[names[0]]) for row in rows])}
+
+
+def bin_table(quantity: str, units: str, over: str = "") -> Table:
+    """Descriptions of the variables that say where the bins of a quantity are.
+
+    `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
+    bounds (CF 1.11, section 7.1), which have its units and its long name. In Pa it must not be a coordinate
+    variable, along a dimension of its own name, which CF would take for a height.
+
+    Parameters
+    ----------
+    quantity : what is binned.
+    units : of the edges.
+    over : by what the quantity is divided, if by anything.
+    """
+    over = f" over {over}" if over else ""
+    bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
+    middle = {"bounds": f"{bins}_bounds", "comment": "middle of the bin"}
+    return {
+        f"{bins}_edges": Variable((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
+        f"{bins}_centre": Variable((bins,), units, inside, further=middle, coordinate=True),
+        f"{bins}_bounds": Variable((bins, BOUND), units, inside),
+    }
+
+
+def bin_values(quantity: str, edges: np.ndarray) -> dict[str, np.ndarray]:
+    """Values of the variables of `bin_table`."""
+    return {
+        f"{quantity}_bin_edges": edges,
+        f"{quantity}_bin_centre": (edges[:-1] + edges[1:]) / 2,
+        f"{quantity}_bin_bounds": np.column_stack([edges[:-1], edges[1:]]),
+    }

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign
-from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.places import labels_at, place_of, slopes_at
+from icha.datasets.labels import LABELS, RunLabels, labels_at, place_of, slopes_at
 from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED
 from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN

@@ -1,4 +1,4 @@
-"""Paths of the files of a campaign below its folder of results; in braces what differs from one to the next."""
+"""Paths of the files of a campaign below its folder of results, in braces what differs; how their arrays are stored."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ RUN = f"runs/{labels.RUN}.nc"
 THEORIES = "references/{surface}.nc"
 SOLUTION = f"references/boundary_elements/{labels.SOLUTION}.nc"
 LOOP = f"references/loops/{labels.CONTACT}.nc"
-ERROR_SOURCES = f"references/error_sources/{labels.CONTACT}.nc"
-ONE_ASPERITY = "references/one_asperity/{asperity}.nc"
 DATASET = "dataset/{campaign}.nc"
 COMPARISON = "aggregated/{campaign}.nc"
 MODEL_ERROR = "aggregated/model_error.nc"
@@ -52,3 +50,14 @@ def job_file(path: str, kind: str, ending: str) -> str:
     # Kinds of references have their own folders; the theories of the surfaces have none.
     job = rest if folder == "references" and "/" in rest else path
     return f"{kind}/{job.rpartition('.')[0]}{ending}"
+
+
+# As measured by benchmarks/storage.py (docs/reference/dataset.md): smaller arrays lose by being cut into chunks what
+# compression gains.
+LEAST_COMPRESSED = 1024
+# Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
+COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
+COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
+
+# Bytes of an array of a campaign dataset beyond which it is not read as a whole.
+LEFT_IN_FILE = 2**26

@@ -20,7 +20,7 @@ from rocrate.model import ContextEntity, Dataset, Entity, File
 from rocrate.rocrate import ROCrate
 
 from icha.configuration.publication import Author, Publication
-from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.attributes import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
 from icha.deposit.metadata import known_licence, web_address
 from icha.deposit.verify import CRATE, README, SOURCE

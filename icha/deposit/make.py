@@ -15,8 +15,8 @@ import xarray as xr
 
 from icha.analysis.checks import read_checks, refuse_unknown_failures
 from icha.configuration.campaign import Campaign
+from icha.configuration.cases import campaign_sha256, run_sha256
 from icha.configuration.publication import Publication
-from icha.configuration.settings import campaign_sha256, run_sha256
 from icha.datasets.files import read_campaign
 from icha.deposit.crate import Job, write_crate
 from icha.deposit.metadata import citation_cff, datacite_metadata, known_licence, zenodo_metadata
@@ -26,7 +26,7 @@ from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_
 from icha.planning.costs import Cost
 from icha.planning.plan import read_attributes
 from icha.planning.results import campaign_files
-from icha.support.atomic_files import moving, sync_folder, whole_file
+from icha.support.atomic_files import sync_folder, while_owned, whole_file
 from icha.support.checksums import is_whole, made_as, sha256_of, stale
 
 _BLOCK = 2**20
@@ -87,7 +87,7 @@ def make_deposit(
         with whole_file(archive) as temporary:
             _write_zip(temporary, part, folder.name)
             sync_folder(part)
-            with moving():
+            with while_owned():
                 # What was here before goes at once, and its checksums with it.
                 archive.unlink(missing_ok=True)
                 _remove(folder)
@@ -142,7 +142,7 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     expected[files.dataset] = campaign_sha256(campaign)
     wrong = dict(stale(results, recorded))
     for path, sha256 in expected.items():
-        if read_attributes(results / path).get("config_sha256") != sha256:
+        if (read_attributes(results / path) or {}).get("config_sha256") != sha256:
             wrong[path] = "it was not computed with the settings of this campaign"
     for path, asked in recorded.items():
         if asked != made_as(results, path):

@@ -21,26 +21,25 @@ from icha.checks.findings import Check
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
 from icha.configuration.surfaces import SelfAffineSurface
+from icha.datasets.attributes import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
-from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.model_paper import MODEL_PAPER
-from icha.datasets.places import slopes_of
-from icha.datasets.results import ERROR_SOURCES, LOOP, ONE_ASPERITY, RUN, SOLUTION, SURFACE, THEORIES
+from icha.datasets.labels import LABELS, RunLabels, slopes_of
+from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.deposit.metadata import acknowledgement, known_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
-from icha.planning.software import further_software
+from icha.planning.needs import further_software
 from icha.support import in_words
 
 _TEMPLATE = "README.md.jinja"
 # Placeholders for what differs between files of one kind.
 _PLACEHOLDERS = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
-_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "asperity": "<name>", "model_folder": ""}
+_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "model_folder": ""}
 # Kinds of files by the beginning of a path and the number of its parts.
 _KINDS = {
     (pattern.partition("/{")[0], len(PurePosixPath(kind).parts)): kind
-    for pattern in (SURFACE, RUN, SOLUTION, LOOP, ERROR_SOURCES, ONE_ASPERITY, THEORIES)
+    for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
     for kind in {pattern.format(**_PLACEHOLDERS | {"model_folder": folder}) for folder in ("", "<model>/")}
 }
 # Numbers of a variable that are read at once.
@@ -261,7 +260,7 @@ def _asked(campaign: Campaign) -> dict:
         "adhesive": any(material.surface_energy > 0 for material in campaign.materials.values()),
         "both_ways": any(study.unload or study.turning_points for study in campaign.studies.values()),
         "installed": (*further_software(campaign), "environment")[0],
-        "free": any(campaign.boundary(name) == "free" for name in campaign.surfaces),
+        "free": any(campaign.is_free(name) for name in campaign.surfaces),
     }
 
 

@@ -15,16 +15,15 @@ from pathlib import Path
 import netCDF4
 
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.load import load_configuration
-from icha.configuration.named_files import FOLDER as INPUTS
+from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
 from icha.deposit.program import PROGRAM, differences
 from icha.deposit.verify import CHECKSUMS, COMPUTED, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
-from icha.support.hdf5 import refuse_traps
 from icha.support.in_words import counted
+from icha.support.input_files import refuse_traps
 from icha.support.program import own_workflow, package_of
 from icha.support.values import NAME_PATTERN
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from icha.support import in_words
 from icha.support.checksums import sha256_of
-from icha.support.printable import is_printable, printable
+from icha.support.in_words import is_printable, printable
 
 CHECKSUMS = "SHA256SUMS"
 # Files by which a deposit describes itself: to readers, as an RO-Crate, to Zenodo.

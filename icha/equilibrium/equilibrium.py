@@ -3,9 +3,9 @@
 With adhesion contact forms and breaks in jumps. As soon as Newton's iteration is close to an equilibrium, all jumps and
 unions that apply happen at once, and the iteration goes on from there.
 
-Unions are undone when the surfaces part: as the problem says, where a united spot detaches, which then falls back into
-its asperities (those that a stable state of the law holds stay in contact), or before, where the two spots that it was
-made of would no longer overlap.
+Unions are undone when the surfaces part: where the two spots that a united one was made of would no longer overlap; or
+where it lets go before that, and falls back into its asperities (those that a stable state of the law holds stay in
+contact).
 """
 
 import hashlib

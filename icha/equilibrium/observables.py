@@ -9,7 +9,7 @@ from icha.contact.observables import summit_counts
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import ContactState
-from icha.surfaces.summit_coverage import SummitCoverage
+from icha.surfaces.summits import SummitCoverage
 from icha.surfaces.surface import Surface
 
 

@@ -1,11 +1,10 @@
-"""The problem: a law of one spot, the summits of one surface, and how long united spots stay united."""
+"""The problem: a law of one spot and the summits of one surface."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from icha.asperity.law import SpotLaw
-from icha.contact.unions import OVERLAP
 from icha.surfaces.summits import Asperities
 
 
@@ -13,15 +12,13 @@ from icha.surfaces.summits import Asperities
 class Problem:
     """Asperities in contact with a half-space.
 
-    law: of one spot. rms_height: the length that makes errors of an equilibrium dimensionless, m. united_until:
-    OVERLAP, where the two that united spots were made of would just touch, or DETACHMENT, where they let go as a whole.
-    jump_in: the asperities' jump-in approaches (n,), m.
+    law: of one spot. rms_height: the length that makes errors of an equilibrium dimensionless, m. jump_in:
+    the asperities' jump-in approaches (n,), m.
     """
 
     law: SpotLaw
     asperities: Asperities
     rms_height: float
-    united_until: str = OVERLAP
     jump_in: np.ndarray = field(init=False)
 
     def __post_init__(self):

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from icha.contact.events import JUMP_IN, SPLIT, Events
-from icha.contact.unions import OVERLAP
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.sites import CONTACT, Sites
 from icha.equilibrium.states import ContactState
@@ -17,7 +16,7 @@ from icha.equilibrium.states import ContactState
 class Search:
     """A search between two equilibria, immutable: events and Newton's steps lead from one to the next.
 
-    start: the state it begins from. parting: whether unions end where their two spots would no longer overlap.
+    start: the state it begins from. parting: whether the surfaces part.
     Arrays of the asperities' length: holder, seen, seen_at as in `ContactState`; fallen, the united spot that an
     asperity has just fallen out of, -1 for others; has_fallen, whether it has before; locked, whether it has broken
     contact here and may not make it again at this separation.
@@ -52,7 +51,7 @@ class Search:
         return cls(
             problem=problem,
             start=state,
-            parting=problem.united_until == OVERLAP and separation > state.separation,
+            parting=separation > state.separation,
             sites=sites,
             holder=state.holder if index is None else index[state.holder],  # -1 looks up the last
             seen=state.seen,

@@ -49,7 +49,7 @@ class Sites:
     """Table of sites, arrays of length n, and the half-space with a point at every one.
 
     position (n, 2), height, radius_of_curvature, jump_off (approach): m. asperity: its index, -1 for united spots.
-    members: asperities united in it. parts: the Union that it is, None for others and where that is not kept.
+    members: asperities united in it. parts: the Union that it is, None for others.
     parted: number of the union out of which a spot has come, -1 for others. status: CONTACT, TRIAL or GONE. approach:
     the last one known, m. response: d(delta)/du. known: whether it was in contact before the search. arranged: number
     of sites when the half-space was made.

@@ -22,7 +22,6 @@ class Campaign(Protocol):
     materials: Mapping[str, Any]
     finite_range: Mapping[str, Any]
     boundary_element_loops: Mapping[str, Any]
-    error_sources: Mapping[str, Any]
     measurements: Mapping[str, Any]
 
     def contacts(self, study: str) -> list[tuple[str, int, float, str]]:

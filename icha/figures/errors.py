@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.datasets.places import place_of, surfaces_and_slopes
+from icha.datasets.labels import place_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.datasets import results
-from icha.datasets.places import place_of
+from icha.datasets.labels import place_of
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.datasets import results
-from icha.datasets.places import place_of
+from icha.datasets.labels import place_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import material_looks, model_name, plausible, say_which_snapshots
 from icha.figures.declaration import Campaign, Declaration, Inputs

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from icha.datasets import results
-from icha.datasets.measured_table import read_columns
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
@@ -33,6 +32,7 @@ from icha.figures.style import (
     panel_label,
     styled,
 )
+from icha.support.input_files import read_columns
 
 if TYPE_CHECKING:
     import xarray as xr

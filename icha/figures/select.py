@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.contact.models import BOUNDARY_ELEMENTS, first_of
-from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.places import place_of, slopes_of
+from icha.datasets.labels import LABELS, RunLabels, place_of, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.style import number, slope_label
 

@@ -2,7 +2,7 @@
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.attributes import MODEL_PAPER
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.observables import AsperityObservables
 from icha.models.model import Model
@@ -12,7 +12,7 @@ from icha.surfaces.surface import Surface
 
 
 def _observables(surface: Surface, material: Material, path: Path) -> AsperityObservables:
-    contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, path.united_until)
+    contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
     return AsperityObservables(contact, surface)
 
 
@@ -24,6 +24,5 @@ MODEL = Model(
         "L. Afferrante, G. Carbone and G. Demelio, Wear 278-279 (2012) 28-33, doi:10.1016/j.wear.2011.12.013; "
         "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
     ),
-    united_by_rule=True,
     observables=_observables,
 )

@@ -34,7 +34,6 @@ MODEL = Model(
         "K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. A 324 (1971) 301-313, doi:10.1098/rspa.1971.0141; "
         "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
     ),
-    united_by_rule=False,
     observables=_observables,
     kept=_kept,
 )

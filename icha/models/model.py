@@ -19,7 +19,6 @@ class Model:
     ----------
     title, method : what it is, for the title and the summary of a run.
     references : publications of its methods.
-    united_by_rule : whether the path's `united_until` means something to it.
     observables : of the contact of a surface and a material, for a path; ValueError if it cannot be computed.
     kept : its contact with equilibria kept in a folder; None if it has none that take long.
     """
@@ -27,6 +26,5 @@ class Model:
     title: str
     method: str
     references: str
-    united_by_rule: bool
     observables: Callable[[Surface, Material, Path], Observables]
     kept: Callable[[ContactModel, pathlib.Path], ContactModel] | None = None

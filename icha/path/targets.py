@@ -4,7 +4,6 @@ import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from icha.contact.unions import OVERLAP, UNITED_UNTIL
 from icha.path.limits import DEFAULT_STEP, LEAST_PRESSURE, STATES, STEP
 from icha.support.rules import NUMBER
 
@@ -62,8 +61,6 @@ class Path:
         first contact.
     control : "separation": the mean separation is imposed. "load": the load is; the state runs along the same curve
         and jumps, at constant load, where it would have to turn back. Then all stops and turning points are loads.
-    united_until : how long united spots stay united on the way back: "overlap", where the two spots that they were
-        made of would just touch, or "detachment", where they detach as a whole and fall back into their asperities.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
@@ -76,7 +73,6 @@ class Path:
     turning_points: tuple[Target, ...]
     unload: bool
     control: str
-    united_until: str
     max_step: float
 
     def __init__(
@@ -89,7 +85,6 @@ class Path:
         turning_points: Iterable[tuple[str, float]] = (),
         unload: bool = False,
         control: str = SEPARATION_CONTROL,
-        united_until: str = OVERLAP,
         max_step: float = DEFAULT_STEP,
     ) -> None:
         """Check the values and build the list of stops."""
@@ -98,8 +93,6 @@ class Path:
             raise ValueError(f"unload: {unload!r} is neither True nor False")
         if control not in CONTROLS:
             raise ValueError(f"control: {control!r} must be one of {', '.join(CONTROLS)}")
-        if united_until not in UNITED_UNTIL:
-            raise ValueError(f"united_until: {united_until!r} must be one of {', '.join(UNITED_UNTIL)}")
         max_step = STEP.checked("max_step", max_step)
         values = _stops(LISTS[kind], kind, values)
         wanted = _wanted([(kind, values[-1])] if snapshots is None else snapshots)
@@ -113,7 +106,6 @@ class Path:
         object.__setattr__(self, "turning_points", turns)
         object.__setattr__(self, "unload", unload)
         object.__setattr__(self, "control", control)
-        object.__setattr__(self, "united_until", united_until)
         object.__setattr__(self, "max_step", max_step)
 
     @property

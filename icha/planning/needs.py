@@ -1,14 +1,84 @@
-"""What a campaign needs against what the machine has, before it is begun."""
+"""What a campaign needs: memory, time and cores for its jobs, room on the disk, and software that only some need."""
 
+import importlib.util
 import math
 import os
 import shutil
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
+from icha.configuration.boundary_elements import BesideStudy
+from icha.configuration.campaign import Campaign
+from icha.contact.models import ASPERITIES
+from icha.datasets.labels import RunLabels
+from icha.planning.costs import MAP_ARRAYS, PATCH_ARRAYS, job_threads
 from icha.planning.plan import Item, memory_on
 from icha.support import in_words
 from icha.support.in_words import counted
+
+TAMAAS = "tamaas"
+# Sections of a campaign that ask for boundary elements at finite ranges.
+BY_TAMAAS = ("finite_range", "boundary_element_loops")
+
+
+def further_software(campaign: Campaign) -> tuple[str, ...]:
+    """Packages that a campaign needs besides those that every campaign needs."""
+    return (TAMAAS,) if _sections(campaign) else ()
+
+
+def missing_software(campaign: Campaign) -> str | None:
+    """What is not installed that a campaign needs, and how to install it; None if all is there."""
+    if not further_software(campaign) or importlib.util.find_spec(TAMAAS):
+        return None
+    return (
+        f"{', '.join(_sections(campaign))}: solved by Tamaas, which is not installed; `make tamaas` installs it in a "
+        "clone, `pip install tamaas` elsewhere. It is an extra of the package, for its licence is AGPL-3.0-or-later."
+    )
+
+
+def _sections(campaign):
+    return [name for name in BY_TAMAAS if getattr(campaign, name)]
+
+
+def surface_threads(campaign: Campaign, surface: str) -> int:
+    """Cores for a surface and its runs: one, with runs side by side, but where transforms of large arrays pay."""
+    return job_threads(campaign.grid(surface))
+
+
+def _megabytes(program: float, arrays: float, nodes: int) -> int:
+    """Memory of a job that holds some arrays of `nodes` a side besides its program, MB."""
+    return int(program + arrays * 8e-6 * nodes**2)
+
+
+def surface_memory(campaign: Campaign, surface: str) -> int:
+    """Megabytes for making a surface, or a run of asperities on it."""
+    return _megabytes(600, 4, campaign.grid(surface))
+
+
+def run_memory(campaign: Campaign, case: RunLabels) -> int:
+    """Megabytes for a run."""
+    arrays = 4 if case.model == ASPERITIES else 1.25 * PATCH_ARRAYS
+    return _megabytes(600, arrays, campaign.grid(case.surface))
+
+
+def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
+    """Megabytes for boundary elements at a finite range."""
+    return _megabytes(400, 30, campaign.grid(surface) * entry.refinement)
+
+
+def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
+    """Megabytes for a figure, which may hold the largest topography, and who is in contact where by both models."""
+    largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
+    return _megabytes(1000, max(MAP_ARRAYS.values()) * holds_topography, largest)
+
+
+def run_minutes(campaign: Campaign, case: RunLabels) -> int:
+    """Minutes after which a run is taken for stuck: many times what such runs have taken."""
+    if surface_threads(campaign, case.surface) > 1:
+        return 240 if case.model == ASPERITIES else 1440
+    asked = campaign.studies[case.study]
+    minutes = 120 if asked.unload or asked.turning_points else 30
+    return minutes if case.model == ASPERITIES else 8 * minutes
 
 
 def memory_of_machine() -> int:

@@ -9,20 +9,19 @@ from functools import cache
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.settings import run_settings, run_sha256
+from icha.configuration.cases import run_settings, run_sha256
 from icha.contact.models import ASPERITIES
 from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
-from icha.datasets.places import count_cells
+from icha.datasets.labels import count_cells
 from icha.datasets.results import ResultFiles, job_file
 from icha.figures.registry import DECLARATIONS
 from icha.planning import costs
-from icha.planning.constants import FITTED, Constants
-from icha.planning.resources import run_threads
+from icha.planning.costs import WORKFLOW
 from icha.planning.results import CampaignFiles, campaign_files
-from icha.planning.roughness import roughness
+from icha.planning.validity import expected_summits
 from icha.support.checksums import is_whole
-from icha.support.hdf5 import text
+from icha.support.input_files import text
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
 # So many of the files that are there are compared with what was expected of them.
@@ -57,7 +56,7 @@ class Item:
         return self.state in (TO_DO, CHANGED, DAMAGED)
 
 
-def plan(campaign: Campaign, results: Path, of: Constants = FITTED) -> list[Item]:
+def plan(campaign: Campaign, results: Path) -> list[Item]:
     """All files of a campaign but those that cost next to nothing, in the order in which they are made.
 
     A run counts as done if its file is there and was made with the present settings (`config_sha256`); whether the
@@ -69,17 +68,16 @@ def plan(campaign: Campaign, results: Path, of: Constants = FITTED) -> list[Item
     ----------
     campaign : the campaign.
     results : its folder of results. Benchmarks in there of jobs that were done say how fast this machine is.
-    of : constants of the costs.
     """
-    return list(_calibrated(_items(campaign, results, of), results))
+    return list(_calibrated(_items(campaign, results), results))
 
 
-def _items(campaign, results, of) -> list[Item]:
+def _items(campaign, results) -> list[Item]:
     files = campaign_files(campaign)
-    items = list(_computed(campaign, results, files, of))
+    items = list(_computed(campaign, results, files))
     made_anew = {item.path for item in items if item.to_do}
-    for part, path, stage, inputs, cost in _gathered(campaign, files, items, of):
-        state = _there(results, path)
+    for part, path, stage, inputs, cost in _gathered(campaign, files, items):
+        state = _state(results, path)
         if state == DONE and not made_anew.isdisjoint(inputs):
             state = TO_DO
         items.append(Item(part, path, state, cost, stage=stage))
@@ -88,89 +86,58 @@ def _items(campaign, results, of) -> list[Item]:
     return items
 
 
-def _there(results, path):
+def _state(results, path):
     return TO_DO if not (results / path).is_file() else DONE if is_whole(results, path) else DAMAGED
 
 
-def _computed(campaign, results, files, of) -> Iterator[Item]:
+def _computed(campaign, results, files) -> Iterator[Item]:
     """Surfaces, runs, and what is computed beside them."""
-    grid = campaign.grid
-    rough = cache(lambda surface: roughness(campaign, surface))
-
-    def there(part, path, cost, threads=1):
-        return Item(part, path, _there(results, path), cost, threads)
-
-    def beside(part, entries, cases, cost, asked):
-        for path, case in cases.items():
-            entry = entries[case.entry]
-            adhesive = campaign.materials[case.material].surface_energy > 0
-            nodes = grid(case.surface) * entry.refinement
-            yield there(f"{part} {case.entry}", path, cost(nodes, asked(entry, case), of, adhesive=adhesive))
-
+    summits, run_cost = cache(lambda surface: expected_summits(campaign, surface)), cache(costs.run_cost)
     for path, (name, _) in files.surfaces.items():
-        yield there("surfaces", path, costs.surface_cost(grid(name), of), costs.job_threads(grid(name)))
-    sweep_cost, patch_cost = cache(costs.sweep_cost), cache(costs.patch_cost)
+        grid = campaign.grid(name)
+        yield Item("surfaces", path, _state(results, path), costs.surface_cost(grid), costs.job_threads(grid))
     for path, case in files.runs.items():
         state, reason = run_state(results / path, run_sha256(campaign, case))
         if not is_whole(results, path):
             state, reason = DAMAGED, ""
-        surface = rough(case.surface)
-        settings = _described(run_settings(campaign, case), case.rms_slope, surface)
-        part, cores = f"study {case.study}", run_threads(campaign, case)
-        if case.model == ASPERITIES:
-            cost = sweep_cost(surface, settings, of)
-        else:
-            cost = patch_cost(surface, settings, of)
-            part = f"{part}, boundary elements"
-        yield Item(part, path, state, cost, cores, reason)
+        grid = campaign.grid(case.surface)
+        sweep = _sweep_of(run_settings(campaign, case), case.rms_slope)
+        cost = run_cost(case.model, grid, summits(case.surface), **sweep)
+        part = f"study {case.study}" + (", boundary elements" if case.model != ASPERITIES else "")
+        yield Item(part, path, state, cost, costs.job_threads(grid), reason)
     for path in files.theories:
-        yield there("theories", path, costs.theories_cost(of))
-    yield from beside(
-        "boundary elements",
-        campaign.finite_range,
-        files.solutions,
-        costs.solution_cost,
-        lambda entry, case: case.reduced_pressure,
-    )
-    yield from beside(
-        "boundary elements both ways",
-        campaign.boundary_element_loops,
-        files.loops,
-        costs.loop_cost,
-        lambda entry, case: entry.separation_step,
-    )
-    yield from beside(
-        "error sources",
-        campaign.error_sources,
-        files.error_sources,
-        costs.sources_cost,
-        lambda entry, case: tuple(entry.reduced_pressures),
-    )
-    for path, tabor_parameter in files.one_asperity.items():
-        yield there("one asperity", path, costs.one_asperity_cost(tabor_parameter, of))
+        yield Item("theories", path, _state(results, path), costs.theories_cost())
+    for path, case in {**files.solutions, **files.loops}.items():
+        both_ways = path in files.loops
+        entry = (campaign.boundary_element_loops if both_ways else campaign.finite_range)[case.entry]
+        nodes = campaign.grid(case.surface) * entry.refinement
+        adhesive = campaign.materials[case.material].surface_energy > 0
+        if both_ways:
+            cost = costs.loop_cost(nodes, entry.separation_step, adhesive=adhesive)
+        else:
+            cost = costs.solution_cost(nodes, case.reduced_pressure, adhesive=adhesive)
+        part = f"boundary elements{' both ways' if both_ways else ''} {case.entry}"
+        yield Item(part, path, _state(results, path), cost)
 
 
-def _gathered(
-    campaign, files: CampaignFiles, computed: list[Item], of
-) -> Iterator[tuple[str, str, int, Iterable[str], costs.Cost]]:
+def _gathered(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
     """What is made of runs: part, path, stage, inputs and cost."""
-    runs, here = len(files.runs), of.gathering
+    runs, held = len(files.runs), _dataset_memory(files, computed)
     size = sum(item.cost.disk for item in computed if item.is_run)
-
-    held = _dataset_memory(files, computed)
-
-    def table(path, stage, inputs, each, disk, cost=costs.table_cost):
-        return "dataset and checks", path, stage, inputs, cost(each, disk, held, of)
-
-    yield table(files.dataset, 1, files.runs, here.dataset_run * runs, 0.5 * size, costs.dataset_cost)
-    yield table(files.comparison, 2, [files.dataset], here.comparison_run * runs, 0.03 * size + 90e3)
     beside = [*files.compared, *files.solutions]
-    for path in files.model_error:
-        yield table(path, 2, [files.dataset, *beside], here.error_run * len(beside), 150e3)
-    yield table(files.checks, 2, [files.dataset, *files.solutions], here.checks_run * runs, 5e3 * runs)
+    tables = [
+        ("dataset", [files.dataset], 1, files.runs, runs, 0.5 * size),
+        ("comparison", [files.comparison], 2, [files.dataset], runs, 0.03 * size + 90e3),
+        ("model error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
+        ("checks", [files.checks], 2, [files.dataset, *files.solutions], runs, 5e3 * runs),
+    ]
+    for kind, paths, stage, inputs, count, disk in tables:
+        for path in paths:
+            yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, held)
+    result_files = ResultFiles(campaign.name)
     for name in campaign.figures.drawn():
-        path = ResultFiles(campaign.name).path(results_files.FIGURE, name=name, ending="png")
-        inputs = campaign.figures.inputs(name, campaign, ResultFiles(campaign.name))
+        path = result_files.path(results_files.FIGURE, name=name, ending="png")
+        inputs = campaign.figures.inputs(name, campaign, result_files).values()
         shown = set(campaign.figures.studies_of(name, campaign))
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
         cost = costs.figure_cost(
@@ -178,10 +145,10 @@ def _gathered(
             max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0,
             max((len(campaign.studies[study].models) for study in shown), default=1),
             held,
-            of,
         )
-        yield "figures", path, 3, _flat(inputs), cost
-    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, held, of)
+        flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
+        yield "figures", path, 3, flat, cost
+    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, held)
 
 
 def _dataset_memory(files, computed):
@@ -197,35 +164,26 @@ def _dataset_memory(files, computed):
     )
 
 
-def _flat(inputs):
-    return [path for each in inputs.values() for path in ([each] if isinstance(each, str) else each)]
-
-
-def _described(settings, rms_slope, rough) -> costs.Sweep:
+def _sweep_of(settings, rms_slope) -> dict:
     """What of a run's settings its cost depends on."""
-    path, material = settings["path"], settings["material"]
-    snapshots = path["snapshots"] if path["snapshots"] is not None else [()]
-    return costs.Sweep(
-        loads=tuple(_loads(path, snapshots, rms_slope)),
-        snapshots=len(snapshots),
-        adhesion=material["surface_energy"] / material["contact_modulus"] / (rough.sharpness * rms_slope**2),
-        legs=len(path.get("turning_points", ())) + bool(path.get("unload")),
-        max_step=path["max_step"],
-    )
-
-
-def _loads(path, snapshots, rms_slope):
-    """Reduced pressures of the stops of a path, roughly: half of the area fractions; of separations a guess."""
+    path, snapshots = settings["path"], settings["path"]["snapshots"]
+    # Reduced pressures, roughly: half of the area fractions; of separations a guess.
     loads = {
         "reduced_pressure": lambda value: value,
         "relative_load": lambda value: value / rms_slope,
         "area_fraction": lambda value: value / 2,
         "mean_separation": lambda value: _UNKNOWN_LOAD,
     }
-    stops = [(kind, value) for kind in loads for value in path.get(f"{kind}s") or ()]
-    there = set(stops)
-    stops += [tuple(snapshot) for snapshot in snapshots if snapshot and tuple(snapshot) not in there]
-    return [loads[kind](value) for kind, value in stops]
+    stops = {(kind, value) for kind in loads for value in path.get(f"{kind}s") or ()}
+    stops |= {tuple(snapshot) for snapshot in snapshots or ()}
+    return {
+        "load": max(loads[kind](value) for kind, value in stops),
+        "stops": len(stops),
+        "snapshots": 1 if snapshots is None else len(snapshots),
+        "adhesive": settings["material"]["surface_energy"] > 0,
+        "legs": len(path.get("turning_points", ())) + bool(path.get("unload")),
+        "max_step": path["max_step"],
+    }
 
 
 # Attributes of a run's file that say with which settings it was computed and what it is worth.
@@ -236,31 +194,17 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
     """State of a run's file, and the reason why the run failed, if it did."""
     if not file.is_file():
         return TO_DO, ""
-    try:
-        attributes = read_attributes(file)
-    except DamagedFile:
+    attributes = read_attributes(file)
+    if attributes is None:
         return DAMAGED, ""
     if attributes.get("config_sha256") != sha256:
         return CHANGED, ""
-    if reason := why_no_result(attributes):
-        return FAILED, reason
-    return DONE, ""
+    reason = why_no_result(attributes)
+    return (FAILED, reason) if reason else (DONE, "")
 
 
-class DamagedFile(Exception):
-    """A file that is there but is no netCDF-4 file, or only a part of one."""
-
-
-def read_attributes(file: Path) -> dict[str, str]:
-    """What a file says of the settings and the end of a run, read without its variables.
-
-    Raises
-    ------
-    DamagedFile
-        If its content cannot be read.
-    OSError
-        If the system does not let it be read.
-    """
+def read_attributes(file: Path) -> dict[str, str] | None:
+    """Attributes of a run's settings and end, read without its variables; None of a file that is no whole netCDF-4."""
     import h5py
 
     try:
@@ -269,7 +213,7 @@ def read_attributes(file: Path) -> dict[str, str]:
     except OSError as error:
         if error.errno is not None:  # no permission, for one: that says nothing of the content
             raise
-        raise DamagedFile(file) from None
+        return None
 
 
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
@@ -281,9 +225,9 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
     return {path: reason for path, (state, reason) in states.items() if state == FAILED}
 
 
-def expected_seconds(items: Iterable[Item], folder: str, of: Constants = FITTED) -> dict[str, float]:
+def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
     """Expected core-seconds of the job of every item, handing it out included, by its path with `folder` before it."""
-    return {f"{folder}/{item.path}": item.cost.seconds * item.threads + of.workflow.job for item in items}
+    return {f"{folder}/{item.path}": item.cost.seconds * item.threads + WORKFLOW.job for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
@@ -291,29 +235,26 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
 
     By the cost model alone, whatever the jobs of this machine have taken: the same wherever it is asked for.
     """
-    items = [replace(item, state=TO_DO) for item in _items(campaign, results, FITTED)]
+    items = [replace(item, state=TO_DO) for item in _items(campaign, results)]
     return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)
 
 
-def _calibrated(items: Iterable[Item], results: Path) -> Iterator[Item]:
-    """The items with times and memories scaled to what the jobs of their kind that are done have taken."""
-    items = list(items)
+def _calibrated(items: list[Item], results: Path) -> Iterator[Item]:
+    """The items with times scaled to what the jobs of their kind that are done have taken."""
     kinds: dict[str, list[Item]] = {}
     for item in items:
         kinds.setdefault(_kind(item), []).append(item)
     factors = {}
     for kind, members in kinds.items():
         done = [item for item in members if item.state in (DONE, FAILED)]
-        done = done[:: max(1, len(done) // _SAMPLE)]
-        measured = [(item, _benchmark(results, item)) for item in done]
-        pairs = [(item.cost.seconds, seconds) for item, seconds in measured if seconds]
-        factors[kind] = costs.correction(pairs)
+        measured = [(item, _benchmark(results, item)) for item in done[:: max(1, len(done) // _SAMPLE)]]
+        factors[kind] = costs.correction([(item.cost.seconds, seconds) for item, seconds in measured if seconds])
     for item in items:
-        yield replace(item, cost=item.cost.slower(factors[_kind(item)]))
+        yield replace(item, cost=replace(item.cost, seconds=item.cost.seconds * factors[_kind(item)]))
 
 
 def _kind(item):
-    return item.part if item.part.startswith("study ") else item.path.rsplit("/", 1)[0].split("/")[0] + item.part
+    return item.part if item.part.startswith("study ") else item.path.split("/")[0] + item.part
 
 
 def _benchmark(results: Path, item: Item) -> float | None:
@@ -360,38 +301,33 @@ def total(items: Iterable[Item]) -> Total:
     )
 
 
-def time_on(items: Iterable[Item], cores: int, of: Constants = FITTED) -> float:
+def time_on(items: Iterable[Item], cores: int) -> float:
     """Seconds from the call to the end on some cores, if anything is to be done.
 
     The work of every stage is shared out, but takes never less than its longest job; jobs are handed out one by one.
     """
     items = list(items)
-    stages: dict[int, list[Item]] = {}
-    for item in items:
-        stages.setdefault(item.stage, []).append(item)
-    return start_up(items, of) + sum(_stage_on(stage, cores, of) for stage in stages.values())
+    seconds = start_up(items)
+    for stage in {item.stage for item in items}:
+        sums = total(item for item in items if item.stage == stage)
+        handing_out = WORKFLOW.job * sums.to_do
+        seconds += max((sums.work + handing_out) / cores, sums.longest, handing_out)
+    return seconds
 
 
-def _stage_on(items, cores, of):
-    sums = total(items)
-    handing_out = of.workflow.job * sums.to_do
-    return max((sums.work + handing_out) / cores, sums.longest, handing_out)
-
-
-def start_up(items: Collection[Item], of: Constants = FITTED) -> float:
+def start_up(items: Collection[Item]) -> float:
     """Seconds until the first job, for what is to be done: Snakemake, its plan, what jobs import."""
     if not any(item.to_do for item in items):
         return 0.0
-    here = of.workflow
-    return here.start + here.planned * len(items) + here.environment
+    return WORKFLOW.start + WORKFLOW.planned * len(items) + WORKFLOW.environment
 
 
-def around_jobs(items: Collection[Item], of: Constants = FITTED) -> float:
+def around_jobs(items: Collection[Item]) -> float:
     """Seconds on one core that go into starting and into handing out what is to be done."""
-    return start_up(items, of) + of.workflow.job * sum(item.to_do for item in items)
+    return start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
 
 
-def memory_on(items: Iterable[Item], cores: int, most: float = math.inf, of: Constants = FITTED) -> float:
+def memory_on(items: Iterable[Item], cores: int, most: float = math.inf) -> float:
     """Bytes that Snakemake and the largest jobs to be done take, as many as run side by side.
 
     Those side by side are let take no more than `most`, unless one does alone.
@@ -401,4 +337,4 @@ def memory_on(items: Iterable[Item], cores: int, most: float = math.inf, of: Con
     for item in left:
         if item.threads <= free or free == cores:
             together, free = together + item.cost.memory, free - item.threads
-    return of.workflow.memory + min(together, max(most, left[0].cost.memory)) if left else 0.0
+    return WORKFLOW.memory + min(together, max(most, left[0].cost.memory)) if left else 0.0

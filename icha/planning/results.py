@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import asperity_cases, loop_cases, run_cases, solution_cases, source_cases, surface_cases
+from icha.configuration.cases import loop_cases, run_cases, solution_cases, surface_cases
 from icha.contact.models import BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
@@ -13,8 +13,8 @@ from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 class CampaignFiles:
     """Paths of the files of a campaign, in the order of its configuration.
 
-    Where there are many of a kind, each has what it holds beside it: labels, name and seed of a surface, name of the
-    surface of theories, Tabor parameter of one asperity (None for Hertz's contact).
+    Where there are many of a kind, each has what it holds beside it: labels, name and seed of a surface, or name of
+    the surface of theories.
     """
 
     surfaces: dict[str, tuple[str, int]]
@@ -22,8 +22,6 @@ class CampaignFiles:
     theories: dict[str, str]
     solutions: dict[str, SolutionLabels]
     loops: dict[str, ContactLabels]
-    error_sources: dict[str, ContactLabels]
-    one_asperity: dict[str, float | None]
     dataset: str
     comparison: str
     compared: dict[str, RunLabels]
@@ -41,7 +39,7 @@ class CampaignFiles:
     @property
     def references(self) -> list[str]:
         """What runs are compared with."""
-        return [*self.theories, *self.solutions, *self.loops, *self.error_sources, *self.one_asperity]
+        return [*self.theories, *self.solutions, *self.loops]
 
     @property
     def computed(self) -> list[str]:
@@ -81,8 +79,6 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         theories={path(results.THEORIES, surface=name): name for name, _ in surfaces},
         solutions=solutions,
         loops=each(results.LOOP, loop_cases(campaign)),
-        error_sources=each(results.ERROR_SOURCES, source_cases(campaign)),
-        one_asperity={path(results.ONE_ASPERITY, asperity=n): mu for n, mu in asperity_cases(campaign).items()},
         dataset=path(results.DATASET),
         comparison=path(results.COMPARISON),
         compared=compared,

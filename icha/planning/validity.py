@@ -1,4 +1,4 @@
-"""What is known, before a campaign is run, of whether its models hold for it."""
+"""What is known of the surfaces of a campaign before it is run, and whether its models hold for it."""
 
 import math
 from functools import cache
@@ -10,10 +10,17 @@ from icha.asperity.material import WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
-from icha.configuration.full_contact import full_contact_energy
+from icha.configuration.plausibility import full_contact_energy
+from icha.configuration.surfaces import MeasuredSurface, SelfAffineSurface
 from icha.contact.models import ASPERITIES
-from icha.planning.roughness import rms_curvature, surface_facts
-from icha.surfaces.moments import SpectralMoments
+from icha.surfaces.moments import (
+    SpectralMoments,
+    cells_per_short_wave,
+    height_statistics,
+    slope_anisotropy,
+    spectral_moments,
+    summit_density,
+)
 
 # Radius of the mean curvature of the summits of a Gaussian surface times its rms curvature (McCool 1986, as in
 # icha.references.summit_theories, for which this would have to wait).
@@ -21,6 +28,89 @@ _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
 
 # Of the spots that touch first one of twenty has a Tabor parameter of less than this times that of the mean.
 _LEAST = 0.84
+
+
+def self_affine_moments(
+    period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
+) -> SpectralMoments:
+    """Moments of a self-affine surface with roll-off, but for a common factor; lengths in m.
+
+    Of the spectrum's moments as integrals over the plane of wave vectors, m0 = int C, m2 = 1/2 int q^2 C,
+    m4 = 3/8 int q^4 C.
+    """
+    q_l, q_0, q_1 = (2 * math.pi / length for length in (period, rolloff_wavelength, short_wavelength))
+
+    def moment(order):
+        # int q^(order + 1) C dq: flat up to the roll-off, falling as q^(-2 (1 + H)) from there on.
+        power = order - 2 * hurst
+        falling = math.log(q_1 / q_0) if power == 0 else math.expm1(power * math.log(q_1 / q_0)) / power
+        return (q_0 ** (order + 2) - q_l ** (order + 2)) / (order + 2) + q_0 ** (order + 2) * falling
+
+    return SpectralMoments(moment(0), moment(2) / 2, 3 / 8 * moment(4))
+
+
+def expected_summits(campaign: Campaign, name: str) -> float:
+    """Number of summits of a random surface by its spectrum; those of a surface from a file are counted."""
+    section = campaign.surfaces[name]
+    if isinstance(section, SelfAffineSurface):
+        moments = self_affine_moments(*section.lengths_and_hurst)
+        return section.period**2 * summit_density(moments.m2, moments.m4)
+    from icha.surfaces.summits import count_summits
+
+    return count_summits(_read(section))
+
+
+def rms_curvature(campaign: Campaign, name: str) -> float:
+    """Rms curvature of a profile of a surface at rms slope 1, 1/m."""
+    section = campaign.surfaces[name]
+    moments = (
+        self_affine_moments(*section.lengths_and_hurst)
+        if isinstance(section, SelfAffineSurface)
+        else spectral_moments(_read(section))
+    )
+    return math.sqrt(moments.m4 / (2 * moments.m2))
+
+
+def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
+    """Values of a surface by the names of `icha.analysis.validated_range.VALIDATED`, as far as a surface has them.
+
+    A random surface is Gaussian and isotropic; one from a file is measured.
+    """
+    section = campaign.surfaces[name]
+    if isinstance(section, SelfAffineSurface):
+        moments, grid, unsupported = self_affine_moments(*section.lengths_and_hurst), section.grid, 0
+        skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, False
+        summits = expected_summits(campaign, name)
+    else:
+        from icha.surfaces.summits import locate_summits
+
+        surface = _read(section)
+        moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
+        anisotropy, free = slope_anisotropy(surface), surface.free
+        found, grid = locate_summits(surface), surface.grid
+        unsupported = len(found.unsupported_height)
+        summits = len(found) + unsupported
+    return {
+        "slope_anisotropy": anisotropy,
+        "height_skewness": skewness,
+        "height_kurtosis": kurtosis,
+        "nayak_parameter": moments.nayak_parameter,
+        "nodes_per_short_wave": cells_per_short_wave(grid, summits),
+        "unsupported_summits": unsupported / max(summits, 1),
+        "free_edges": float(free),
+    }
+
+
+def _read(section):
+    # SciPy, for which campaigns without such a surface do not wait.
+    if isinstance(section, MeasuredSurface):
+        from icha.surfaces.measured.topography import prepared_topography
+
+        return prepared_topography(section.path, section.preparation).surface
+    from icha.surfaces.measured.array_files import read_height_map
+    from icha.surfaces.surface import Surface
+
+    return Surface(read_height_map(section.path, section.metres_per_unit), section.period)
 
 
 def expected_validity(campaign: Campaign) -> list[Statement]:

@@ -32,8 +32,7 @@ from icha.asperity.material import Material
 from icha.boundary_elements.patches import BEYOND_EDGES
 from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
 from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
-from icha.datasets.bins import bin_values
-from icha.datasets.build import build, of
+from icha.datasets.build import bin_values, build, of
 from icha.datasets.variables.boundary_elements import SOLUTION
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
 from icha.references.failures import NotSolved

@@ -31,8 +31,7 @@ from icha.report.explorer_data import (
 )
 from icha.report.template import template
 from icha.support.atomic_files import whole_file
-from icha.support.in_words import counted
-from icha.support.printable import printable_lines
+from icha.support.in_words import counted, printable_lines
 
 # What one chooses a contact by, in this order.
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from icha.analysis.model_error import SUMMARISED
-from icha.datasets.places import place_of, slopes_of, surfaces_and_slopes
+from icha.datasets.labels import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.support.statistics import ENOUGH, ensemble
 

@@ -8,8 +8,7 @@ from markupsafe import Markup
 
 from icha.checks.findings import IDENTITY_LIMIT
 from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_of_status, select_run
-from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.places import labels_at, slopes_of
+from icha.datasets.labels import LABELS, RunLabels, labels_at, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, RAGGED
 from icha.figures.select import asked_seeds, path_steps
 from icha.figures.style import quantity, unit_for

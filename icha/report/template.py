@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from icha.support import in_words
-from icha.support.printable import printable_lines
+from icha.support.in_words import printable_lines
 
 # A table has so many rows at most.
 MOST_ROWS = 300

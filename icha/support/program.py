@@ -1,8 +1,11 @@
-"""Where the workflow is that came with this package: in the repository, or installed beside the package.
+"""This program on this machine: where its workflow is (in the repository, or installed beside), and its processes.
 
-`python -m icha.support.program` prints it: shipped campaigns and example files lie there, in config/.
+`python -m icha.support.program` prints where shipped campaigns and example files lie, in config/.
 """
 
+import ctypes
+import os
+import signal
 from pathlib import Path
 
 # The folder beside the installed package; pyproject.toml puts it there (tool.hatch.build.targets.wheel.hooks).
@@ -28,3 +31,26 @@ def package_of(workflow: Path) -> Path:
 
 if __name__ == "__main__":
     print(own_workflow())
+
+
+_PR_SET_PDEATHSIG = 1  # of prctl(2)
+
+
+def beginning_of(process: int) -> str:
+    """When a process began, in the system's own count: with its number it tells the process from all others.
+
+    Raises
+    ------
+    FileNotFoundError, ProcessLookupError
+        If there is no such process.
+    """
+    # The name of the program, in parentheses, may hold anything.
+    status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
+    return status.rpartition(")")[2].split()[19]
+
+
+def end_with_parent(parent: int) -> None:
+    """Have the system kill this process when its parent, the process `parent`, ends, however that does."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)

@@ -1,4 +1,4 @@
-"""The square on which a surface is given: a periodic cell, or a single one on a free half-space."""
+"""The square on which a surface is given: periodic cell or single square; and which arrays are heights on it."""
 
 import numpy as np
 
@@ -12,3 +12,15 @@ def periodic_difference(first, second, period):
     """Shortest way first - second between coordinates in the periodic cell, of any shape, m."""
     difference = first - second
     return difference - period * np.rint(difference / period)
+
+
+def flaw_of_heights(heights: np.ndarray) -> str | None:
+    """What keeps an array of real numbers from being a height map: its shape, values that are not finite, flatness."""
+    if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 8:
+        return f"an array of shape {heights.shape}, not a square of at least 8 x 8"
+    bad = int(np.count_nonzero(~np.isfinite(heights)))
+    if bad:
+        return f"{bad} of {heights.size} heights that are not finite"
+    if heights.max() == heights.min():
+        return "heights that are all the same"
+    return None

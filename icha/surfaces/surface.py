@@ -17,7 +17,7 @@ import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, Integer, Real
-from icha.surfaces.heights import flaw_of_heights
+from icha.surfaces.square import flaw_of_heights
 
 # What lies beyond the square: the same square again and again, or nothing but the half-space.
 PERIODIC, FREE = "periodic", "free"

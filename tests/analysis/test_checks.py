@@ -20,7 +20,7 @@ from icha.checks.run import check_run, reasons_of_failure
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.references.finite_range import finite_range_solution
-from icha.references.one_asperity import paraboloid
+from validation.surfaces import paraboloid
 
 
 def failed(run):

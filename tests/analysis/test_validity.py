@@ -12,7 +12,7 @@ from icha.analysis.validated_range import VALIDATED, outside_validation
 from icha.analysis.validity import VALIDATION, Case, named, of_dataset, statements
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign import campaign_tree
-from icha.planning.roughness import surface_facts
+from icha.planning.validity import surface_facts
 from icha.surfaces.moments import cells_per_short_wave, height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.summits import locate_summits
 

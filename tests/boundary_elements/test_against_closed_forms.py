@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from icha.references.short_range import single_contacts as contacts
+from validation import single_contacts as contacts
 
 FINE, COARSE = 0.01, 0.025  # asked for from 8 cells of contact radius on, and from 4
 

@@ -11,7 +11,7 @@ from icha.boundary_elements.elasticity import Contact
 from icha.boundary_elements.front import COMPLIANCE, neighbour_weights, neighbours
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import moving
-from icha.references.short_range.rough_contacts import SOFT, rough
+from validation.rough_contacts import SOFT, rough
 
 GRID = 160
 

@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
 
-from icha.configuration.cases import (
-    run_cases,
-    solution_cases,
-    surface_cases,
-)
+from icha.configuration.cases import run_cases, run_settings, solution_cases, surface_cases, surface_settings
 from icha.configuration.design import value_label
-from icha.configuration.settings import (
-    run_settings,
-    surface_settings,
-)
 
 BAD = {
     # key, value, what the message must say of it

@@ -3,13 +3,7 @@
 import pytest
 from demo_configuration import LONG_RANGE, TRUTH
 
-from icha.configuration.cases import (
-    source_cases,
-)
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.settings import (
-    source_settings,
-)
 from icha.figures.fig4_contact_map import finest_solution
 
 BAD = {
@@ -47,10 +41,10 @@ BAD = {
         {"fig10_model_error": {"study": "one"}},
         "figures.fig10_model_error.study: 'one' has no boundary elements beside it",
     ),
-    "figure of unknown error sources": (
+    "figure of error sources": (
         "figures",
         {"fig12_error_sources": {"entry": "why"}},
-        "figures.fig12_error_sources.entry: 'why' is not defined",
+        "figures.fig12_error_sources: is no longer a figure",
     ),
 }
 
@@ -86,33 +80,6 @@ def test_the_map_is_compared_with_the_finest_solution_of_its_state(load):
     assert solution(**at_load).path == "coarse/rough/seed1/slope0.2/soft/p0.01"
     assert solution(**at_load, seed=2, rms_slope=1.0).path == "fine/rough/seed2/slope1/soft/p0.01"
     assert solution(snapshot={"area_fraction": 0.02}) is None
-
-
-def test_the_sources_of_the_error_are_drawn_without_adhesion(load):
-    changes = {
-        **LONG_RANGE,
-        "error_sources": {"why": TRUTH | {"seeds": [2]}},
-        "figures": {"fig12_error_sources": {"entry": "why"}},
-    }
-    with pytest.raises(ConfigurationError, match=r"fig12_error_sources\.entry: 'why' has not one material"):
-        load(changes)
-    bare = changes | {"materials.soft.surface_energy": "0 J/m^2"}
-    # Its mean over the seeds is that of one surface at one slope.
-    with pytest.raises(ConfigurationError, match=r"entry: 'why' has not one rms slope but 2 \(0\.2, 1\.0\)"):
-        load(bare)
-    del bare["figures"]
-    campaign = load(bare).campaign
-    cases = source_cases(campaign)
-    assert [case.path for case in cases] == [f"why/rough/seed2/slope{slope}/soft" for slope in ("0.2", "1")]
-    assert source_settings(campaign, cases[1]) == {
-        "material": {"contact_modulus": 25e6, "surface_energy": 0.0, "interaction_range": pytest.approx(120e-9)},
-        "rms_slope": 1.0,
-        "seed": 2,
-        "reduced_pressures": [0.003, 0.01],
-        "refinement": 2,
-        "tolerance": 1e-8,
-    }
-    assert campaign.snapshots_of("one") == [("area_fraction", 0.02)]  # the runs are none of their concern
 
 
 def test_a_study_of_areas_is_not_said_to_lack_boundary_elements(refused):

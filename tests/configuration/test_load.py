@@ -1,6 +1,7 @@
 """Files of configurations: what is no configuration, overrides, all mistakes at once."""
 
 import pytest
+from demo_configuration import measured_surface
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
@@ -66,3 +67,26 @@ def test_missing_file(tmp_path):
 def test_days_that_no_calendar_has_are_text_until_they_are_checked(tmp_path):
     (tmp_path / "one.yaml").write_text("publication: {date: 2026-02-30}")
     assert read_yaml(tmp_path / "one.yaml") == {"publication": {"date": "2026-02-30"}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"studies.one.materials": ["hard"]}, r"materials\[0\]: 'hard' is not defined"),
+        ({"studies.one.unload": "perhaps"}, r"one\.unload: 'perhaps'"),
+        ({"figures": {"fig2_area_and_gap": {"study": "two"}}}, r"fig2_area_and_gap\.study: 'two' is not defined"),
+    ],
+)
+def test_mistakes_of_the_text_are_told_before_a_scan_is_read(changes, message, load, monkeypatch):
+    monkeypatch.setattr("icha.configuration.load.inspect_topographies", lambda campaign: pytest.fail("was read"))
+    measured = {"surfaces.rough": measured_surface(), "studies.one.rms_slopes": "measured"}
+    with pytest.raises(ConfigurationError, match=message):
+        load(measured | changes)
+
+
+def test_slopes_of_scans_are_compared_once_they_are_known(load):
+    measured = {"surfaces.rough": measured_surface(), "studies.one.rms_slopes": "measured"}
+    slope = load(measured).campaign.contacts("one")[0].rms_slope
+    assert load({**measured, "figures": {"fig4_contact_map": {"study": "one", "rms_slope": slope}}})
+    with pytest.raises(ConfigurationError, match=r"rms_slope: 0.5 is not in study 'one'"):
+        load({**measured, "figures": {"fig4_contact_map": {"study": "one", "rms_slope": 0.5}}})

@@ -3,12 +3,11 @@
 import pytest
 from demo_configuration import LONG_RANGE, TRUTH, measured_surface
 
-from icha.configuration.cases import run_cases
+from icha.configuration.cases import run_cases, run_settings, run_sha256
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.settings import run_settings, run_sha256
 from icha.planning.costs import PATCH_ARRAYS
+from icha.planning.needs import run_memory, run_minutes, surface_threads
 from icha.planning.plan import plan
-from icha.planning.resources import run_memory, run_minutes, run_threads
 from icha.planning.results import campaign_files
 
 BOTH = {"studies.one.models": ["asperities", "boundary_elements"]}
@@ -85,16 +84,6 @@ def test_other_models_have_a_folder_of_their_own(load):
     assert len({run_sha256(campaign, case) for case in run_cases(campaign)}) == 8
 
 
-def test_the_rule_of_unions_means_nothing_to_boundary_elements(load):
-    back = BOTH | {"studies.one.unload": True}
-    one, other = (load(back | {"studies.one.united_until": rule}).campaign for rule in ("overlap", "detachment"))
-    for case in run_cases(one):
-        same = run_sha256(one, case) == run_sha256(other, case)
-        assert same == (case.model == "boundary_elements")
-        assert ("united_until" in run_settings(one, case)["path"]) == (case.model == "asperities")
-    assert run_settings(one, run_cases(one)[-1])["model"] == "boundary_elements"
-
-
 def test_known_failures_may_be_of_either_model(load):
     failure = {"run": "one/rough/seed1/slope1/boundary_elements/soft", "reason": "why"}
     load(BOTH | {"publication": {"known_failures": [failure]}})
@@ -115,4 +104,4 @@ def test_boundary_elements_are_planned_as_a_part_of_their_own_at_their_own_cost(
     assert run_memory(campaign, last) > 600 + PATCH_ARRAYS * 8 * 512**2 / 1e6 > run_memory(campaign, first)
     assert run_memory(campaign, last) * 1e6 > slow[0].cost.memory
     assert run_minutes(campaign, last) > run_minutes(campaign, first)
-    assert run_threads(campaign, first) == run_threads(campaign, last) == 1
+    assert surface_threads(campaign, "rough") == 1

@@ -59,7 +59,9 @@ BAD = {
         "funding": [{"funder": "A", "award_url": "https://a.org/\u200b"}]
     },
     "'a' is given twice": {"funding": [{"funder": each, "award_number": "1"} for each in "Aa"]},
-    f"'{GOOD_RUN}' is given twice": {"known_failures": [{"run": GOOD_RUN, "reason": each} for each in ("why", "because")]},
+    f"'{GOOD_RUN}' is given twice": {
+        "known_failures": [{"run": GOOD_RUN, "reason": each} for each in ("why", "because")]
+    },
     "known_failures[0].run: 'one' is not a run": {"known_failures": [{"run": "one", "reason": "why"}]},
     "known_failures[0].reason: '\\n' is blank": {"known_failures": [{"run": GOOD_RUN, "reason": "\n"}]},
     "summary: 'One\\n\\ttwo' holds the control character": {"summary": "One\n\ttwo"},

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import icha
-from icha.configuration.measured_surfaces import MeasuredSurface
+from icha.configuration.surfaces import MeasuredSurface
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.surface import EdgeWarning
 

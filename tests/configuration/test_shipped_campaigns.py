@@ -4,18 +4,11 @@ import numpy as np
 import pytest
 from demo_configuration import REPOSITORY
 
-from icha.configuration.cases import (
-    run_cases,
-    solution_cases,
-    surface_cases,
-)
+from icha.configuration.cases import run_cases, run_settings, solution_cases, surface_cases
 from icha.configuration.load import load_configuration
-from icha.configuration.settings import (
-    run_settings,
-)
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.planning.needs import further_software
 from icha.planning.results import campaign_files
-from icha.planning.software import further_software
 from icha.references.literature import literature
 
 SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])

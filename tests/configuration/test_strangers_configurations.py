@@ -168,10 +168,10 @@ WRONG = {
     "solutions together": (
         {
             "studies.one.seeds": "1..10000",
-            "error_sources": {f"b{i}": {"study": "one", "reduced_pressures": [0.01, 0.02]} for i in range(3)},
+            "finite_range": {f"b{i}": {"study": "one", "reduced_pressures": [0.01, 0.02]} for i in range(3)},
         },
         None,
-        "error_sources: ask for 120000 solutions together; allowed: 100000 at most",
+        "finite_range: ask for 120000 solutions together; allowed: 100000 at most",
     ),
     "entries beside a study": (
         "finite_range",
@@ -278,7 +278,7 @@ def test_scans_of_absurd_units_and_sizes_are_refused(unit, size, load):
     if (unit, size) == ("nm", "64 um"):
         assert load(changes).campaign.period("rough") == pytest.approx(64e-6)
         return
-    with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.(height_unit|size|path): .*; allowed: "):
+    with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.(height_unit|size|path)\S*: .*; allowed: "):
         load(changes)
 
 

@@ -4,13 +4,7 @@ import pytest
 from demo_configuration import LONG_RANGE, TRUTH
 
 import icha
-from icha.configuration.cases import (
-    run_cases,
-)
-from icha.configuration.settings import (
-    campaign_sha256,
-    run_settings,
-)
+from icha.configuration.cases import campaign_sha256, run_cases, run_settings
 
 BAD = {
     # key, value, what the message must say of it
@@ -73,7 +67,7 @@ BAD = {
         "load",
         "studies.one.control: 'load' with the stop area_fraction = 0.02; allowed: stops and turning points that are",
     ),
-    "unknown end of unions": ("studies.one.united_until", "ever", "'overlap' or 'detachment'"),
+    "end of unions": ("studies.one.united_until", "overlap", "united_until: is no longer a choice"),
     "turning point of two kinds": (
         "studies.one.turning_points",
         [{"area_fraction": 0.1, "relative_load": 0.1}],
@@ -141,10 +135,9 @@ def test_the_way_back_is_part_of_the_path(load):
         {
             "studies.one.unload": True,
             "studies.one.turning_points": [{"reduced_pressure": -1e-3}, {"area_fraction": 0.03}],
-            "studies.one.united_until": "overlap",
         }
     ).campaign
     path = run_settings(campaign, run_cases(campaign)[0])["path"]
-    assert path["unload"] is True and path["united_until"] == "overlap" and path["control"] == "separation"
+    assert path["unload"] is True and path["control"] == "separation"
     assert path["turning_points"] == [("reduced_pressure", -1e-3), ("area_fraction", 0.03)]
     assert icha.Path(**path).turning_points[1].value == 0.03

@@ -2,18 +2,10 @@
 
 import numpy as np
 import pytest
-from demo_configuration import (
-    file_surface,
-)
+from demo_configuration import file_surface
 
-from icha.configuration.cases import (
-    run_cases,
-    surface_cases,
-)
+from icha.configuration.cases import run_cases, surface_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.settings import (
-    surface_settings,
-)
 from icha.datasets.labels import number_label
 
 BAD = {
@@ -107,10 +99,10 @@ def test_damaged_surface_files(load, tmp_path):
 
 
 def test_a_topography_that_exceeds_the_memory_is_a_message(load, monkeypatch):
-    def fail(*_):
+    def fail(*_, **__):
         raise MemoryError("Unable to allocate 80 GiB for an array")
 
-    monkeypatch.setattr("icha.configuration.load._facts", fail)
+    monkeypatch.setattr("icha.configuration.topographies._mapped", fail)
     # Long values are cut short.
     with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.path: '/.* fit .*Unable to allocate 80 GiB"):
         load({"surfaces.rough": file_surface("heights.npy")})

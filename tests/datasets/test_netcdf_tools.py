@@ -1,8 +1,6 @@
-"""Files are for the tools of others: plain netCDF4, plain xarray and ncdump agree on them, checkers accept them."""
+"""Files are for the tools of others: plain netCDF4 and plain xarray agree on them, checkers accept them."""
 
-import os
 import re
-import shutil
 import subprocess
 import sys
 
@@ -41,7 +39,7 @@ def every_variable(folder):
                     yield f"{path.name}:{group.path.rstrip('/')}/{name}", variable
 
 
-# --- three readers ----------------------------------------------------------------------------------------------
+# --- two readers ----------------------------------------------------------------------------------------------
 
 
 def by_netcdf4(path, group):
@@ -80,25 +78,6 @@ def by_xarray(path, group, picture):
     return pickle.loads(subprocess.run(command, check=True, capture_output=True, cwd=path.parent).stdout)
 
 
-def ncdump():
-    program = shutil.which("ncdump")
-    if program is None:
-        reason = "ncdump is not installed (Debian's package netcdf-bin)"
-        (pytest.fail if os.environ.get("ICHA_REQUIRE_NCDUMP") == "1" else pytest.skip)(reason)
-    return program
-
-
-def by_ncdump(path, group):
-    """Every variable's list of values as ncdump prints them; fill values as None."""
-    options = ["-p", "9,17", *([] if group == "/" else ["-g", group.strip("/")])]
-    text = subprocess.run([ncdump(), *options, str(path)], check=True, capture_output=True, text=True).stdout
-    data = text.rsplit("data:\n", 1)[1]
-    return {
-        name: [None if each == "_" else each for each in re.findall(r'"[^"]*"|[^\s,;]+', values)]
-        for name, values in re.findall(r"^ +(\w+) =\s+(.*?) ;$", data, flags=re.MULTILINE | re.DOTALL)
-    }
-
-
 @pytest.mark.parametrize(("file", "group"), GROUPS.items())
 def test_netcdf4_and_xarray_read_the_same_and_plot_it(folder, tmp_path, file, group):
     plain = by_netcdf4(folder / file, group)
@@ -119,24 +98,6 @@ def test_netcdf4_and_xarray_read_the_same_and_plot_it(folder, tmp_path, file, gr
         assert plain["failure"][place] == "the path ends early" and shown[1].mask.all()
     np.testing.assert_array_equal(line, np.transpose([np.ma.filled(each, np.nan) for each in shown]))
     assert (tmp_path / "plot.png").stat().st_size > 5000
-
-
-@pytest.mark.parametrize(("file", "group"), GROUPS.items())
-def test_ncdump_prints_what_netcdf4_reads(folder, file, group):
-    printed = by_ncdump(folder / file, group)
-    plain = by_netcdf4(folder / file, group)
-    assert set(printed) == set(plain)
-    for name, values in plain.items():
-        flat = np.ravel(values)
-        if flat.dtype.kind in "SU":
-            # It may print the empty text of the last in a row as nothing.
-            texts = [text.strip('"') for text in printed[name]]
-            assert [text for text in texts if text] == [str(text) for text in flat if text], name
-            continue
-        missing = np.ma.getmaskarray(flat)
-        assert [each is None for each in printed[name]] == missing.tolist(), name
-        numbers = np.array([0.0 if each is None else float(each) for each in printed[name]])
-        np.testing.assert_array_equal(numbers[~missing], np.ma.getdata(flat)[~missing].astype(float), err_msg=name)
 
 
 def test_missing_values_and_texts_are_what_was_written(folder):
@@ -262,10 +223,8 @@ def test_every_kind_of_file_is_known(folder):
     }
     assert found["campaign"] == CAMPAIGN and found["surface"] == SURFACE
     others = {name: kind for name, kind in found.items() if kind not in (RUN, SOLUTION, CAMPAIGN, SURFACE)}
-    assert set(others) == {
-        *("aggregated", "model_error", "theories", "loop", "error_sources", "hertz_asperity", "one_asperity"),
-    }
-    assert others["hertz_asperity"] == others["one_asperity"] and len(set(others.values())) == len(others) - 1
+    assert set(others) == {"aggregated", "model_error", "theories", "loop"}
+    assert len(set(others.values())) == len(others)
 
 
 def test_checkers_accept_every_kind_of_file(folder):

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 import small_campaign as small
 
-from icha.datasets.files import write_dataset
-from icha.datasets.netcdf import characters, is_text
-from icha.datasets.run_values import read_run_values
+from icha.datasets.campaign_runs import read_run_values
+from icha.datasets.files import characters, is_text, write_dataset
 
 
 def written(run, path):

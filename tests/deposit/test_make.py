@@ -25,11 +25,10 @@ from typer.testing import CliRunner
 
 from icha.analysis.checks import read_checks
 from icha.cli import app
-from icha.configuration.load import load_configuration
-from icha.configuration.named_files import with_files_beside_it
+from icha.configuration.cases import campaign_sha256, run_sha256
+from icha.configuration.load import load_configuration, with_files_beside_it
 from icha.configuration.publication import KnownFailure
-from icha.configuration.settings import campaign_sha256, run_sha256
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import write_dataset
 from icha.deposit import make, readme
 from icha.deposit.crate import Job

@@ -10,7 +10,7 @@ from outside_validators import sealed, validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import RELATIONS, RESOURCES, RelatedIdentifier
-from icha.datasets.model_paper import MODEL_PAPER
+from icha.datasets.attributes import MODEL_PAPER
 from icha.deposit.metadata import (
     citation_cff,
     datacite_metadata,

@@ -16,7 +16,7 @@ from publications import ALL, COMMIT, LEAST
 from icha.analysis.checks import check_campaign
 from icha.configuration.load import load_configuration
 from icha.configuration.publication import Author, Funding, KnownFailure
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.deposit.readme import markdown, readme
 from icha.planning.costs import Cost
 

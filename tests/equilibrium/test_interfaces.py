@@ -28,8 +28,8 @@ class Only:
         return getattr(self._whole, name)
 
 
-def model(law, united_until="detachment"):
-    return InteractingAsperities(law, find_summits(SURFACE), SURFACE.rms_height, united_until)
+def model(law):
+    return InteractingAsperities(law, find_summits(SURFACE), SURFACE.rms_height)
 
 
 def last(contact, loads, **path):

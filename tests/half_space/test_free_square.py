@@ -18,7 +18,6 @@ from icha.half_space.ewald import HalfSpace
 from icha.half_space.free_square import image_potential, mean_displacement
 from icha.half_space.grid_displacement import DisplacementField
 from icha.half_space.interaction import Interaction, displacement_at
-from icha.references.error_sources.variants import error_sources
 from icha.references.finite_range import finite_range_solution
 from icha.surfaces.summits import Asperities, find_summits
 
@@ -345,8 +344,6 @@ def test_moments_of_a_free_square_are_means_over_it():
     for periodic_only in (lambda: surface.refined(2), lambda: finite_range_solution(surface, law(0.0).material, 1e-3)):
         with pytest.raises(ValueError, match="boundary: 'free'"):
             periodic_only()
-    with pytest.raises(ValueError, match="boundary: 'free'"):
-        error_sources(surface, law(0.0).material, [1e-3])
     with pytest.raises(ValueError, match="boundary: 'open' must be one of periodic, free"):
         icha.Surface(surface.heights, 1.0, boundary="open")
 

@@ -13,7 +13,7 @@ from icha.analysis.common_loads import compare_runs
 from icha.checks.run import check_run
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, read_run, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, flaws, kind_of
 from icha.datasets.labels import LABELS, RunLabels
@@ -21,7 +21,7 @@ from icha.datasets.variables.run import FURTHER, PATCHES
 from icha.figures.select import pick_run, study_runs
 
 PATH = icha.Path(reduced_pressures=[1e-3, 1e-2], snapshots=[("reduced_pressure", 1e-3), ("reduced_pressure", 1e-2)])
-BACK = icha.Path(reduced_pressures=[1e-3], unload=True, united_until="overlap")
+BACK = icha.Path(reduced_pressures=[1e-3], unload=True)
 
 
 def run(model, path=PATH, material="soft", seed=1):
@@ -59,8 +59,6 @@ def test_a_run_says_by_which_model_it_is(runs, tmp_path):
     for name in ("title", "summary", "references"):
         assert asperities.attrs[name] != patched.attrs[name]
     assert "boundary elements" in patched.attrs["title"] and "Griffith" in patched.attrs["references"]
-    assert str(run(BOUNDARY_ELEMENTS, BACK)["united_until"].values) == ""
-    assert str(run(ASPERITIES, BACK)["united_until"].values) == "overlap"
     write_dataset(patched, tmp_path / "run.nc")
     kind, back = kind_of(tmp_path / "run.nc")
     assert kind == RUN and flaws(RUN, back) == []

@@ -12,7 +12,8 @@ PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-
 METADATA = PROJECT["project"]
 WHEEL = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
 # What a wheel of a program has no use for.
-LEFT_OUT = ("tests/", "docs/", "benchmarks/", "recipe/", "results/", ".")
+LEFT_OUT = ("tests/", "docs/", "benchmarks/", "validation/", "recipe/", "results/", ".")
+LEFT_OUT += ("CONTRIBUTING.md", "VISION.md", "Containerfile")
 
 
 def test_all_files_of_the_repository_are_in_the_wheel_or_left_out_on_purpose():

@@ -197,51 +197,26 @@ def test_without_adhesion_and_unions_nothing_is_lost(turning_points, tolerance):
     assert met >= 0.9 * (last.sizes["step"] - 2) and met > 20
 
 
-def test_without_adhesion_unions_cost_less_if_they_end_where_they_began():
-    contacts = {until: pair(1.0, 4.0, until, BARE) for until in ("detachment", "overlap")}
-    losses = {}
-    for until, contact in contacts.items():
-        waypoints = travelled(contact, [0.03], unload=True)
-        end = closed_again(waypoints)
-        losses[until] = abs(lost(contact, waypoints)[0]) / max(w.balance.work * contact.area for w in waypoints)
-        assert end.coalescences == 1
-        if until == "overlap":
-            assert end.splits == 1
-    assert losses["overlap"] < 0.05 * losses["detachment"]
-    assert losses["overlap"] < 1e-3
+def test_without_adhesion_a_union_costs_next_to_nothing():
+    contact = pair(1.0, 4.0, BARE)
+    waypoints = travelled(contact, [0.03], unload=True)
+    end = closed_again(waypoints)
+    assert end.coalescences == end.splits == 1
+    assert abs(lost(contact, waypoints)[0]) < 1e-3 * max(w.balance.work * contact.area for w in waypoints)
 
 
-def test_without_adhesion_overlap_undoes_every_union():
-    surface = icha.SelfAffineSpectrum(100e-6, 50e-6, 20e-6, 0.8, rms_slope=0.2).realise(32, 1)
-    runs = [
-        icha.simulate(surface, Material(1e6, 0.0, 2e-9), Path([7e-2], unload=True, united_until=until))
-        for until in ("overlap", "detachment")
-    ]
-    overlap, detachment = runs
-    assert int(overlap.coalescence_count[-1]) == int(overlap.split_count[-1]) > 0
-    assert abs(float(overlap.hysteresis_loss)) < 0.2 * abs(float(detachment.hysteresis_loss))
+def test_without_adhesion_every_union_is_undone():
+    run = icha.simulate(small()[0], Material(1e6, 0.0, 2e-9), Path([7e-2], unload=True))
+    assert int(run.coalescence_count[-1]) == int(run.split_count[-1]) > 0
 
 
 # --- united spots -------------------------------------------------------------------------------------------
 
 
-def test_a_united_pair_that_holds_on_gives_back_more_than_was_put_in():
-    """A property of the rule "detachment", not of nature: two equal spots that unite far from jump-off become an
-    asperity that is taller than they were. United until it lets go as a whole, it holds on much longer than the two
-    and pulls all the way: the work that it takes to break it is not what the union set free, so that the loop may have
-    either sign. What the rule makes of the energy is counted as the loss by coalescence, here a large gain.
-
-    Undone where the two would just touch, the same union costs next to nothing.
-    """
-    held, undone = (pair(0.0, 6.0, until) for until in ("detachment", "overlap"))
-    ways = [travelled(contact, [0.03], unload=True) for contact in (held, undone)]
-    last = [[w.state for w in way if len(w.state.spots)][-1] for way in ways]
-    assert last[0].separation > last[1].separation + 1
-    (total, *_, by_union, _, _), (other, *_, other_union, _, _) = (
-        lost(contact, way) for contact, way in zip((held, undone), ways, strict=True)
-    )
-    assert total < 0 and by_union < 0
-    assert other > 0 and abs(other_union) < 0.02 * other
+def test_a_union_that_is_undone_where_the_two_would_just_touch_costs_next_to_nothing():
+    contact = pair(0.0, 6.0)
+    total, *_, by_union, _, _ = lost(contact, travelled(contact, [0.03], unload=True))
+    assert total > 0 and abs(by_union) < 0.02 * total
 
 
 # --- surfaces -----------------------------------------------------------------------------------------------
@@ -270,7 +245,7 @@ def test_work_is_stored_or_lost_at_every_step(which):
     parts = sum(run[f"dissipated_{name}"].values for name in LOSSES)
     rest = (run.work - run.stored_energy).values - parts  # what no event accounts for
     assert rest[0] == 0 and rest[-1] == pytest.approx(float(run.loss_unattributed), rel=1e-9)
-    assert np.max(np.abs(rest)) < 0.02 * abs(float(run.hysteresis_loss))
+    assert np.max(np.abs(rest)) < 2e-3 * np.max(np.abs(run.work.values))
     # It does not change in steps in which anything unites or comes apart.
     united = np.diff(run.coalescence_count + run.split_count) > 0
     assert np.all(np.abs(np.diff(rest)[united]) <= 1e-12 * np.max(np.abs(run.work.values)))
@@ -282,15 +257,13 @@ def test_work_is_stored_or_lost_at_every_step(which):
         assert np.all(np.diff(count)[changed] > 0)
 
 
-@pytest.mark.parametrize("until", ["overlap", "detachment"])
-def test_the_step_does_not_matter(until, monkeypatch):
+def test_the_step_does_not_matter(monkeypatch):
     """Half the longest step, and half of all that is left unresolved, change pull-off and loss by less than 1 %."""
-    path = {"unload": True, "united_until": until}
-    coarse = united_run() if until == "detachment" else icha.simulate(*small(), Path([5e-2], **path))
+    coarse = united_run()
     assert int(coarse.coalescence_count[-1]) > 0
     for name in ("UNRESOLVED_LOSS", "UNRESOLVED_WORK", "UNITING_STEP"):
         monkeypatch.setattr(resolution, name, 0.5 * getattr(resolution, name))
-    fine = icha.simulate(*small(), Path([5e-2], max_step=0.5 * DEFAULT_STEP, **path))
+    fine = icha.simulate(*small(), Path([5e-2], unload=True, max_step=0.5 * DEFAULT_STEP))
     assert fine.sizes["step"] > coarse.sizes["step"]
     for name in ("pull_off_pressure", "hysteresis_loss"):
         assert float(fine[name]) == pytest.approx(float(coarse[name]), rel=0.01), name

@@ -32,7 +32,6 @@ from few_asperities import (
     load,
     pair,
     small,
-    stable_radius,
     travelled,
     united_run,
 )
@@ -48,8 +47,8 @@ from icha.path.follow import follow
 from icha.path.limits import MAX_REDUCED_PRESSURE
 from icha.path.resolution import Account, Stride, resolved
 from icha.path.targets import LOAD_CONTROL
-from icha.references.one_asperity import paraboloid
 from icha.surfaces.summits import find_summits
+from validation.surfaces import paraboloid
 
 # --- one asperity -------------------------------------------------------------------------------------------
 
@@ -162,9 +161,9 @@ def test_four_equal_asperities_let_go_at_their_common_limit_point():
 # --- turning points -----------------------------------------------------------------------------------------
 
 
-def some(until="detachment"):
+def some():
     """Three asperities that feel each other and their images."""
-    return contact_of([HEIGHT, HEIGHT - 1.5, HEIGHT - 3.1], [[-9, 0], [8, 3], [1, -11]], period=60.0, until=until)
+    return contact_of([HEIGHT, HEIGHT - 1.5, HEIGHT - 3.1], [[-9, 0], [8, 3], [1, -11]], period=60.0)
 
 
 def value_of(kind, contact, waypoint):
@@ -240,7 +239,7 @@ def scattered(count, seed):
     """Asperities anywhere in a cell, of random heights, that feel each other and their images."""
     rng, side = np.random.default_rng(seed), np.sqrt(count)
     heights = HEIGHT - 3 * np.abs(rng.normal(size=count))
-    return contact_of(heights, 10 * side * (rng.random((count, 2)) - 0.5), period=13 * side, until="overlap")
+    return contact_of(heights, 10 * side * (rng.random((count, 2)) - 0.5), period=13 * side)
 
 
 @pytest.mark.parametrize("control", ["separation", "load"])
@@ -265,29 +264,19 @@ def test_contact_without_an_equilibrium_was_never_made():
 # --- united spots -------------------------------------------------------------------------------------------
 
 
-def test_when_a_united_spot_lets_go_the_taller_asperity_stays_on_its_branch():
-    contact = pair(3.0, 4.0, "detachment")
-    waypoints = travelled(contact, [0.03], unload=True)
-    members = [w.state.spots.members.tolist() for w in waypoints if w.leg == 1]
-    assert members[0] == [2] and [1] in members and [1, 1] not in members
-    after = [w.state for w in waypoints if w.leg == 1 and w.state.spots.members.tolist() == [1]]
-    for state in after:
-        d = HEIGHT - state.separation
-        assert d > JUMP_OFF_APPROACH - 1e-7
-        d = max(d, JUMP_OFF_APPROACH)
-        np.testing.assert_allclose(state.spots.contact_radius, stable_radius(d), rtol=1e-3)
-        np.testing.assert_allclose(state.spots.position, [[FAR / 2 - 2, FAR / 2]])
-    assert HEIGHT - after[-1].separation == pytest.approx(JUMP_OFF_APPROACH, abs=1e-5)
-    end = closed_again(waypoints)
-    assert (end.coalescences, end.splits, end.jump_ins, end.jump_offs) == (1, 1, 2, 2)
-    events = history(waypoints)
-    assert events.kind[-3:].tolist() == [JUMP_OFF, SPLIT, JUMP_OFF]
-    assert events.members[-3:].tolist() == [2, 2, 1]
+def test_a_united_spot_that_lets_go_falls_into_its_asperities():
+    """Where both of them have a stable state they stay in contact, and unite again."""
+    contact = pair(3.0, 4.0)
+    united = [w.state for w in travelled(contact, [0.03]) if w.state.spots.members.tolist() == [2]][-1]
+    after = contact.equilibrium(united, united.separation, let_go=1)
+    events = contact.events_between(united, after)
+    assert events.kind.tolist() == [JUMP_OFF, SPLIT, COALESCENCE] and events.members.tolist() == [2, 2, 2]
+    assert after.spots.members.tolist() == [2]
 
 
 def test_an_overlap_parts_where_it_began():
     """The two spots that a union was made of come apart about where they met, and break one after the other."""
-    waypoints = travelled(pair(3.0, 6.0, "overlap"), [0.04], unload=True)
+    waypoints = travelled(pair(3.0, 6.0), [0.04], unload=True)
     end = closed_again(waypoints)
     assert (end.coalescences, end.splits, end.jump_offs) == (1, 1, 2)
 
@@ -356,7 +345,6 @@ def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
         ({"control": "force", "unload": True}, "^control: 'force' must be one of separation, load"),
         ({"control": None}, "^control: None"),
         ({"control": "load"}, "^control: 'load'"),
-        ({"united_until": "x"}, "^united_until: 'x' must be one of overlap, detachment"),
         ({"turning_points": 0.1}, "^turning_points: 0.1 is not a list"),
         ({"turning_points": [0.1]}, r"^turning_points\[0\]: 0.1 is not a pair"),
         ({"turning_points": [("pressure", 0.01)]}, r"^turning_points\[0\]: kind 'pressure' must be one of"),

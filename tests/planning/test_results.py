@@ -27,7 +27,6 @@ def campaign(tmp_path_factory):
         ("runs", results.RUN),
         ("solutions", results.SOLUTION),
         ("loops", results.LOOP),
-        ("error_sources", results.ERROR_SOURCES),
     ],
 )
 def test_every_path_is_its_pattern_with_the_parts_of_its_labels(campaign, kind, pattern):
@@ -51,7 +50,6 @@ def test_a_folder_stands_before_every_path(campaign):
         ("runs/load/rough/seed1/slope0.5/soft.nc", "logs/runs/load/rough/seed1/slope0.5/soft.log"),
         ("references/rough.nc", "logs/references/rough.log"),
         ("references/loops/e/rough/seed1/slope0.5/soft.nc", "logs/loops/e/rough/seed1/slope0.5/soft.log"),
-        (results.ONE_ASPERITY, "logs/one_asperity/{asperity}.log"),
     ],
 )
 def test_logs_of_jobs_lie_apart_from_their_files(path, expected):

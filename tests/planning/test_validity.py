@@ -9,9 +9,8 @@ import small_campaign as small
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.load import load_configuration
-from icha.datasets.campaign_file.write import write_campaign
-from icha.planning.roughness import rms_curvature
-from icha.planning.validity import expected_validity, found_validity
+from icha.datasets.campaign_file import write_campaign
+from icha.planning.validity import expected_validity, found_validity, rms_curvature
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import spectral_moments
 

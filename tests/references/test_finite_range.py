@@ -1,4 +1,4 @@
-"""Boundary elements against exact solutions; ICHA against boundary elements where the two must agree: on one bump."""
+"""Boundary elements at finite ranges against exact solutions."""
 
 import os
 import subprocess
@@ -19,9 +19,8 @@ from icha.references.finite_range import (
     perimeter_correction,
     states_at_mean_separations,
 )
-from icha.references.one_asperity import hertz_asperity, one_asperity, paraboloid
-from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
+from validation.surfaces import paraboloid
 
 HERTZ = MATERIALS["hertz"]
 
@@ -33,80 +32,6 @@ def displacement(state, contact_modulus):
     q = k * np.hypot(np.fft.fftfreq(n, 1 / n)[:, None], np.fft.rfftfreq(n, 1 / n))
     q[0, 0] = np.inf
     return np.fft.irfft2(2 / (contact_modulus * q) * np.fft.rfft2(state.traction), s=(n, n))
-
-
-# --- one bump: the model and the boundary elements have to agree -------------------------------------------------
-
-
-def test_the_bump_is_one_asperity_of_radius_one():
-    summits = find_summits(paraboloid(128, 10.0))
-    assert len(summits) == 1
-    assert summits.radius_of_curvature == pytest.approx(1.0, rel=1e-9)
-
-
-@pytest.fixture(scope="module")
-def hertzian():
-    return hertz_asperity(contact_radii=[1.0, 0.5], period=16.0, grid=512)
-
-
-@pytest.mark.parametrize("name", ["zero_gap_area_error", "force_error"])
-def test_hertzian_bump_agrees_within_one_percent_at_a_given_approach(hertzian, name):
-    np.testing.assert_allclose(hertzian[name], 0, atol=0.01)
-
-
-@pytest.mark.parametrize("name", ["zero_gap_area_error_at_load", "approach_error_at_load"])
-def test_hertzian_bump_agrees_within_one_percent_at_a_given_load(hertzian, name):
-    np.testing.assert_allclose(hertzian[name], 0, atol=0.01)
-    assert hertzian.sizes["given_load"] == 2
-
-
-@pytest.fixture(scope="module", params=[2.0, pytest.param(3.5, marks=pytest.mark.slow)])
-def adhesive(request):
-    """A bump with adhesion in compression, in tension and where it is pulled off, on as few nodes as resolve it.
-
-    At the Tabor parameter 3.5 the two are within 3 %; the smaller one is as quick as it is less near JKR's limit.
-
-    The area is compared with the energetic one, which JKR's is the limit of: the cohesive zone, a few per cent of the
-    radius, is no part of the area of zero gap. Approach and load change sign on the way: their errors are those of
-    JKR's own length, and of the load or the pull-off force, whichever is larger.
-    """
-    return one_asperity(request.param, approaches=[3.0, 1.5], period=10.0)
-
-
-def near_jkr(adhesive):
-    return 0.03 if adhesive.tabor_parameter > 3 else 0.08
-
-
-@pytest.mark.parametrize("name", ["energetic_area_error", "force_error"])
-def test_jkr_bump_agrees_at_a_given_approach(adhesive, name):
-    np.testing.assert_allclose(adhesive[name], 0, atol=near_jkr(adhesive))
-
-
-@pytest.mark.parametrize("name", ["energetic_area_error_at_load", "approach_error_at_load"])
-def test_jkr_bump_agrees_at_a_given_load(adhesive, name):
-    np.testing.assert_allclose(adhesive[name], 0, atol=near_jkr(adhesive))
-    assert adhesive.given_load[0] > 0 > adhesive.given_load[1]
-
-
-def test_jkr_pull_off_force_agrees(adhesive):
-    """The largest tension on the way up, against JKR's 3/2 pi dgamma R."""
-    assert max(-adhesive.force_boundary_elements) == pytest.approx(1.5 * np.pi, rel=near_jkr(adhesive))
-
-
-@pytest.mark.slow
-def test_area_of_zero_gap_agrees_within_three_percent_where_the_cohesive_zone_is_narrow():
-    """It needs a larger Tabor parameter than all else, and a grid to resolve it; this state bears next to no load."""
-    narrow = one_asperity(5.0, approaches=(2.0,), pull_off=False, period=8.0)
-    for name in ("zero_gap_area_error", "zero_gap_area_error_at_load", "energetic_area_error", "force_error"):
-        np.testing.assert_allclose(narrow[name], 0, atol=0.03)
-
-
-def test_jkr_contact_lies_between_the_zero_gap_and_the_energetic_area(adhesive):
-    """In tension, where next to nothing comes from the neighbouring cells."""
-    tension = adhesive.isel(approach=slice(1, None))
-    assert np.all(tension.force_boundary_elements < 0) and tension.sizes["approach"] == 2
-    assert np.all(tension.zero_gap_area < tension.area_icha)
-    assert np.all(tension.area_icha < tension.energetic_area)
 
 
 # --- exact solutions ---------------------------------------------------------------------------------------------

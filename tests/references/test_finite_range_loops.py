@@ -8,7 +8,7 @@ from icha.asperity.material import Material
 from icha.references.failures import NotSolved
 from icha.references.finite_range import GapContact
 from icha.references.finite_range_loops import finite_range_loop
-from icha.references.one_asperity import paraboloid
+from validation.surfaces import paraboloid
 
 ROUGH = icha.SelfAffineSpectrum(period=1.0, rolloff_wavelength=0.5, short_wavelength=0.25, hurst=0.8, rms_slope=0.1)
 PERIOD = 8.0

@@ -11,14 +11,13 @@ from typer.testing import CliRunner
 
 import icha
 from icha.cli import app
-from icha.cli.events import Job, last_line, reason_of
-from icha.cli.project import Mistake, told
-from icha.cli.terminal import markup, say
+from icha.cli.live import Job, last_line, reason_of
+from icha.cli.project import Mistake, markup, say, told
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.report.explorer import _filled
 from icha.report.template import template
-from icha.support.printable import is_printable, printable, printable_lines
+from icha.support.in_words import is_printable, printable, printable_lines
 
 EVIL = "a\x1b[2J\x9b1m\r\b\x07\x7f\u202eb\u2028c\u200b"
 

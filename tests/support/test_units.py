@@ -7,7 +7,7 @@ import pint
 import pytest
 import yaml
 
-from icha.support.units import USUAL, to_number, to_si
+from icha.support.values import USUAL, to_number, to_si
 
 
 def test_quantities_are_exact_si_values():

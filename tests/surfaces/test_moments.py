@@ -78,10 +78,6 @@ def test_surface_files_hold_the_moments(tmp_path):
         read_spectral_moments(tmp_path / "none.nc")
 
 
-def test_stickiness_without_adhesion_is_none():
-    assert stickiness(spectral_moments(rough()), Material(25e6, 0.0, 2e-9)) == 0.0
-
-
 def test_stickiness_is_the_attraction_beside_hertzian_contacts():
     # Contact strips of width d under cylinders of the curvature h''/2 have beside them Hertz's gap
     # (a^2/2R)(s sqrt(s^2 - 1) - arcosh s), s = x/a, a = d/2. In the limit of short range the strips where it is less
@@ -113,14 +109,6 @@ def test_surfaces_stick_where_the_published_inequality_holds():
     assert bound == pytest.approx(1.03, abs=2e-3)
 
 
-def test_softness_energy_and_smoothness_make_sticky():
-    moments = spectral_moments(rough())
-    usual = stickiness(moments, MATERIAL)
-    assert stickiness(moments, Material(12.5e6, 0.05, 2.071e-9)) == pytest.approx(2 * usual)
-    assert stickiness(moments, Material(25e6, 0.1, 2.071e-9)) == pytest.approx(2 * usual)
-    assert stickiness(moments.scaled_to_rms_slope(0.5), MATERIAL) == pytest.approx(usual * 2 ** (5 / 3))
-
-
 def test_power_spectrum_is_that_of_the_synthesis():
     """C(q) of every ring: integral over the plane is h_rms^2, and the spectrum that was asked for comes back."""
     spectrum = SelfAffineSpectrum(1.0, 0.25, 0.02, 0.7)
@@ -130,13 +118,6 @@ def test_power_spectrum_is_that_of_the_synthesis():
     inside = (q > 1.05 * 2 * np.pi / 0.25) & (q < 0.95 * 2 * np.pi / 0.02)
     np.testing.assert_allclose(power[inside], spectrum.psd(q[inside]), rtol=0.03)
     assert np.all(power[q > 1.1 * 2 * np.pi / 0.02] < 1e-20 * power.max())
-
-
-def test_power_spectrum_of_one_wave_is_where_it_belongs():
-    y, x = np.mgrid[:64, :64] / 64
-    surface = Surface(2.0 * np.cos(2 * np.pi * (6 * x + 8 * y)), 3.0)
-    q, power = radial_power_spectrum(surface)
-    assert q[np.argmax(power)] == pytest.approx(10 * 2 * np.pi / 3.0, rel=0.05)
 
 
 def test_power_spectrum_of_a_free_square_does_not_see_its_edges():

@@ -336,7 +336,7 @@ VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
 
 def validate(folder: Path, names: list[str], most: int) -> bool:
     """Run validators and print what they say; whether all are content."""
-    from icha.support.printable import printable
+    from icha.support.in_words import printable
 
     good = True
     for name in names:
@@ -361,8 +361,8 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
 def main() -> int:
     """Validate what the command line names."""
     from icha.deposit.verify import LARGE, Damaged, whole_deposit
-    from icha.support.hdf5 import refuse_traps
-    from icha.support.printable import printable
+    from icha.support.in_words import printable
+    from icha.support.input_files import refuse_traps
 
     parser = argparse.ArgumentParser(description="Put a deposit to the validators of others, without any network.")
     parser.add_argument("deposit", type=Path, help="a folder or a zip archive")

@@ -1,7 +1,7 @@
 # What was asked for; all runs in one file, a group per study; the runs of every study at common loads; the runs against
 # boundary elements; what every result must satisfy, and whether it does.
 
-from icha.configuration.settings import campaign_sha256
+from icha.configuration.cases import campaign_sha256
 from icha.deposit.metadata import discovery_attributes
 from icha.support.checksums import sha256_of
 

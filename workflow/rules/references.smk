@@ -1,8 +1,8 @@
 # What runs are compared with: what theories say of a surface, and published points; boundary elements on the topography
-# of a run, one load each or both ways; variants between the model and them; one asperity, where the answer is known.
+# of a run, one load each or both ways.
 
-from icha.configuration.settings import adhesive_contacts, loop_settings, solution_settings, source_settings
-from icha.planning.resources import solver_memory
+from icha.configuration.cases import adhesive_contacts, loop_settings, solution_settings
+from icha.planning.needs import solver_memory
 
 
 rule reference:
@@ -82,52 +82,3 @@ rule boundary_element_loop:
         "slope {wildcards.slope}, {wildcards.material}"
     script:
         "../scripts/follow_boundary_elements.py"
-
-
-rule error_sources:
-    input:
-        surface="<results>/surfaces/{surface}/seed{seed}.nc",
-    output:
-        "<results>/references/error_sources/{entry}/<contact>.nc",
-    log:
-        "<logs>/error_sources/{entry}/<contact>.log",
-    benchmark:
-        "<benchmarks>/error_sources/{entry}/<contact>.jsonl"
-    conda:
-        "../envs/icha.yaml"
-    resources:
-        mem_mb=lambda wildcards: solver_memory(CAMPAIGN, wildcards.surface, CAMPAIGN.error_sources[wildcards.entry]),
-        runtime=480,
-    params:
-        settings=lambda wildcards: source_settings(
-            CAMPAIGN, held(FILES.error_sources, results.ERROR_SOURCES, wildcards)
-        ),
-        attributes=as_it_is(ATTRIBUTES),
-        code=code_of("find_error_sources.py"),
-    message:
-        "Sources of the error {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
-        "{wildcards.material}"
-    script:
-        "../scripts/find_error_sources.py"
-
-
-rule one_asperity:
-    output:
-        "<results>/references/one_asperity/{asperity}.nc",
-    log:
-        "<logs>/one_asperity/{asperity}.log",
-    benchmark:
-        "<benchmarks>/one_asperity/{asperity}.jsonl"
-    conda:
-        "../envs/icha.yaml"
-    resources:
-        mem_mb=800,
-        runtime=120,
-    params:
-        tabor_parameter=lambda wildcards: held(FILES.one_asperity, results.ONE_ASPERITY, wildcards),
-        attributes=as_it_is(ATTRIBUTES),
-        code=code_of("press_one_asperity.py"),
-    message:
-        "One asperity: {wildcards.asperity}"
-    script:
-        "../scripts/press_one_asperity.py"

@@ -2,7 +2,7 @@
 
 from job import attributes, guarded
 
-from icha.datasets.campaign_file.write import write_campaign
+from icha.datasets.campaign_file import write_campaign
 
 
 def make_dataset(runs, output, *, labels, settings, attributes):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from icha.datasets.bins import bin_table
+from icha.datasets.build import bin_table
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.terms import Variable
 

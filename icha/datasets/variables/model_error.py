@@ -3,7 +3,7 @@
 In the limit of a short range contact has an edge beyond which nothing acts: all areas of boundary elements are one.
 """
 
-from icha.datasets.bins import bin_table
+from icha.datasets.build import bin_table
 from icha.datasets.variables.terms import Variable
 
 # What the model is compared with: the attribute `truth` of an entry.

@@ -5,7 +5,7 @@ import numpy as np
 from icha.asperity.full_contact import MEANING
 from icha.contact.events import EVENT_KINDS
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
-from icha.datasets.bins import bin_table
+from icha.datasets.build import bin_table
 from icha.datasets.variables.terms import INFINITE, MATERIAL, ROUGHNESS, Variable, term, terms
 
 _STEP, _SNAPSHOT, _SPOT, _EVENT = ("step",), ("snapshot",), ("spot",), ("event",)
@@ -123,12 +123,6 @@ RUN = {
         (), "1", "number of maxima of the interpolated surface that are no asperities, as no nodes support them", int
     ),
     "control": Variable((), "1", "what is imposed: separation or load", str),
-    "united_until": Variable(
-        (),
-        "1",
-        "how long united spots stay united on the way back: detachment or overlap; empty for boundary elements",
-        str,
-    ),
 }
 
 # Besides, those of boundary elements ...

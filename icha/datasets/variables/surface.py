@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from icha.datasets.bins import BOUND
+from icha.datasets.build import BOUND
 from icha.datasets.variables.terms import Variable, terms
 
 _RING = ("psd_bin",)

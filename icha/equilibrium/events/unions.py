@@ -9,7 +9,6 @@ import numpy as np
 
 from icha.asperity.coalescence import disjoint_pairs, equivalent_spots, overlapping_pairs
 from icha.contact.events import COALESCENCE, JUMP_IN
-from icha.contact.unions import OVERLAP
 from icha.equilibrium.equations import Point
 from icha.equilibrium.search import Search
 from icha.equilibrium.sites import CONTACT, TRIAL, Union
@@ -89,10 +88,8 @@ def _overlapping(search, point, margin, deep):
 
 
 def _parts(search, pairs, a, radius):
-    """What the united spots are made of (k,), where that is kept: None or a Union."""
+    """What the united spots are made of (k,): a Union each."""
     parts = np.full(len(pairs), None)
-    if search.problem.united_until != OVERLAP:
-        return parts
     sites, (i, j) = search.sites, pairs.T
     way = periodic_difference(sites.position[j], sites.position[i], search.problem.asperities.cell)
     touching = radius * np.minimum(np.linalg.norm(way, axis=1) / (a[i] + a[j]), 1.0)

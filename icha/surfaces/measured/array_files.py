@@ -1,25 +1,47 @@
-"""Readers of arrays with or without their units: npy, netCDF and HDF5."""
+"""Readers of arrays: npy, netCDF, HDF5, and whatever formats of instruments SurfaceTopography reads."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from icha.support.input_files import require_room
-from icha.surfaces.measured.found import Found, chosen_name, metres_of, regular_ticks, with_y_first
-from icha.surfaces.measured.settings import Preparation, UnfitTopography
+from icha.support.input_files import bounded_memory, flaw_of_path, refuse_traps, require_room
+from icha.support.rules import LENGTH
+from icha.surfaces.measured.settings import (
+    LINE_SCAN,
+    Found,
+    Preparation,
+    UnfitTopography,
+    chosen_name,
+    metres_of,
+    regular_ticks,
+    with_y_first,
+)
+from icha.surfaces.square import flaw_of_heights
 
 # Copies of an array, as floats, that are held while it is read.
 _COPIES = 3
+# Formats in which any bytes of the right number are heights: there it is the ending of the name that tells.
+_WITHOUT_SIGNATURE = ("hgt", "nms")
+# Formats that are no evidence of an instrument: of any text with numbers, of which other fields are dropped, and
+# of any file of a certain length.
+_OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
+# Formats of arrays that say nothing about themselves.
+_ARRAYS = ("mat", "npz")
+_UNKNOWN = (
+    "cannot be read as instrument: the file is of none of the formats of instruments that are known here, or damaged; "
+    "allowed: another `format`, or an export of the heights as text"
+)
+_ALLOWED = "allowed: a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
 
 
-def read_npy(path: Path, how: Preparation) -> Found:
+def read_npy(file, how: Preparation) -> Found:
     """An array of NumPy's, without names or units."""
-    return Found(with_y_first(whole_npy(path), how))
+    return Found(with_y_first(_whole_npy(file.path), how))
 
 
-def whole_npy(path: Path) -> np.ndarray:
+def _whole_npy(path: Path) -> np.ndarray:
     """The array of a file of NumPy's."""
     # Mapped, no more is declared than is there; of what overflows NumPy warns before it refuses it.
     with np.errstate(over="ignore"):
@@ -28,7 +50,7 @@ def whole_npy(path: Path) -> np.ndarray:
     return np.array(array)
 
 
-def whole_variable(variable) -> np.ndarray:
+def _whole_variable(variable) -> np.ndarray:
     """The numbers of a netCDF variable as floats, nan where they are missing."""
     _require_room(variable)
     return np.ma.filled(variable[...].astype(float), np.nan)
@@ -39,11 +61,11 @@ def _require_room(declared):
     require_room(_COPIES * 8 * math.prod(declared.shape))
 
 
-def read_netcdf(path: Path, how: Preparation) -> Found:
+def read_netcdf(source, how: Preparation) -> Found:
     """The variable `data`, `height`, `heights`, `z` or the only one of two dimensions, with its units and axes."""
     import netCDF4
 
-    with netCDF4.Dataset(path) as file:
+    with netCDF4.Dataset(source.path) as file:
         shapes = {name: variable.shape for name, variable in file.variables.items()}
         plane = maps_among(shapes)
         asked = how.data if how.data in shapes else chosen_name(how.data, plane, ("height", "heights", "z"), "variable")
@@ -52,7 +74,7 @@ def read_netcdf(path: Path, how: Preparation) -> Found:
             raise UnfitTopography(
                 "data", f"has {chosen.ndim} dimensions; allowed: {', '.join(plane) or 'none is there'}"
             )
-        heights = whole_variable(chosen)
+        heights = _whole_variable(chosen)
         heights = heights.reshape(heights.shape[-2:])
         dimensions = chosen.dimensions[-2:]
         names = [name.lower() for name in dimensions]
@@ -74,7 +96,7 @@ def _side(coordinate, count):
     if coordinate is None or coordinate.ndim != 1:
         return None, False
     about, unit = coordinate.__dict__, _unit_of(coordinate.__dict__)
-    values = whole_variable(coordinate)
+    values = _whole_variable(coordinate)
     if unit is not None and "length" in about:
         return float(about["length"]) * unit, False
     if count < 2:
@@ -85,14 +107,14 @@ def _side(coordinate, count):
     return (count * step * unit if unit is not None else None), values[0] > values[-1]
 
 
-def read_hdf5(path: Path, how: Preparation) -> Found:
+def read_hdf5(source, how: Preparation) -> Found:
     """The dataset `data`, or the only one of two dimensions; its attribute `units` or `unit`, if there is one.
 
     MATLAB (from version 7.3) stores columns, so that HDF5 has the transpose of what MATLAB shows.
     """
     import h5py
 
-    with h5py.File(path) as file:
+    with h5py.File(source.path) as file:
         shapes = {}
 
         def note(name, node):
@@ -111,23 +133,22 @@ def read_hdf5(path: Path, how: Preparation) -> Found:
         chosen = file[name]
         _require_room(chosen)
         heights = chosen[...].reshape(chosen.shape[-2:])
-        if path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
+        if source.path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
             heights = heights.T
         unit = _unit_of(dict(chosen.attrs))
         return Found(with_y_first(heights, how), unit, data=name if len(plane) > 1 else "")
 
 
-def format_of_hdf5(path: Path) -> str:
-    """The format of an HDF5 file whose name does not tell it; netCDF-4 and Zygo's files are HDF5, too."""
+def format_of_hdf5(path: Path) -> str | None:
+    """The format of an HDF5 file whose name does not tell it, None of others; netCDF-4 and Zygo's files are HDF5."""
     import h5py
 
-    try:
-        with h5py.File(path) as file:
-            if "_NCProperties" in file.attrs:
-                return "netcdf"
-            return "instrument" if "MetaData" in file else "hdf5"
-    except OSError:  # damaged, which its reader reports
-        return "hdf5"
+    if not h5py.is_hdf5(path):
+        return None
+    with h5py.File(path) as file:
+        if "_NCProperties" in file.attrs:
+            return "netcdf"
+        return "instrument" if "MetaData" in file else "hdf5"
 
 
 def _is_map(shape):
@@ -135,7 +156,7 @@ def _is_map(shape):
     return len(shape) >= 2 and all(count == 1 for count in shape[:-2])
 
 
-def maps_among(shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
+def maps_among(shapes: Mapping[Hashable, tuple[int, ...]]) -> list:
     """Names of the arrays that can be maps of heights; lines and single numbers of two dimensions only if no other is.
 
     MATLAB keeps every number and every line as an array of two dimensions.
@@ -150,3 +171,106 @@ def _unit_of(attributes):
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
     return None if text is None else metres_of(text)
+
+
+def open_instrument(path: Path):
+    """Open a file with SurfaceTopography; None if it is of no format that it knows."""
+    from SurfaceTopography import open_topography
+    from SurfaceTopography.Exceptions import CannotDetectFileFormat
+
+    try:
+        return open_topography(str(path))
+    except CannotDetectFileFormat:  # its message lists what every reader says
+        return None
+
+
+def is_instrument_text(file) -> bool:
+    """Whether SurfaceTopography knows the format of a text file, as one of a certain instrument."""
+    try:
+        return file.instrument is not None and file.instrument.format() not in _OF_ANY_TEXT
+    except Exception:  # a damaged file of a format that it knows; reading it gives the message
+        return True
+
+
+def read_instrument(file, how: Preparation) -> Found:
+    """Whatever SurfaceTopography reads. Its arrays have x as first axis."""
+    opened = file.instrument
+    endings = opened.file_extensions() if opened is not None else ()
+    if opened is None or (
+        opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower().removeprefix(".") not in endings
+    ):
+        raise UnfitTopography("path", _UNKNOWN)
+    channel, data = _channel(opened, how)
+    said = channel.physical_sizes
+    topography = channel.topography(**({"physical_sizes": (1.0, 1.0)} if said is None else {}))
+    heights = np.ma.filled(np.ma.asarray(topography.heights()).astype(float), np.nan).T
+    unit = None if topography.unit is None else metres_of(topography.unit)
+    size = coordinates = None if said is None else tuple(float(side) for side in topography.physical_sizes)
+    lateral = how.lateral_unit or unit
+    if size is not None:
+        size = None if lateral is None else tuple(side * lateral for side in size)
+    coordinates = coordinates if size is None else None
+    return Found(heights, unit, size, coordinates, format=opened.name(), data=data)
+
+
+def _channel(opened, how):
+    """The channel that is asked for, or the default one; its name, empty if it is the only map."""
+    channels = opened.channels
+    names = [channel.name for channel in channels]
+    maps = [channels[k] for k in maps_among({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})]
+    if how.data is not None:
+        channel = channels[names.index(chosen_name(how.data, names, (), "channel"))]
+    elif opened.format() in _ARRAYS and maps:
+        # Arrays of a workspace have no default: whichever came first would be pressed.
+        channel = channels[names.index(chosen_name(None, [each.name for each in maps], (), "array"))]
+    else:
+        channel = opened.default_channel
+    if channel.dim != 2:
+        areal = [each.name for each in channels if each.dim == 2]
+        if not areal:
+            raise UnfitTopography("path", LINE_SCAN.format(max(channel.nb_grid_pts)))
+        raise UnfitTopography("data", f"is a line scan; allowed: a topography, of {', '.join(areal)}")
+    return channel, channel.name if len(maps) > 1 else ""
+
+
+def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
+    """Read the heights of a file, (n, n) in m, first axis y.
+
+    Parameters
+    ----------
+    path : `.npy`, or netCDF with a variable `height`.
+    metres_per_unit : the unit of the heights in the file.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or its heights are not a square array of finite numbers.
+    """
+    path = Path(path)
+    if flaw := flaw_of_path(path):
+        raise ValueError(f"{flaw}; {_ALLOWED}")
+    try:
+        with bounded_memory():
+            refuse_traps(path)
+            heights = _heights(path)
+    except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
+        raise ValueError(f"cannot be read ({error}); {_ALLOWED}") from None
+    if heights.dtype.kind not in "iuf":
+        raise ValueError(f"holds {heights.dtype}, not real numbers; {_ALLOWED}")
+    if flaw := flaw_of_heights(heights):
+        raise ValueError(f"holds {flaw}; {_ALLOWED}")
+    heights = heights.astype(float) * metres_per_unit
+    if not LENGTH.holds(float(np.ptp(heights))):
+        raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {_ALLOWED}, and another unit")
+    return heights
+
+
+def _heights(path: Path) -> np.ndarray:
+    if path.suffix == ".npy":
+        return _whole_npy(path)
+    if path.suffix == ".nc":
+        import netCDF4
+
+        with netCDF4.Dataset(path) as data:
+            return _whole_variable(data["height"])
+    raise ValueError(f"unknown kind of file {path.suffix!r}")

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 
-from icha.surfaces.measured.cutoff import LEAST_PIXELS
+from icha.surfaces.measured.steps import LEAST_PIXELS
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import (
     LEAST_CELLS_OF_SUMMIT,
@@ -18,8 +18,7 @@ from icha.surfaces.moments import (
     radial_power_spectrum,
     ring_edges,
 )
-from icha.surfaces.summit_coverage import SummitCoverage
-from icha.surfaces.summits import Asperities, locate_summits
+from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
 # The spectrum of a self-affine surface falls at least as q^-2 (its Hurst exponent is not negative), that of

@@ -1,21 +1,19 @@
 """A scan in metres: what a file of any format says, with units and size."""
 
 import importlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from icha.support import in_words
-from icha.support.hdf5 import is_hdf5, refuse_traps
-from icha.support.input_files import TooLarge, bounded_memory
-from icha.support.printable import printable
+from icha.support.in_words import printable
+from icha.support.input_files import RefusedFile, bounded_memory, refuse_traps
 from icha.support.rules import LENGTH
-from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_netcdf, read_npy
-from icha.surfaces.measured.fourier_files import read_fourier
-from icha.surfaces.measured.instrument_files import read_instrument
+from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
-from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
+from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
+from icha.surfaces.measured.text_tables import SourceFile
 
 READERS = {
     "npy": read_npy,
@@ -35,12 +33,13 @@ class Scan:
     """What a file says in metres: heights (ny, nx), nan where missing, first axis y, and the size (x, y) of it all.
 
     coordinate_unit: metres, where the size follows from coordinates whose unit the file does not tell. format: as
-    which the file was read. data: name of the array or channel that was taken, empty if the file has only one.
+    which the file was read. data: name of the array or channel that was taken, empty if the file has only one. steps:
+    what was read and done, in words.
     """
 
     heights: np.ndarray
     size: tuple[float, float]
-    description: str = ""
+    steps: tuple[str, ...] = ()
     coordinate_unit: float | None = None
     format: str = ""
     data: str = ""
@@ -50,6 +49,10 @@ class Scan:
         """Distance of neighbouring nodes along x and along y, m."""
         rows, columns = self.heights.shape
         return self.size[0] / columns, self.size[1] / rows
+
+    def after(self, heights: np.ndarray, *said: str, size: tuple[float, float] | None = None) -> "Scan":
+        """The scan with other heights after a step, what is to be said about it, and another size if it has one."""
+        return replace(self, heights=heights, size=size or self.size, steps=(*self.steps, *said))
 
     @property
     def remark_on_unit(self) -> str:
@@ -64,10 +67,7 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     """Read a file of any of the formats; errors as `icha.surfaces.measured.topography.prepared_topography`."""
     if not path.stat().st_size:
         raise UnfitTopography("path", "is empty; allowed: a file of heights")
-    name = how.format
-    if name == "auto":
-        name = "xyz" if how.columns else format_of(path)
-    found = _read(path, name, how)
+    name, found = _read(path, how)
     unit = how.height_unit or found.unit
     if unit is None:
         raise UnfitTopography("height_unit", "is missing, and the file does not say it; allowed: such as 'um'")
@@ -84,7 +84,7 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     if found.data:
         said += f", data {printable(found.data)} of several"
     format_ = f"{name} ({found.format})" if name == "instrument" else name
-    scan = Scan(found.heights.astype(float) * unit, tuple(size), said, coordinate_unit, format_, found.data)
+    scan = Scan(found.heights.astype(float) * unit, tuple(size), (said,), coordinate_unit, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
         raise UnfitTopography(
             "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; allowed: give it here"
@@ -92,17 +92,26 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     return scan
 
 
-def _read(path, name, how):
-    """What the reader of a format finds, if that are heights."""
+def _read(path, how):
+    """The format of a file, and what its reader finds, if that are heights."""
+    file, name = SourceFile(path), how.format
     try:
-        if name in _LIBRARIES:
-            importlib.import_module(_LIBRARIES[name])
         with bounded_memory():
-            _refuse_traps(path)
-            found = READERS[name](path, how)
+            refuse_traps(path)
+            if name == "auto":
+                name = "xyz" if how.columns else _format_of(path)
+            library = _LIBRARIES.get(name)
+            if name in ("text", "matrix") and (file.layout is None or file.layout.heading):
+                library = "SurfaceTopography"
+        if library is not None:
+            importlib.import_module(library)
+        with bounded_memory():
+            if name == "text":
+                name = format_of_text(file) or "instrument"
+            found = READERS[name](file, how)
     except UnfitTopography:
         raise
-    except TooLarge as error:
+    except RefusedFile as error:
         raise UnfitTopography("path", str(error)) from None
     except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
         raise UnfitTopography(
@@ -116,20 +125,9 @@ def _read(path, name, how):
     if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
         # Two columns are x and z.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
-    if heights.ndim != 2:
+    if heights.ndim != 2 or not heights.size:
         raise UnfitTopography("path", f"holds an array of shape {heights.shape}; allowed: rows and columns of heights")
-    if not heights.size:
-        raise UnfitTopography(
-            "path", f"holds an array of shape {heights.shape}, no heights; allowed: a file of heights"
-        )
-    return found
-
-
-def _refuse_traps(path):
-    try:
-        refuse_traps(path)
-    except ValueError as error:
-        raise UnfitTopography("path", str(error)) from None
+    return name, found
 
 
 def _own_reason(error):
@@ -141,14 +139,12 @@ def _own_reason(error):
     return f" ({error})" if own else ""
 
 
-def format_of(path: Path) -> str:
-    """The format that a file has by the ending of its name and, if it is text, by its columns."""
+def _format_of(path: Path) -> str:
+    """The format that a file has by its name or, if it is HDF5, by what is in it; else "text", which may be others."""
     suffix = path.suffix.lower()
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:
         return known[suffix]
-    if is_hdf5(path):
-        return format_of_hdf5(path)
-    if path.name.lower().endswith(".xyz.gz"):
-        return "xyz"
-    return format_of_text(path) or "instrument"
+    if (known := format_of_hdf5(path)) is not None:
+        return known
+    return "xyz" if path.name.lower().endswith(".xyz.gz") else "text"

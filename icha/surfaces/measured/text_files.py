@@ -1,56 +1,62 @@
-"""Readers of text: a row of heights per line, or x y z."""
+"""Readers of text: a row of heights per line, x y z, or the waves of a Fourier series; and what a heading says."""
 
-from pathlib import Path
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import scipy.fft
 
 from icha.support.input_files import require_room
-from icha.surfaces.measured.found import Found, regular_ticks, with_y_first
-from icha.surfaces.measured.instrument_files import is_instrument_text, read_instrument
-from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
-from icha.surfaces.measured.text_headings import WIDTH, read_heading
-from icha.surfaces.measured.text_tables import layout_of, read_table, without_scales
+from icha.support.rules import GRID
+from icha.surfaces.measured.array_files import is_instrument_text, read_instrument
+from icha.surfaces.measured.settings import (
+    LINE_SCAN,
+    Found,
+    Preparation,
+    UnfitTopography,
+    metres_of,
+    regular_ticks,
+    with_y_first,
+)
+from icha.surfaces.measured.text_tables import SourceFile, without_scales
 
 # A surface has at least so many columns of heights.
 _FEWEST_COLUMNS = 8
 
 
-def read_matrix(path: Path, how: Preparation) -> Found:
+def read_matrix(file: SourceFile, how: Preparation) -> Found:
     """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
-    table = read_table(path)
-    if table.heading and (known := _as_instrument_file(path, how, table)):
+    values, lines = file.values, file.layout.heading
+    if lines and (known := _as_instrument_file(file, how)):
         return known
-    heights, steps, remark = without_scales(table.values)
+    heights, steps, remark = without_scales(values)
     rows, columns = heights.shape
-    heading = read_heading(table.heading, heights.shape)
+    heading = read_heading(lines, heights.shape)
     coordinates = heading.coordinates or (steps and (columns * steps[0], rows * steps[1]))
-    return Found(
-        with_y_first(_without_missing(heights, heading), how),
-        heading.height_unit,
-        heading.size,
-        coordinates,
-        remark=remark,
-    )
+    heights = with_y_first(_without_missing(heights, heading), how)
+    return Found(heights, heading.height_unit, heading.size, coordinates, remark=remark)
 
 
-def _as_instrument_file(path, how, table):
+def _as_instrument_file(file, how):
     """What SurfaceTopography, which knows many headings, finds; None if its heights are not all of the numbers."""
     try:
-        found = read_instrument(path, how)
+        found = read_instrument(file, how)
     except Exception:  # whatever it raises at texts of other kinds
         return None
-    if found.unit is None or found.heights.shape != table.values.shape or np.isnan(table.values).any():
+    if found.unit is None or found.heights.shape != file.values.shape or np.isnan(file.values).any():
         return None
-    scale = np.max(np.abs(found.heights)) / np.max(np.abs(table.values))
-    same = np.allclose(found.heights, scale * table.values, rtol=1e-9, atol=1e-9 * np.max(np.abs(found.heights)))
+    scale = np.max(np.abs(found.heights)) / np.max(np.abs(file.values))
+    same = np.allclose(found.heights, scale * file.values, rtol=1e-9, atol=1e-9 * np.max(np.abs(found.heights)))
     return found if same else None
 
 
-def read_xyz(path: Path, how: Preparation) -> Found:
+def read_xyz(file: SourceFile, how: Preparation) -> Found:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
-    table = read_table(path)
-    points = _columns_of_points(table.values, how)
-    heading = read_heading(table.heading, points.shape)
+    points = _columns_of_points(file.values, how)
+    heading = read_heading(file.layout.heading, points.shape)
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
     (column, nx, dx), (row, ny, dy) = (_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
@@ -101,14 +107,14 @@ def _without_missing(heights, heading):
     return np.where(np.isin(heights, heading.missing), np.nan, heights) if heading.missing else heights
 
 
-def format_of_text(path: Path) -> str | None:
+def format_of_text(file: SourceFile) -> str | None:
     """Format of a text file, by its columns; None if it is no table of numbers, or a format of an instrument."""
-    layout = layout_of(path)
-    if layout is None or (layout.words and is_instrument_text(path)):
+    layout = file.layout
+    if layout is None or (layout.words and is_instrument_text(file)):
         return None
     if any(map(WIDTH.match, layout.heading)):
         return "matrix"
-    if layout.columns == 4 and looks_like_fourier(read_table(path).values):
+    if layout.columns == 4 and looks_like_fourier(file.values):
         return "fourier"
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS else "matrix"
 
@@ -128,3 +134,156 @@ def looks_like_fourier(values: np.ndarray) -> bool:
     pairs = [(mode, at[-x, -y]) for (x, y), mode in at.items() if (-x, -y) in at]
     differences = [abs(mode - opposite.conjugate()) for mode, opposite in pairs]
     return max(differences, default=0.0) <= 1e-4 * np.max(np.abs(modes), initial=1e-300)
+
+
+# How Gwyddion begins the line with the width of an image that it exports, in the languages of its menus. The line with
+# its height follows.
+WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
+_VALUE = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
+_LENGTH = re.compile(rf"{_VALUE}\s*(\S+)?$")
+_TWO_LENGTHS = re.compile(rf"{_VALUE}\s*(\S+)?\s*[x×*]\s*{_VALUE}\s*(\S+)?$")
+# A line of a heading: a name, a colon, an equals sign, a delimiter or blanks, and a value.
+_LINE = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
+# Names in small letters, without punctuation.
+_SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
+_PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
+_UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
+_MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What a heading says.
+
+    height_unit, lateral_unit : metres, None if it does not say.
+    size : (x, y) of the scan, m, None if it does not say.
+    coordinates : (x, y) of the scan in a unit that the heading does not say, None if it does not say it either.
+    missing : numbers that stand for a missing height.
+    """
+
+    height_unit: float | None = None
+    lateral_unit: float | None = None
+    size: tuple[float, float] | None = None
+    coordinates: tuple[float, float] | None = None
+    missing: tuple[float, ...] = ()
+
+
+def read_heading(lines: Sequence[str], shape: tuple[int, int]) -> Heading:
+    """Read the heading of a table of a shape (rows, columns)."""
+    said = {}
+    for line in lines:
+        if found := _LINE.match(line):
+            said.setdefault(re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(), found[2].strip())
+    units = [metres_of(said[name]) for name in _UNITS if name in said]
+    missing = [_value(found[1]) for name in _MISSING if name in said and (found := _LENGTH.match(said[name]))]
+    size, coordinates = _sizes(lines, said, shape)
+    lateral = metres_of(said["lateral units"]) if "lateral units" in said else None
+    return Heading(next((unit for unit in units if unit), None), lateral, size, coordinates, tuple(missing))
+
+
+def _sizes(lines, said, shape):
+    """Size in m, and in units that are not said; None where they are not known."""
+    rows, columns = shape
+    for line, following in itertools.pairwise(lines):
+        if (found := WIDTH.match(line)) and ":" in following:
+            sides = [_length(found[2].strip()), _length(following.split(":", 1)[1].strip())]
+            if all(side and side[1] for side in sides):
+                return tuple(side[0] for side in sides), None
+    for names, factors in ((_SIZES, (1, 1)), (_PIXELS, (columns, rows))):
+        for text in (said[name] for name in names if name in said):
+            if two := _TWO_LENGTHS.match(text):
+                sides = [_length(f"{value} {two[4] or ''}".strip()) for value in (two[1], two[3])]
+            else:
+                sides = [_length(text)] * 2
+            if all(sides):
+                lengths = tuple(side[0] * factor for side, factor in zip(sides, factors, strict=True))
+                if sides[0][1]:
+                    return lengths, None
+                if names is _PIXELS:
+                    return None, lengths
+    return None, None
+
+
+def _length(text):
+    """Value of a length, in m if its unit is said, and whether it is; None if it is no length."""
+    if not (found := _LENGTH.match(text)):
+        return None
+    unit = metres_of(found[2]) if found[2] else None
+    return None if found[2] and unit is None else (_value(found[1]) * (unit or 1.0), unit is not None)
+
+
+def _value(text):
+    return float(text.replace(",", "."))
+
+
+# The spectrum, its conjugate, their difference, the heights, and what is where.
+_BYTES_OF_NODE = 64
+
+
+def read_fourier(file: SourceFile, how: Preparation) -> Found:
+    """qx qy Re Im in every line: h = sum h_q exp(i q.r) over all q; opposite ones, if left out, are the conjugates."""
+    table = file.values
+    if table.shape[1] != 4:
+        raise ValueError(f"{table.shape[1]} numbers in a line, not qx qy Re Im")
+    k = _wave_numbers(table[:, :2], how)
+    period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
+    modes = table[:, 2] + 1j * table[:, 3]
+    if not np.all(np.isfinite(modes)):
+        raise ValueError("some amplitudes are not finite")
+    highest = int(np.max(np.abs(k)))
+    n = how.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
+    if 2 * highest >= n:
+        raise UnfitTopography(
+            "grid",
+            f"is too coarse for waves {highest} times as short as the period; allowed: at "
+            f"least {2 * highest + 2}, advisable: {4 * highest} or more",
+        )
+    require_room(_BYTES_OF_NODE * n**2)
+    spectrum = np.zeros((n, n), dtype=complex)
+    order = np.lexsort((k[:, 0], k[:, 1]))
+    k, modes = k[order], modes[order]
+    if np.any(np.all(np.diff(k, axis=0) == 0, axis=1)):
+        raise ValueError("a wave vector is given twice")
+    spectrum[k[:, 1], k[:, 0]] = modes
+    present = np.zeros((n, n), dtype=bool)
+    present[k[:, 1], k[:, 0]] = True
+    opposite = -np.arange(n) % n
+    alone = present & ~present[np.ix_(opposite, opposite)]
+    conjugate = np.conj(spectrum[np.ix_(opposite, opposite)])
+    both = present & ~alone
+    if np.max(np.abs(spectrum - conjugate)[both], initial=0.0) > 1e-4 * np.max(np.abs(modes)):
+        raise ValueError("opposite wave vectors have amplitudes that are not conjugate: the heights would be complex")
+    spectrum[alone[np.ix_(opposite, opposite)]] = conjugate[alone[np.ix_(opposite, opposite)]]
+    heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
+    return Found(heights, coordinates=(period, period))
+
+
+def _require_few(highest):
+    """Refuse waves that no grid has."""
+    if highest > GRID.most / 2:
+        raise ValueError(f"waves {highest:g} times as short as the period, but a grid has at most {GRID.most} nodes")
+
+
+def _wave_numbers(q, how):
+    """Wave vectors (n, 2) as multiples of 2 pi over the period: as they are written if they are integers."""
+    largest = np.max(np.abs(q))
+    if not largest > 0 or not np.all(np.isfinite(q)):
+        raise ValueError("no wave vectors, or some that are not finite")
+    if how.size is not None and how.size[0] != how.size[1]:
+        raise UnfitTopography("size", "has two sides that differ, for a Fourier series; allowed: one length")
+    if np.all(q == np.rint(q)):
+        _require_few(largest)
+        if how.size is None:
+            raise UnfitTopography(
+                "size",
+                "is missing, and the wave vectors are integers, multiples of 2 pi/L; allowed: L, such as '0.1 mm'",
+            )
+        return q.astype(int)
+    unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
+    k = np.rint(q / unit)
+    # The longest wave fixes the unit only to the digits that it is written with: the shortest one knows it better.
+    k = np.rint(q * (np.max(np.abs(k)) / largest))
+    if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
+        raise ValueError("the wave vectors are no multiples of the smallest one")
+    _require_few(np.max(np.abs(k)))
+    return k.astype(int)

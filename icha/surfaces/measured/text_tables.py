@@ -4,11 +4,13 @@ import gzip
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
+from icha.surfaces.measured.array_files import open_instrument
 from icha.surfaces.measured.settings import UnfitTopography
 
 # Characters in which heading and first line of numbers are looked for, and the largest number of lines of a heading.
@@ -48,16 +50,42 @@ class Layout:
     columns: int
 
 
-@dataclass(frozen=True, eq=False)
-class Table:
-    """The numbers of a text file.
+class SourceFile:
+    """The file of a scan, of which every part is read when it is asked for, and only once.
 
-    values : (rows, columns) array, nan where a number is missing.
-    heading : lines above the numbers.
+    path : of the file.
     """
 
-    values: np.ndarray
-    heading: tuple[str, ...]
+    def __init__(self, path: Path):
+        """Read nothing yet."""
+        self.path = path
+
+    @cached_property
+    def layout(self) -> Layout | None:
+        """How its lines are to be read; None if it is no text of numbers."""
+        return layout_of(self.path)
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """Numbers (rows, columns) of a text, nan where one is missing.
+
+        Raises
+        ------
+        UnfitTopography
+            If it has no numbers, a field that is no number, or a row of another length; with the line's number.
+        """
+        if self.layout is None or not self.layout.columns:
+            raise UnfitTopography(
+                "path",
+                "cannot be read as a table, as it holds no numbers; allowed: a row of heights, or x y z, in every line",
+            )
+        values = _read_clean(self.path, self.layout)
+        return _read_any(self.path, self.layout) if values is None else values
+
+    @cached_property
+    def instrument(self):
+        """The file as SurfaceTopography opens it; None if it is of no format that it knows."""
+        return open_instrument(self.path)
 
 
 def open_text(path: Path) -> TextIO:
@@ -173,24 +201,6 @@ def _number(field: str, decimal_comma: bool) -> float | None:
         return float(_FORTRAN.sub(r"\1e\2", field)) if "_" not in field else None
     except ValueError:
         return None
-
-
-def read_table(path: Path) -> Table:
-    """Read the numbers of a text file.
-
-    Raises
-    ------
-    UnfitTopography
-        If it has no numbers, a field that is no number, or a row of another length; with the line's number.
-    """
-    layout = layout_of(path)
-    if layout is None or not layout.columns:
-        raise UnfitTopography(
-            "path",
-            "cannot be read as a table, as it holds no numbers; allowed: a row of heights, or x y z, in every line",
-        )
-    values = _read_clean(path, layout)
-    return Table(_read_any(path, layout) if values is None else values, layout.heading)
 
 
 def _lines(path: Path, layout: Layout) -> Iterator[tuple[int, str]]:

@@ -1,9 +1,8 @@
 """Measured topographies: from a file to a surface.
 
-A measurement becomes a surface in this order, a module each: heights and lengths in metres (`scan`, by readers of
-`text_files`, `fourier_files`, `array_files` and `instrument_files`), the side that touches first up, a square cut out
-(`crop`), the trend removed (`trend`), missing points filled (`holes`), pixels made square (`pixels`), short waves taken
-out (`cutoff`), edges made what the boundary asks for, and the grid changed (`edges`).
+A measurement becomes a surface in this order: heights and lengths in metres (`scan`, by the readers of `text_files` and
+`array_files`), the side that touches first up, and the steps of `steps`: a square cut out, the trend removed, missing
+points filled, pixels made square, short waves taken out, edges made what the boundary asks for, the grid changed.
 
 SurfaceTopography, which reads what instruments write, could remove trends and fill holes, too. It takes seconds to
 import, which every look at a configuration with a measured surface would cost, and has neither the cosine series of a
@@ -13,7 +12,7 @@ free square nor windows of cells.
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -21,14 +20,9 @@ import numpy as np
 
 from icha.support.checksums import sha256_of
 from icha.support.input_files import flaw_of_path
-from icha.surfaces.measured.crop import cropped
-from icha.surfaces.measured.cutoff import without_short_waves
-from icha.surfaces.measured.edges import bounded
-from icha.surfaces.measured.holes import filled
-from icha.surfaces.measured.pixels import squared
 from icha.surfaces.measured.scan import load_scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.trend import detrended, refuse_flat
+from icha.surfaces.measured.steps import bounded, cropped, detrended, filled, refuse_flat, squared, without_short_waves
 from icha.surfaces.surface import Surface
 
 
@@ -70,24 +64,18 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     """
     path, how = _existing(path), Preparation(**preparation)
     scan = load_scan(path, how)
-    steps = [scan.description]
-    if how.touches_first == "low":
-        scan = replace(scan, heights=-scan.heights)
-    steps.append(f"{how.touches_first} numbers touch first")
-    part, said = cropped(scan, how)
-    steps += said
-    missing = int(np.count_nonzero(~np.isfinite(part.heights)))
-    left = part
+    touching = scan.heights if how.touches_first == "high" else -scan.heights
+    part = cropped(scan.after(touching, f"{how.touches_first} numbers touch first"), how)
+    missing, left = int(np.count_nonzero(~np.isfinite(part.heights))), part
     for step in (detrended, filled, squared, without_short_waves):
-        left, said = step(left, how)
-        steps += said
+        left = step(left, how)
     refuse_flat(left, part, how)
-    surface, said = bounded(left, how)
+    surface, steps = bounded(left, how)
     return PreparedTopography(
         surface=surface,
         source_file=path.name,
         source_sha256=sha256_of(path),
-        description="; ".join([*steps, *said]),
+        description="; ".join(steps),
         format=scan.format,
         data=scan.data,
         filled=missing,

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 import icha
-from icha.support.processes import end_with_parent
+from icha.support.program import end_with_parent
 
 SERVER = os.getpid()
 # The command line, and what only a deposit needs.

@@ -1,1 +1,0 @@
-"""Pages of the documentation whose numbers are results: Markdown, written from datasets."""

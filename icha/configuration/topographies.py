@@ -1,0 +1,116 @@
+"""Topographies from files: their facts, for a campaign that presses them, and themselves, for scripts."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from icha.configuration.campaign import Campaign, Topography
+from icha.configuration.errors import ConfigurationError, line, problem_of
+from icha.configuration.studies import MEASURED
+from icha.configuration.surfaces import FileSurface, MeasuredSurface
+from icha.support.checksums import sha256_of
+from icha.support.values import NOTHING, Problem
+
+if TYPE_CHECKING:
+    from icha.surfaces.surface import Surface
+
+
+def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
+    """Facts of every topography that is pressed and comes from a file; what is wrong with these files."""
+    contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
+    asking = {each.surface for each in contacts if each.rms_slope == MEASURED}
+    adhering = {each.surface for each in contacts if campaign.materials[each.material].surface_energy > 0}
+    found, wrong = {}, []
+    for name in dict.fromkeys(each.surface for each in contacts):
+        surface = campaign.surfaces[name]
+        if surface.random:
+            continue
+        try:
+            if isinstance(surface, MeasuredSurface):
+                found[name] = _scanned(surface, with_slope=name in asking)
+            else:
+                found[name] = _mapped(surface, with_slope=name in asking, with_energy=name in adhering)
+        except (ValueError, MemoryError) as error:
+            key, origin = getattr(error, "key", "path"), campaign.origin("surfaces", name)
+            variant = "" if origin == name else f"of variant {name!r}: "
+            if isinstance(error, MemoryError):
+                error = f"does not fit into the memory of this machine ({error}); allowed: a smaller topography"
+            wrong.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
+    return found, wrong
+
+
+def _scanned(surface: MeasuredSurface, *, with_slope: bool) -> Topography:
+    # Slow to import, and not for every campaign.
+    from icha.surfaces.measured.topography import topography_facts
+
+    facts = topography_facts(surface.path, surface.preparation)
+    slope = _rounded(facts.rms_slope) if with_slope else None
+    return Topography(facts.grid, facts.period, slope, facts.source_sha256, facts.full_contact_energy)
+
+
+def _mapped(surface: FileSurface, *, with_slope: bool, with_energy: bool) -> Topography:
+    from icha.surfaces.measured.array_files import read_height_map
+
+    heights = read_height_map(surface.path, surface.metres_per_unit)
+    slope, energy = None, math.nan
+    if with_slope or with_energy:
+        # Imports SciPy's transforms, for which no other call should wait.
+        from icha.surfaces.surface import Surface
+
+        topography = Surface(heights, surface.period)
+        slope = _rounded(topography.rms_slope) if with_slope else None
+        energy = topography.full_contact_energy / topography.rms_slope**2 if with_energy else math.nan
+    return Topography(len(heights), surface.period, slope, sha256_of(Path(surface.path)), energy)
+
+
+def _rounded(slope: float) -> float:
+    """Six digits, which name files and are more than any instrument has."""
+    return float(f"{slope:.6g}")
+
+
+def read_scan(path: str | os.PathLike, **keywords: Any) -> Surface:
+    """Read a measured topography and prepare it as a campaign does.
+
+    Parameters
+    ----------
+    path : file of the topography.
+    keywords : keys of a measured surface in a configuration, with values as they are written there, such as
+        `size="32 um"`, `height_unit="nm"` and `boundary="window"`. `boundary` is needed; `size` and `height_unit` are
+        needed unless the file has them.
+
+    Raises
+    ------
+    ConfigurationError
+        A ValueError, if a key is missing or wrong, or the file cannot be read or prepared as asked.
+    """
+    section = {"kind": "measured", "path": os.fspath(path), **keywords}
+    from icha.surfaces.measured.settings import UnfitTopography
+    from icha.surfaces.measured.topography import prepared_topography
+    from icha.surfaces.surface import MISFIT_OF_EDGES, EdgeWarning, edges_fit
+
+    try:
+        preparation = MeasuredSurface.model_validate(section).preparation
+    except ValidationError as error:
+        content = {"surfaces": {"scan": section}}
+        problems = [
+            problem_of({**details, "loc": ("surfaces", "scan", *details["loc"])}, content)
+            for details in error.errors(include_url=False)
+        ]
+        lines = [line("read_scan", location[2:], value, reason) for location, value, reason in problems]
+        raise ConfigurationError("\n".join(lines)) from None
+    try:
+        surface = prepared_topography(path, preparation).surface
+    except UnfitTopography as error:
+        value = section.get(error.key)
+        raise ConfigurationError(
+            line("read_scan", (error.key,), NOTHING if value is None else value, str(error))
+        ) from None
+    if not surface.free and not edges_fit(surface.heights):
+        warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=2)
+    return surface

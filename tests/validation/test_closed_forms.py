@@ -1,0 +1,247 @@
+"""Closed forms of the limit of short range against Fourier sums, quadrature, energy, and limits of one another."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from icha import Material
+from icha.asperity.jkr import JKR
+from icha.half_space.interaction import displacement_at
+from validation.closed_forms import (
+    IMAGES_CUBED,
+    CrackInTrough,
+    PennyCrack,
+    RoundPunch,
+    Sinusoid,
+    SphereInCell,
+    Strips,
+    intensity_at_equilibrium,
+)
+
+SOFT = Material(2.0, 0.3, 1e-3)
+BARE = Material(2.0, 0.0, 1e-3)
+
+
+def slope(function, x, step=1e-6):
+    return (function(x + step) - function(x - step)) / (2 * step)
+
+
+# --- flat punches ------------------------------------------------------------------------------------------------
+
+
+def test_round_punch_lets_go_where_energy_is_gained_by_a_smaller_contact():
+    a, F = 0.7, RoundPunch(SOFT, 0.7).pull_off_force
+    # At a given load: elastic energy less the work of the load is -F delta/2.
+    gained = slope(lambda radius: -F * RoundPunch(SOFT, radius).displacement(F) / 2, a)
+    assert gained == pytest.approx(2 * np.pi * a * SOFT.surface_energy, rel=1e-8)
+
+
+def test_round_punch_pulls_as_the_sphere_of_no_curvature():
+    assert RoundPunch(SOFT, 0.7).pull_off_force == pytest.approx(-JKR(SOFT).force(0.7, 1e12))
+
+
+def test_images_of_a_round_punch_act_as_those_of_a_sphere_of_no_curvature():
+    a, R = np.array([0.3]), np.array([1e9])
+    one = np.zeros((1, 2))
+    force = float(JKR(SOFT).force(a, R)[0])
+    at_centre = displacement_at(JKR(SOFT), 8.0, one, one, a, R)[0]
+    # The centre's displacement has the images' second moments, the punch's in the mean also their curvature.
+    images = at_centre - RoundPunch(SOFT, 0.3).displacement(force)
+    wanted = RoundPunch(SOFT, 0.3).displacement_in_cell(force, 8.0) - RoundPunch(SOFT, 0.3).displacement(force)
+    bend = force * IMAGES_CUBED / 8.0**3 * 0.3**2 / 6 / (np.pi * SOFT.contact_modulus)
+    assert images + bend == pytest.approx(wanted, rel=1e-6)
+
+
+def strip_pressure(x, a, L):
+    """Pressure of mean 1 under flat strips |x| < a, each period L (I. N. Sneddon and M. Lowengrub, 1969)."""
+    return np.cos(np.pi * x / L) / np.sqrt(np.sin(np.pi * a / L) ** 2 - np.sin(np.pi * x / L) ** 2)
+
+
+def test_strips_by_fourier_series_of_their_pressure():
+    a, L = 0.3, 1.7
+    strips = Strips(SOFT, a, L)
+
+    def along(t):  # sin(pi x/L) = sin(pi a/L) sin t: p dx/L = dt/pi
+        return np.arcsin(np.sin(np.pi * a / L) * np.sin(t)) * L / np.pi
+
+    total = quad(lambda t: 1 / np.pi, -np.pi / 2, np.pi / 2)[0]
+    assert total == pytest.approx(1.0)
+    modes = np.arange(1, 40_001)
+    t = (np.arange(4000) + 0.5) * np.pi / 4000 - np.pi / 2
+    x = along(t)
+    # In the middle of a strip, mode by mode 2/(E* q); the tail of the series falls as n^(-3/2) and alternates.
+    amplitude = np.array([2 * np.mean(np.cos(2 * np.pi * n * x / L)) for n in modes[:800]])
+    q = 2 * np.pi * modes[:800] / L
+    series = np.cumsum(2 / (SOFT.contact_modulus * q) * amplitude)
+    assert np.mean(series[300:]) == pytest.approx(strips.compliance, rel=2e-3)
+
+
+def test_strips_have_koiters_stress_intensity():
+    a, L, sigma = 0.3, 1.7, 2.5
+    inside = 1e-8
+    intensity = sigma * strip_pressure(a - inside, a, L) * np.sqrt(2 * np.pi * inside)
+    assert intensity**2 == pytest.approx(sigma**2 * L / np.tan(np.pi * a / L), rel=1e-6)
+    at_pull_off = Strips(SOFT, a, L).pull_off_tension * intensity / sigma
+    assert at_pull_off == pytest.approx(intensity_at_equilibrium(SOFT), rel=1e-6)
+
+
+def test_compliance_of_strips_gives_their_energy_release_rate():
+    a, L = 0.3, 1.7
+    tension = Strips(SOFT, a, L).pull_off_tension
+    gained = slope(lambda half: -(tension**2) * L * Strips(SOFT, half, L).compliance / 2, a)
+    assert gained == pytest.approx(2 * SOFT.surface_energy, rel=1e-7)
+
+
+# --- the sinusoid ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=[0.0, 0.05, 0.3])
+def wave(request):
+    amplitude, L, E = 0.02, 1.3, 2.0
+    energy = (request.param * np.pi * E * amplitude / L) ** 2 * L / (2 * E)
+    return Sinusoid(Material(E, energy, 1e-3), amplitude, L)
+
+
+PSI = np.linspace(0.2, 1.5, 14)
+
+
+def test_pressure_is_minus_the_derivative_of_the_energy(wave):
+    """Along the branch of equilibria: energy has no derivative by the contact at a given separation."""
+    for psi in PSI:
+        assert slope(wave.stored_energy, psi) == pytest.approx(
+            -wave.pressure(psi) * slope(wave.separation, psi), rel=1e-6, abs=1e-9
+        )
+
+
+def test_full_contact_of_the_wave_without_adhesion():
+    wave = Sinusoid(BARE, 0.02, 1.3)
+    full = np.pi / 2 - 1e-9
+    assert wave.pressure(full) == pytest.approx(np.pi * BARE.contact_modulus * 0.02 / 1.3)
+    assert wave.separation(full) == pytest.approx(0.0, abs=1e-15)
+    # The half-space has the wave's shape: half the mean of pressure, of amplitude p*, times displacement.
+    assert wave.stored_energy(full) == pytest.approx(wave.full_contact_pressure * 0.02 / 4)
+
+
+def test_first_contact_is_at_the_crest():
+    assert Sinusoid(BARE, 0.02, 1.3).separation(1e-6) == pytest.approx(0.02)
+
+
+def test_narrow_contact_of_the_wave_is_the_line_contact_of_its_crest():
+    """A cylinder of the crest's radius: half-width a, line load pi E* a^2/(4 R) - sqrt(2 pi E* a dgamma).
+
+    The latter: D. Maugis and M. Barquins' cylinder (M. K. Chaudhury et al., J. Appl. Phys. 80 (1996) 30).
+    """
+    wave, a = Sinusoid(Material(2.0, 1e-9, 1e-6), 0.02, 1.3), 1e-3
+    R = 1.3**2 / (4 * np.pi**2 * 0.02)
+    line = np.pi * 2.0 * a**2 / (4 * R) - np.sqrt(2 * np.pi * 2.0 * a * 1e-9)
+    assert wave.pressure(np.pi * a / 1.3) * 1.3 == pytest.approx(line, rel=1e-4)
+
+
+def test_stable_contacts_of_the_wave():
+    E, amplitude, L = 2.0, 0.02, 1.3
+    wave = Sinusoid(Material(E, (0.2 * np.pi * E * amplitude / L) ** 2 * L / (2 * E), 1e-3), amplitude, L)
+    # As Johnson writes it.
+    assert wave.alpha == pytest.approx(0.2)
+    assert wave.alpha**2 == pytest.approx(2 * L * wave.material.surface_energy / (np.pi**2 * E * amplitude**2))
+    assert slope(wave.separation, wave.jump_off_psi) == pytest.approx(0.0, abs=1e-6)
+    assert slope(wave.pressure, wave.snap_psi) == pytest.approx(0.0, abs=1e-6)
+    assert wave.stable_psi(float(wave.separation(0.9))) == pytest.approx(0.9)
+    with pytest.raises(ValueError):
+        wave.stable_psi(1.01 * float(wave.separation(wave.jump_off_psi)))
+
+
+# --- the crack ---------------------------------------------------------------------------------------------------
+
+
+def test_crack_of_given_volume_is_where_energy_is_least():
+    crack, volume = PennyCrack(SOFT), 0.02
+
+    def energy(c):
+        tension = 3 * SOFT.contact_modulus * volume / (8 * c**3)
+        assert crack.volume(tension, c) == pytest.approx(volume)
+        return tension * volume / 2 + SOFT.surface_energy * np.pi * c**2
+
+    c = crack.radius(volume)
+    assert slope(energy, c) == pytest.approx(0.0, abs=1e-7)
+    assert energy(1.01 * c) > energy(c) < energy(0.99 * c)
+    assert crack.tension(c) == pytest.approx(3 * SOFT.contact_modulus * volume / (8 * c**3))
+    assert crack.energy_release_rate(crack.tension(c), c) == pytest.approx(SOFT.surface_energy)
+
+
+def test_opening_of_the_crack_has_its_volume_and_its_stress_intensity():
+    crack, p, c = PennyCrack(SOFT), 1.3, 0.6
+    volume = quad(lambda r: 2 * np.pi * r * crack.opening(r, p, c), 0, c)[0]
+    assert volume == pytest.approx(crack.volume(p, c))
+    # Opening 4 K/E* sqrt(s/(2 pi)) at a distance s from the tip, one face of modulus E* alone.
+    s = 1e-9
+    intensity = crack.opening(c - s, p, c) * SOFT.contact_modulus / 2 * np.sqrt(2 * np.pi / s) / 2
+    assert intensity**2 / (2 * SOFT.contact_modulus) == pytest.approx(crack.energy_release_rate(p, c), rel=1e-6)
+
+
+def test_crack_in_a_trough_by_quadrature():
+    crack, c = CrackInTrough(SOFT, 0.03, 5.0), 0.4
+    q, p = 2 * np.pi / 5.0, crack.pressure(0.4)
+
+    def tension(r):  # azimuthal mean of minus the pressure in full contact
+        around = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+        return crack.tearing * np.mean(np.cos(q * r * np.cos(around)) + np.cos(q * r * np.sin(around))) / 2 - p
+
+    assert crack.tearing == pytest.approx(SOFT.contact_modulus * q / 2 * 0.03)
+    # r = c sin t
+    root = quad(lambda t: tension(c * np.sin(t)) * c * np.sin(t), 0, np.pi / 2)[0]
+    assert 2 / np.sqrt(np.pi * c) * root == pytest.approx(intensity_at_equilibrium(SOFT))
+    volume = 8 / SOFT.contact_modulus * quad(lambda r: tension(r) * r * np.sqrt(c**2 - r**2), 0, c)[0]
+    assert volume / 25 == pytest.approx(crack.separation(c))
+    assert crack.radius(crack.separation(c)) == pytest.approx(c)
+
+
+def test_crack_in_a_shallow_trough_is_that_of_a_flat():
+    flat, c = CrackInTrough(SOFT, 1e-12, 5.0), 0.4
+    alone = PennyCrack(SOFT)
+    assert flat.pressure(c) == pytest.approx(-alone.tension(c))
+    assert flat.separation(c) * 25 == pytest.approx(alone.volume(alone.tension(c), c))
+
+
+def test_volume_and_stress_intensity_of_the_cracked_trough_belong_together():
+    """At given tensions the energy grows with the crack by 2 pi c G; of both the derivative by the mean tension."""
+    crack, c = CrackInTrough(SOFT, 0.03, 5.0), 0.4
+    p, E = crack.pressure(c), SOFT.contact_modulus
+
+    def volume(radius):
+        return 8 / E * (crack.tearing * crack._moments(radius)[1] - p * radius**3 / 3)
+
+    by_mean_tension = intensity_at_equilibrium(SOFT) / E * 2 * np.sqrt(c / np.pi)
+    assert slope(volume, c) == pytest.approx(2 * np.pi * c * by_mean_tension, rel=1e-6)
+
+
+# --- the sphere in its cell --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("material", [SOFT, BARE], ids=["adhesive", "hard"])
+def test_images_of_the_sphere_displace_its_centre_as_the_model_has_it(material):
+    R, L, a = 2.0, 12.0, 1.1
+    cell = SphereInCell(material, R, L)
+    effective = cell._curvature_radius(a)
+    one, radius, curvature = np.zeros((1, 2)), np.array([a]), np.array([effective])
+    centre = displacement_at(JKR(material), L, one, one, radius, curvature)[0]
+    assert cell.approach(a) == pytest.approx(centre, rel=1e-5)
+
+
+def test_images_of_the_sphere_bend_the_half_space_under_it():
+    R, L, a = 2.0, 12.0, 1.1
+    law, cell = JKR(BARE), SphereInCell(BARE, R, L)
+    one, radius, curvature = np.zeros((1, 2)), np.array([a]), np.array([cell._curvature_radius(a)])
+    x = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.35, 0.35]])
+    total = displacement_at(law, L, x, one, radius, curvature)
+    # Contact means that displacement follows the sphere's own shape.
+    drop = total[0] - total[1:]
+    np.testing.assert_allclose(drop, np.sum(x[1:] ** 2, axis=1) / (2 * R), rtol=1e-4)
+
+
+def test_sphere_in_a_wide_cell_is_alone():
+    cell = SphereInCell(SOFT, 2.0, 1e7)
+    law = JKR(SOFT)
+    assert cell.pull_off_force == pytest.approx(1.5 * np.pi * SOFT.surface_energy * 2.0, rel=1e-6)
+    assert cell.jump_off_radius == pytest.approx(float(law.jump_off_radius(2.0)), rel=1e-5)
+    assert cell.contact_radius(0.3) == pytest.approx(float(law.contact_radius(0.3, 2.0)), rel=1e-5)
+    assert cell.force(cell.loaded_radius(0.1)) == pytest.approx(0.1)

@@ -1,0 +1,209 @@
+"""Variants between the model and boundary elements, against Hertz, closed sums and each other."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import icha
+from icha.asperity.jkr import JKR
+from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.path.follow import follow
+from icha.references.finite_range import NodalState, contact_state, perimeter_correction
+from icha.surfaces.summits import Asperities, find_summits
+from validation.error_sources import chain, effects, error_sources, shape_ratio, shape_ratio_of_fourth_order
+from validation.paraboloids import fourth_order_terms, paraboloids, summit_curvatures
+from validation.spot_by_spot import CATEGORIES, contact_patches, match
+from validation.without_unions import Discs, discs_apart, independent_discs, union_area_fraction
+
+HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)
+LAW = JKR(HARD)
+PRESSURES = [2e-3, 1e-2, 3e-2]
+
+
+def summits_at(position, height, radius, period):
+    return Asperities(np.array(position, float), np.array(height, float), np.array(radius, float), period)
+
+
+@pytest.fixture(scope="module")
+def surface():
+    spectrum = icha.SelfAffineSpectrum(
+        period=1.0, rolloff_wavelength=0.4, short_wavelength=0.12, hurst=0.8, rms_slope=0.5
+    )
+    return spectrum.realise(grid=64, seed=3)
+
+
+@pytest.fixture(scope="module")
+def sources(surface):
+    return error_sources(surface, HARD, PRESSURES, seed=3)
+
+
+# --- surfaces ---------------------------------------------------------------------------------------------------
+
+
+def test_curvatures_and_fourth_order_of_crossed_waves():
+    x = np.arange(48) * (2.0 / 48)
+    q, along_x, along_y = np.pi, 0.3, 0.1
+    surface = icha.Surface(along_x * np.cos(q * x) + along_y * np.cos(q * x)[:, None], 2.0)
+    summits = find_summits(surface)
+    assert summit_curvatures(surface, summits) == pytest.approx(
+        np.array([[-along_x * q**2, 0.0, -along_y * q**2]]), abs=1e-9
+    )
+    assert fourth_order_terms(surface, summits) == pytest.approx([(along_x + along_y) * q**4 / 64], rel=1e-9)
+
+
+def test_envelope_of_a_rough_surface_lies_above_every_paraboloid_and_touches_the_highest(surface):
+    summits = find_summits(surface)
+    curvatures = summit_curvatures(surface, summits)
+    grid = 128
+    heights = paraboloids(summits, curvatures, grid)
+    nodes = np.rint(summits.position * grid).astype(int)
+    offset = nodes / grid - summits.position
+    xx, xy, yy = curvatures.T
+    dx, dy = offset.T
+    own = summits.height + 0.5 * (xx * dx**2 + 2 * xy * dx * dy + yy * dy**2)
+    above = heights[nodes[:, 1] % grid, nodes[:, 0] % grid] - own
+    assert np.min(above) > -1e-12
+    assert above[np.argmax(summits.height)] == pytest.approx(0, abs=1e-12)
+    assert np.max(heights) <= np.max(summits.height)
+
+
+# --- contact without unions -------------------------------------------------------------------------------------
+
+
+def test_equal_summits_without_interaction_have_the_closed_sum():
+    count, radius, pressure = 7, 0.3, 1e-4
+    position = np.random.default_rng(1).random((count, 2)) * 5
+    discs = independent_discs(summits_at(position, [0.2] * count, [radius] * count, 5.0), LAW, pressure)
+    approach = (0.75 * pressure * 25 / (count * 2.0 * np.sqrt(radius))) ** (2 / 3)
+    assert discs.separation == pytest.approx(0.2 - approach, rel=1e-12)
+    assert discs.contact_radius == pytest.approx(np.full(count, np.sqrt(radius * approach)), rel=1e-9)
+
+
+@pytest.mark.parametrize("switch", [{}, {"point_forces": True}, {"field_shape": True}])
+def test_a_lone_summit_is_hertz_and_its_images(switch):
+    radius, period, pressure = 1.0, 40.0, 1e-6
+    summits = summits_at([[3.0, 4.0]], [0.5], [radius], period)
+    discs = discs_apart(summits, LAW, pressure, 0.1, **switch)
+    force = pressure * period**2
+    a = np.cbrt(0.75 * force * radius / 2.0)
+    assert discs.contact_radius == pytest.approx([a], rel=1e-5)
+    # Images and counter-pressure of a point load on a square cell.
+    images = -3.900265 * force / (np.pi * 2.0 * period)
+    assert discs.separation == pytest.approx(0.5 - a**2 / radius - images, abs=1e-4 * a**2)
+
+
+def test_without_overlaps_it_is_the_model(surface):
+    contact = InteractingAsperities(LAW, find_summits(surface), surface.rms_height)
+    unit = 2.0 * surface.rms_slope
+    (waypoint,) = follow(contact, icha.Path(reduced_pressures=[5e-4]), unit)
+    state = waypoint.state
+    assert np.all(state.spots.members == 1)
+    discs = discs_apart(contact.asperities, LAW, 5e-4 * unit, surface.rms_height)
+    assert discs.separation == pytest.approx(state.separation, rel=1e-7)
+    assert np.sort(discs.contact_radius) == pytest.approx(np.sort(state.spots.contact_radius), rel=1e-6)
+    area = np.pi * np.sum(discs.contact_radius**2) / surface.period**2
+    assert area == pytest.approx(contact.area_fraction(state), rel=1e-6)
+
+
+def test_area_of_overlapping_discs_is_that_of_their_union(surface):
+    a, distance = 0.1, 0.12
+    angle = np.arccos(distance / (2 * a))
+    union = 2 * a**2 * (np.pi - angle + np.sin(angle) * np.cos(angle))
+    discs = Discs(np.array([[0.3, 0.98], [0.3, 0.98 + distance - 1]]), np.full(2, a), np.ones(2), 0.0)
+    assert union_area_fraction(discs, surface) == pytest.approx(union, rel=2e-3)
+    apart = Discs(np.array([[0.3, 0.3], [0.7, 0.7]]), np.array([0.1, 0.01]), np.ones(2), 0.0)
+    assert union_area_fraction(apart, surface) == pytest.approx(np.pi * 0.0101, rel=1e-12)
+
+
+# --- patches ----------------------------------------------------------------------------------------------------
+
+
+def state_of(traction, period=1.0):
+    traction = np.array(traction, float)
+    some_surface = icha.Surface(np.random.default_rng(0).random(traction.shape), period)
+    return NodalState(some_surface, np.where(traction > 0, 0.0, 1.0), traction, traction > 0, 0.0)
+
+
+def test_patches_go_on_across_the_cell_and_add_up():
+    traction = np.zeros((16, 16))
+    traction[6:9, 14:] = traction[6:9, :2] = 1.0
+    traction[14:, 6:8] = traction[:1, 6:8] = 2.0
+    traction[12, 12] = 4.0
+    state = state_of(traction)
+    patches = contact_patches(state)
+    assert sorted(patches.nodes) == [1, 6, 12]
+    assert sorted(patches.force * 256) == pytest.approx([4.0, 12.0, 12.0])
+    assert np.sum(patches.area) == pytest.approx(perimeter_correction(state.contact)[0], rel=1e-12)
+    assert np.all((patches.area > 0) & (patches.area * 256 < patches.nodes))
+    assert patches.label[6, 15] == patches.label[6, 0] != 0
+
+
+def test_spots_and_patches_are_matched():
+    traction = np.zeros((64, 64))
+    for rows, columns in ((8, 8), (8, 24), (8, 26), (40, 8), (40, 40), (24, 50)):
+        traction[rows - 2 : rows + 3, columns - 2 : columns + 3] = 1.0
+    patches = contact_patches(state_of(traction, 64.0))
+    #          single     several     several    united     extra        missed: (24, 50) and (40, 40)
+    centres = [(8.2, 8.1), (23.5, 8.0), (27.0, 8.0), (8.0, 40.0), (55.0, 55.0)]
+    found = match(np.array(centres), np.full(5, 1.8), np.array([0, 0, 0, 1, 0], bool), patches, 64.0)
+    assert list(found.category[found.spot_group]) == ["single", "several", "several", "united", "extra"]
+    assert sorted(found.category[found.patch_group]) == ["missed", "missed", "several", "single", "united"]
+
+
+def test_area_on_a_rotational_profile_of_fourth_order():
+    """Boundary elements against Sneddon's closed form; a lone summit, on which the load is not shared."""
+    grid, period, radius, fourth = 256, 4.0, 1.0, 0.35
+    x = (np.arange(grid) - grid // 2) * (period / grid)
+    r2 = np.minimum(x**2 + x[:, None] ** 2, 1.0)
+    surface = icha.Surface(-r2 / (2 * radius) + fourth * r2**2, period)
+    force = 8 / 3 * 0.35**3 * (1 - 3.2 * fourth * 0.35**2)
+    state = contact_state(surface, HARD, force / period**2 / (2.0 * surface.rms_slope))
+    patches = contact_patches(state)
+    pair = xr.Dataset(
+        {
+            "pair_patch_area": ("pair", patches.area),
+            "pair_patch_force": ("pair", patches.force),
+            "pair_curvature_radius": ("pair", [radius]),
+            "pair_fourth_order": ("pair", [fourth]),
+            "contact_modulus": 2.0,
+        }
+    )
+    assert float(shape_ratio(pair)[0]) == pytest.approx((1 - 3.2 * fourth * 0.35**2) ** (-2 / 3), rel=0.015)
+    assert float(shape_ratio_of_fourth_order(pair)[0]) == pytest.approx(float(shape_ratio(pair)[0]), rel=0.015)
+
+
+# --- the whole --------------------------------------------------------------------------------------------------
+
+
+def test_split_adds_up_to_the_totals(sources):
+    area = sources["contact_area_fraction"]
+    for name, variant in (("spot_area_fraction", "icha"), ("patch_area_fraction", "boundary_elements")):
+        assert sources[name].sum("category").values == pytest.approx(area.sel(variant=variant).values, rel=1e-9)
+    for name in ("spot_load_share", "patch_load_share"):
+        assert sources[name].sum("category").values == pytest.approx(np.ones(len(PRESSURES)), rel=1e-9)
+    assert list(sources["category"].values) == list(CATEGORIES)
+    singles = sources["spot_count"].sel(category="single")
+    assert int(singles.sum()) == sources.sizes["pair"]
+    assert np.array_equal(singles, sources["patch_count"].sel(category="single"))
+    for name, part in (("pair_spot_area", "spot_area_fraction"), ("pair_patch_area", "patch_area_fraction")):
+        per_state = [float(sources[name][sources["pair_reduced_pressure"] == p].sum()) for p in PRESSURES]
+        nominal = float(sources["period"]) ** 2
+        assert per_state == pytest.approx(sources[part].sel(category="single").values * nominal, rel=1e-9)
+
+
+def test_effects_add_up_to_the_error(sources):
+    area = sources["contact_area_fraction"]
+    error = np.log(area.sel(variant="icha") / area.sel(variant="boundary_elements"))
+    assert effects(sources).sum("source").values == pytest.approx(error.values, rel=1e-9)
+    assert effects(sources).sizes["source"] == len(chain(sources)) - 1
+
+
+def test_with_adhesion_the_chain_is_shorter(surface):
+    sticky = icha.Material(contact_modulus=2.0, surface_energy=1e-4, interaction_range=5e-3)
+    sources = error_sources(surface, sticky, [2e-2], tolerance=1e-6)
+    names = set(sources["variant"].values)
+    assert names == {*chain(sources), "icha_fine_grid", "boundary_elements_coarse"}
+    assert "spot_count" not in sources
+    error = np.log(sources["contact_area_fraction"].sel(variant="icha"))
+    error = error - np.log(sources["contact_area_fraction"].sel(variant="boundary_elements"))
+    assert effects(sources).sum("source").values == pytest.approx(error.values, rel=1e-9)

@@ -1,0 +1,259 @@
+"""Where the model's error comes from: between ICHA and boundary elements, one thing is changed at a time.
+
+Boundary elements can be given, instead of the topography, the surface that the model assumes. A chain of variants then
+leads from the model to the truth, every link changing one thing:
+
+    icha                      the model;
+    without_unions            overlapping spots stay as they are; their area is that of the union of the discs;
+    field_shape               moreover the displacement w by the other spots has a slope and a curvature across a spot:
+                              there the summit stands higher by R |grad w|^2/2 and is sharper, 1/R + laplacian(w)/2;
+    circular_paraboloids      boundary elements on the upper envelope of the paraboloids z - r^2/(2R) of all summits;
+    elliptic_paraboloids      the same with both principal curvatures, of which 1/R is the geometric mean;
+    boundary_elements         boundary elements on the topography itself.
+
+What the last link changes is the shape of the summits beyond their paraboloids. Beside the chain stand
+
+    independent               Hertz's summits that do not interact;
+    point_forces              without unions, spots acting on each other by their forces alone, F/(pi E* r);
+    icha_fine_grid            the model on a grid twice as fine;
+    boundary_elements_coarse  boundary elements on a grid half as fine.
+
+How a summit goes on beyond its paraboloid shows in single patches: on the profile r^2/(2R) - b r^4 a contact of radius
+a carries F = 4 E* a^3/(3R) (1 - 16/5 b R a^2) (I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47-57,
+doi:10.1016/0020-7225(65)90019-4), with b the bi-Laplacian of the heights at the summit over 64.
+
+`python -m validation.error_sources` solves the middle of campaign validation, half an hour, and writes the tables and
+the figure of docs/error_sources.md. What was solved is kept in results/error_sources.
+"""
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from threadpoolctl import threadpool_limits
+
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
+from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.path.follow import follow
+from icha.path.targets import Path
+from icha.references.finite_range import DEFAULT_TOLERANCE, NodalState, contact_state, perimeter_correction
+from icha.surfaces.spectrum import SelfAffineSpectrum
+from icha.surfaces.summits import find_summits
+from icha.surfaces.surface import Surface
+from validation.paraboloids import circular_curvatures, fourth_order_terms, paraboloids, summit_curvatures
+from validation.spot_by_spot import CATEGORIES, split
+from validation.without_unions import discs_apart, independent_discs, union_area_fraction
+
+# From the model to the truth, and what changes from one to the next. With adhesion the model is not solved without its
+# unions.
+CHAIN = {
+    "icha": "",
+    "without_unions": "unions",
+    "field_shape": "slope and curvature of the others' field",
+    "circular_paraboloids": "rest of the contact mechanics",
+    "elliptic_paraboloids": "ellipticity of the summits",
+    "boundary_elements": "shape beyond the paraboloid",
+}
+ADHESIVE_CHAIN = {
+    "icha": "",
+    "circular_paraboloids": "contact mechanics and unions",
+    "elliptic_paraboloids": "ellipticity of the summits",
+    "boundary_elements": "shape beyond the paraboloid",
+}
+
+
+class State(NamedTuple):
+    """Contact area fraction, and mean separation in m."""
+
+    area: float
+    separation: float
+
+
+def error_sources(
+    surface: Surface,
+    material: Material,
+    reduced_pressures,
+    *,
+    refinement: int = 2,
+    tolerance: float = DEFAULT_TOLERANCE,
+    seed: int = -1,
+    progress: Callable[[str], None] = print,
+) -> xr.Dataset:
+    """Solve all variants for one surface, and split the model's error spot by spot.
+
+    Parameters
+    ----------
+    surface, material : as for `icha.simulate`; a range of attraction must be resolved on the coarser grid, too.
+    reduced_pressures : p/(E* h'_rms) with the rms slope of the surface itself, increasing, (n,).
+    refinement : boundary elements per cell of the surface's grid along a side, even, so that half of it can be tried.
+    tolerance : of the boundary elements.
+    seed : recorded in the dataset.
+    progress : called with a line of text for every variant.
+
+    Returns
+    -------
+    xarray.Dataset: areas and separations along (variant, reduced_pressure). Without adhesion also the split along
+    (category, reduced_pressure), whose sums are the total areas and loads of `icha` and `boundary_elements`, and along
+    `pair` every single spot and its patch.
+    """
+    if refinement % 2:
+        raise ValueError(f"refinement: {refinement!r} must be even")
+    path = Path(reduced_pressures=reduced_pressures)
+    pressures = [target.value for target in path.targets]
+    states, parts = {}, None
+
+    def keep(name, solved):
+        states[name] = list(solved)
+        progress(f"{name}: A/A0 = {', '.join(f'{state.area:.4e}' for state in states[name])}")
+
+    def solved(surface, refinement):
+        return [contact_state(surface, material, p, refinement=refinement, tolerance=tolerance) for p in pressures]
+
+    # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
+    with threadpool_limits(1):
+        contact, model = _model(surface, material, path)
+        keep("icha", (State(contact.area_fraction(state), state.separation) for state in model))
+        fine, of_fine = _model(surface.refined(2), material, path)
+        keep("icha_fine_grid", (State(fine.area_fraction(state), state.separation) for state in of_fine))
+        if not contact.adhesive:
+            for name, discs in _without_unions(contact, surface, pressures):
+                keep(name, (State(union_area_fraction(one, surface), one.separation) for one in discs))
+        for name, curvatures in (
+            ("circular_paraboloids", circular_curvatures(contact.asperities)),
+            ("elliptic_paraboloids", summit_curvatures(surface, contact.asperities)),
+        ):
+            heights = paraboloids(contact.asperities, curvatures, refinement * surface.grid)
+            keep(name, (_solve_paraboloids(heights, surface, material, p, tolerance) for p in pressures))
+        keep("boundary_elements_coarse", map(_state_at_nodes, solved(surface, refinement // 2)))
+        truth = solved(surface, refinement)
+        keep("boundary_elements", map(_state_at_nodes, truth))
+        if not contact.adhesive:
+            fourth = fourth_order_terms(surface, contact.asperities)
+            parts = [split(contact, state, true, fourth) for state, true in zip(model, truth, strict=True)]
+    return _dataset(surface, material, pressures, states, parts).assign(seed=seed, refinement=refinement)
+
+
+def _model(surface, material, path):
+    """The contact problem, and the model's states at the stops of the path."""
+    contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+    unit = material.contact_modulus * surface.rms_slope
+    met = {waypoint.target: waypoint.state for waypoint in follow(contact, path, unit)}
+    return contact, [met[target] for target in path.targets]
+
+
+def _without_unions(contact, surface, reduced_pressures):
+    """Names of the variants without unions and adhesion, and their discs at every pressure."""
+    law, summits = contact.law, contact.asperities
+    loads = [p * contact.contact_modulus * surface.rms_slope for p in reduced_pressures]
+    yield "independent", (independent_discs(summits, law, p) for p in loads)
+    for name, switch in (
+        ("point_forces", {"point_forces": True}),
+        ("without_unions", {}),
+        ("field_shape", {"field_shape": True}),
+    ):
+        yield name, [discs_apart(summits, law, p, surface.rms_height, **switch) for p in loads]
+
+
+def _state_at_nodes(state: NodalState) -> State:
+    return State(perimeter_correction(state.contact)[0], state.mean_separation)
+
+
+def _solve_paraboloids(heights, surface, material, reduced_pressure, tolerance):
+    """The same load on another surface; its separation is measured from the mean plane of the true one."""
+    other = Surface(heights, surface.period)
+    reduced_pressure = reduced_pressure * surface.rms_slope / other.rms_slope
+    state = _state_at_nodes(contact_state(other, material, reduced_pressure, tolerance=tolerance))
+    return state._replace(separation=state.separation + float(np.mean(heights)))
+
+
+def _dataset(surface, material, pressures, states, parts):
+    along = ("variant", "reduced_pressure")
+    variables = {
+        "contact_area_fraction": (along, [[state.area for state in solved] for solved in states.values()]),
+        "mean_separation": (along, [[state.separation for state in solved] for solved in states.values()]),
+        "contact_modulus": material.contact_modulus,
+        "surface_energy": material.surface_energy,
+        **{name: getattr(surface, name) for name in ("rms_slope", "rms_height", "rms_curvature", "period", "grid")},
+    }
+    coordinates = {"variant": list(states), "reduced_pressure": pressures}
+    if parts is not None:
+        coordinates["category"] = list(CATEGORIES)
+        repeated = np.repeat(pressures, [len(part["pair_spot_area"]) for part in parts])
+        variables["pair_reduced_pressure"] = ("pair", repeated)
+        for name in parts[0]:
+            of_states = [part[name] for part in parts]
+            if name.startswith("pair_"):
+                variables[name] = ("pair", np.concatenate(of_states))
+            else:
+                variables[name] = (("category", "reduced_pressure"), np.array(of_states).T)
+    return xr.Dataset(variables, coordinates)
+
+
+def chain(sources: xr.Dataset) -> dict[str, str]:
+    """The variants from the model to the truth, and what changes from the one before."""
+    return ADHESIVE_CHAIN if float(sources["surface_energy"]) > 0 else CHAIN
+
+
+def effects(sources: xr.Dataset) -> xr.DataArray:
+    """What every link of the chain adds to ln(A/A_truth) of the model, along (source, reduced_pressure).
+
+    The sum over the sources is the logarithm of the model's area over the boundary elements'.
+    """
+    links = chain(sources)
+    names = list(links)
+    area = np.log(sources["contact_area_fraction"])
+    steps = [
+        area.sel(variant=before, drop=True) - area.sel(variant=after, drop=True)
+        for before, after in itertools.pairwise(names)
+    ]
+    return xr.concat(steps, "source").assign_coords(source=[links[name] for name in names[1:]])
+
+
+def shape_ratio(sources: xr.Dataset) -> xr.DataArray:
+    """Area of every pair's patch over Hertz's area at the patch's own force: 1 for a lone paraboloid."""
+    radius = np.cbrt(0.75 * sources["pair_patch_force"] * sources["pair_curvature_radius"] / sources["contact_modulus"])
+    return sources["pair_patch_area"] / (np.pi * radius**2)
+
+
+def shape_ratio_of_fourth_order(sources: xr.Dataset) -> xr.DataArray:
+    """The same as the summit's fourth-order term gives it, (1 - 16/5 b R a^2)^(-2/3); NaN beyond where that can be."""
+    reduction = (
+        3.2 / np.pi * sources["pair_fourth_order"] * sources["pair_curvature_radius"] * sources["pair_patch_area"]
+    )
+    return (1 - reduction.where(reduction < 1)) ** (-2 / 3)
+
+
+def relative_radius(sources: xr.Dataset) -> xr.DataArray:
+    """Radius of every pair's patch times the wave number sqrt(<q^4>/<q^2>) of the surface's curvature over slope."""
+    wave_number = sources["rms_curvature"] * np.sqrt(8 / 3) / sources["rms_slope"]
+    return np.sqrt(sources["pair_patch_area"] / np.pi) * wave_number
+
+
+# The surface in the middle of campaign validation.
+SPECTRUM = SelfAffineSpectrum(100e-6, 20e-6, 1.5625e-6, 0.8, 1.0)
+HARD, STICKY = Material(25e6, 0.0, 40e-9), Material(25e6, 0.05, 40e-9)
+
+
+def main() -> None:
+    """Solve what was not solved before, and write tables and figure."""
+    from validation.error_sources_shown import write
+
+    def solved(name, seed, material, reduced_pressures):
+        file = FilePath("results/error_sources", f"{name}_seed{seed}.nc")
+        if not file.exists():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            print(f"{name}, seed {seed}", flush=True)
+            surface = SPECTRUM.realise(512, seed)
+            error_sources(surface, material, reduced_pressures, seed=seed).to_netcdf(file, engine="h5netcdf")
+        return xr.load_dataset(file, engine="h5netcdf")
+
+    loads = [1e-4, 1e-3, 3.16e-3, 1e-2, 3.16e-2]
+    write([solved("adhesionless", seed, HARD, loads) for seed in (1, 2, 3)], solved("adhesive", 1, STICKY, [1e-2]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,227 @@
+"""One asperity in its periodic cell by the model and by boundary elements, where the two have to agree.
+
+The asperity is a paraboloid of radius of curvature R = 1 m, and E* = 1 Pa. With adhesion dgamma = 1 J/m^2, so that
+lengths are in (dgamma^2 R/E*^2)^(1/3), forces in dgamma R, and the range of attraction is one over the Tabor parameter.
+Approaches are those of the summit to the mean plane of the cell.
+
+The law of Johnson, Kendall and Roberts (K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971)
+301, doi:10.1098/rspa.1971.0141) is the limit of a vanishing range, that is of a large Tabor parameter (D. Tabor, J.
+Colloid Interface Sci. 58 (1977) 2). At a finite one boundary elements have two areas, that of zero gap and the
+energetic one (see `icha.references.finite_range`), and the law's area is compared with both. Hertz's law has no
+such parameter.
+
+`python -m validation.one_asperity` takes some ten minutes and writes the tables of docs/validation.md, "One asperity".
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+import scipy.fft
+import xarray as xr
+
+from icha.asperity.cohesive_zone import is_resolved, strength_number
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
+from icha.contact.model import Control
+from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.half_space.interaction import displacement_at
+from icha.references.finite_range import NodalState, contact_state, perimeter_correction, states_at_mean_separations
+from icha.surfaces.summits import find_summits
+from icha.surfaces.surface import Surface
+from validation.surfaces import paraboloid
+from validation.tables import Table, write_tables
+
+# Forces and areas have settled to a few parts in 1e5.
+DEFAULT_TOLERANCE = 1e-6
+# However long the range, contact itself has to span some nodes.
+_LEAST_GRID = 64
+_PULL_OFF = 1.5 * math.pi
+
+
+def resolving_grid(material: Material, period: float) -> int:
+    """Fewest nodes along a side of a cell (m) that resolve the attraction, of a number that is quick to transform."""
+    grid = _LEAST_GRID
+    while not is_resolved(material, period / grid):
+        grid = scipy.fft.next_fast_len(grid + 1, real=True)
+    return grid
+
+
+def one_asperity(
+    tabor_parameter: float,
+    *,
+    approaches: Sequence[float] = (3.0, 2.0, 1.0),
+    period: float = 12.0,
+    tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable[[str], None] = print,
+) -> xr.Dataset:
+    """Press an adhesive asperity into contact and draw it off, by the model and by boundary elements.
+
+    Parameters
+    ----------
+    tabor_parameter : positive.
+    approaches : in m, that is in (dgamma^2 R/E*^2)^(1/3), falling. That of the model's pull-off force is added: there
+        boundary elements have their largest tension, too, and take longest.
+    period : of the cell, m.
+    tolerance : relative error at which the boundary elements' solver may stop.
+    progress : called with lines of text.
+
+    Returns
+    -------
+    xarray.Dataset: along `approach` both sides at the same approach, the last that of pull-off; along `given_load` the
+    model at the forces that boundary elements have at the approaches asked for, where the model can carry them.
+    """
+    material = Material(1.0, 1.0, 1 / tabor_parameter)
+    surface = paraboloid(resolving_grid(material, period), period)
+    asked = (*approaches, pull_off_approach(JKR(material), period))
+    separations = [surface.heights.max() - approach for approach in asked]
+    states = states_at_mean_separations(surface, material, separations, tolerance=tolerance, progress=progress)
+    return _comparison(surface, material, states, len(approaches), progress)
+
+
+def hertz_asperity(
+    *,
+    contact_radii: Sequence[float] = (1.0, 0.5),
+    period: float = 16.0,
+    grid: int = 512,
+    tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable[[str], None] = print,
+) -> xr.Dataset:
+    """The same without adhesion, at the loads that have given contact radii (m, falling) by Hertz's law alone."""
+    material = Material(1.0, 0.0, 1.0)
+    surface = paraboloid(grid, period)
+    unit = surface.rms_slope * surface.period**2
+    loads = [float(JKR(material).force(radius, 1.0)) / unit for radius in contact_radii]
+    states = (contact_state(surface, material, load, tolerance=tolerance) for load in loads)
+    return _comparison(surface, material, states, len(loads), progress)
+
+
+def pull_off_approach(law: JKR, period: float) -> float:
+    """Approach of the asperity, with its images, where its tension is largest, m.
+
+    At the radius (9 pi dgamma R^2/(8 E*))^(1/3), where dF/da = 0.
+    """
+    summit, R = np.zeros((1, 2)), np.ones(1)
+    a = np.cbrt(9 * np.pi / 8 * law.material.adhesion_length * R**2)
+    return float(displacement_at(law, period, summit, summit, a, R)[0])
+
+
+class _Model:
+    """The model's one spot, moved from state to state."""
+
+    def __init__(self, surface, material):
+        self.contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+        self.top = float(surface.heights.max())
+        self.state = self.contact.untouched()
+
+    def at(self, approach):
+        """Force (N) and area (m^2) at an approach (m), on from the last."""
+        self.state = self.contact.equilibrium(self.state, self.top - approach)
+        return self._force_and_area(self.state)
+
+    def carrying(self, force):
+        """Area (m^2) and approach (m) at a force (N), from where it is."""
+        pressure = Control("pressure", force / self.contact.area)
+        loaded = self.contact.equilibrium(self.state, self.state.separation, pressure)
+        return self._force_and_area(loaded)[1], self.top - loaded.separation
+
+    def _force_and_area(self, state):
+        if len(state.spots) != 1:
+            raise RuntimeError(f"one asperity: {len(state.spots)} spots instead of one")
+        nominal = self.contact.area
+        return self.contact.pressure(state) * nominal, self.contact.area_fraction(state) * nominal
+
+
+def _comparison(
+    surface: Surface, material: Material, states: Iterable[NodalState], loaded: int, progress: Callable[[str], None]
+) -> xr.Dataset:
+    """The model at the approaches of the boundary elements' states, and at the loads of the first `loaded` of them."""
+    pull_off = _PULL_OFF * material.surface_energy
+    nominal, top = surface.period**2, float(surface.heights.max())
+    model = _Model(surface, material)
+    rows, at_load = [], []
+    for index, state in enumerate(states):
+        approach, force = top - state.mean_separation, state.nominal_pressure * nominal
+        zero_gap = perimeter_correction(state.contact)[0] * nominal
+        energetic = state.energetic_area_fraction(material) * nominal
+        force_icha, area_icha = model.at(approach)
+        rows.append((approach, force, zero_gap, energetic, force_icha, area_icha))
+        if index < loaded and force > -pull_off:
+            at_load.append((index, *model.carrying(force)))
+        progress(f"approach {approach:.4g} m: force {force:.6g} N, by ICHA {force_icha:.6g} N")
+    approach, force, zero_gap, energetic, force_icha, area_icha = np.array(rows).T
+    at = [index for index, *_ in at_load]
+    area_at_load, approach_at_load = np.array([solved for _, *solved in at_load]).reshape(-1, 2).T
+    length = np.cbrt(material.adhesion_length**2) if pull_off else approach[at]
+    along, by_load = ("approach",), ("given_load",)
+    values = {
+        "force_boundary_elements": (along, force),
+        "zero_gap_area": (along, zero_gap),
+        "energetic_area": (along, energetic),
+        "force_icha": (along, force_icha),
+        "area_icha": (along, area_icha),
+        "area_icha_at_load": (by_load, area_at_load),
+        "force_error": (along, (force_icha - force) / np.maximum(np.abs(force), pull_off)),
+        "zero_gap_area_error": (along, area_icha / zero_gap - 1),
+        "energetic_area_error": (along, area_icha / energetic - 1),
+        "zero_gap_area_error_at_load": (by_load, area_at_load / zero_gap[at] - 1),
+        "energetic_area_error_at_load": (by_load, area_at_load / energetic[at] - 1),
+        "approach_error_at_load": (by_load, (approach_at_load - approach[at]) / length),
+        "tabor_parameter": float(material.tabor_parameter(1.0)),
+        "grid": surface.grid,
+        "strength_number": strength_number(material, surface.spacing),
+    }
+    if pull_off:
+        values["pull_off_error"] = (pull_off - float(np.max(-force))) / pull_off
+    return xr.Dataset(values, {"approach": approach, "given_load": force[at]})
+
+
+# --- tables -------------------------------------------------------------------------------------------------------
+
+_ERRORS = {
+    "zero_gap_area_error": "area over zero gap, same approach",
+    "zero_gap_area_error_at_load": "area over zero gap, same load",
+    "energetic_area_error": "area over energetic, same approach",
+    "energetic_area_error_at_load": "area over energetic, same load",
+    "force_error": "force, same approach",
+    "approach_error_at_load": "approach, same load",
+    "pull_off_error": "pull-off force",
+}
+
+
+def _range(error, digits):
+    """Least to largest of an error, in per cent; one number if they are the same as written, a dash without values."""
+    if not error.size:
+        return "–"
+    ends = [f"{100 * float(end):+.{digits}f}" for end in (error.min(), error.max())]
+    return " to ".join(dict.fromkeys(end.replace("-", "+") if float(end) == 0 else end for end in ends))
+
+
+def tables(adhesive: Sequence[xr.Dataset], hertz: xr.Dataset) -> dict[str, Table]:
+    """Errors with adhesion, a row for every Tabor parameter, and without."""
+    rows = [
+        [
+            f"{float(one['tabor_parameter']):g}",
+            str(int(one["grid"])),
+            f"{float(one['strength_number']):.3f}",
+            *(_range(one[name], 1) for name in _ERRORS),
+        ]
+        for one in adhesive
+    ]
+    radii = np.sqrt(hertz["area_icha_at_load"].values / np.pi)
+    bare = {
+        "area, same load": "zero_gap_area_error_at_load",
+        "area, same approach": "zero_gap_area_error",
+        "approach, same load": "approach_error_at_load",
+        "force, same approach": "force_error",
+    }
+    row = [f"{radii.min():.2g} to {radii.max():.2g} R", str(int(hertz["grid"]))]
+    row += [_range(hertz[name], 2) for name in bare.values()]
+    return {
+        "one_asperity": Table(["μ", "n", "strength number", *_ERRORS.values()], rows),
+        "one_asperity_hertz": Table(["contact radius", "n", *bare], [row]),
+    }
+
+
+if __name__ == "__main__":
+    write_tables(tables([one_asperity(mu) for mu in (2.0, 2.8, 4.0)], hertz_asperity()))

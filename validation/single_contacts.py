@@ -1,0 +1,341 @@
+"""Boundary elements in the limit of short range held against closed forms: spheres, punches, waves, cracks, pairs.
+
+In units E* = 1 Pa and dgamma = 1 J/m^2; spheres have radius 1 m, so that lengths are in (dgamma R^2/E*^2)^(1/3). Every
+function returns rows of numbers, dictionaries that JSON can hold; errors are relative, less one, unless they say else.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
+from icha.boundary_elements.contact import BoundaryElements
+from icha.contact.model import PRESSURE, Control
+from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.surfaces.summits import find_summits
+from validation.closed_forms import CrackInTrough, RoundPunch, Sinusoid, SphereInCell, Strips
+from validation.surfaces import bump, punch, strips, two_bumps, wave
+
+# Tabor parameter 5: a range that counts at the jump into contact alone.
+MATERIAL = Material(1.0, 1.0, 0.2)
+_PERIOD = 12.0
+_PULL_OFF = 1.5 * math.pi
+# Approaches of a sphere between a strong contact and the pull-off at given separation.
+APPROACHES = (3.0, 2.0, 1.0, 0.0, -0.6, -1.0, -1.2)
+
+
+def disc(grid: int, period: float, radius: float, offset=(0.0, 0.0)) -> np.ndarray:
+    """Nodes within a distance (m) of a place near the middle of the cell, (n, n) of bool; offset: (x, y) in cells."""
+    x, y = ((np.arange(grid) - grid // 2 - shift) * period / grid for shift in offset)
+    return np.hypot(y[:, None], x) <= radius
+
+
+def force_and_area(contact: BoundaryElements, state) -> tuple[float, float]:
+    """Of a state, N and m^2."""
+    return contact.pressure(state) * contact.area, contact.area_fraction(state) * contact.area
+
+
+def sphere_there_and_back(
+    grid: int, offset=(0.0, 0.0), approaches: Sequence[float] = APPROACHES, material: Material = MATERIAL
+) -> list[dict]:
+    """A sphere drawn off from a strong contact and pressed on again, at given approaches (m, falling).
+
+    cells: the radius of contact over the spacing, of the closed form.
+    """
+    surface, top = bump(grid, _PERIOD, offset)
+    contact, exact = BoundaryElements.of(surface, material), SphereInCell(material, 1.0, _PERIOD)
+    radius = exact.contact_radius(approaches[0])
+    state = contact.released(disc(grid, _PERIOD, radius, offset), top - approaches[0])
+    rows = []
+    for branch, approach in itertools.chain(
+        (("off", one) for one in approaches), (("on", one) for one in approaches[-2::-1])
+    ):
+        state = contact.equilibrium(state, top - approach)
+        force, area = force_and_area(contact, state)
+        radius = exact.contact_radius(approach)
+        wanted = float(exact.force(radius))
+        rows.append(
+            {
+                "grid": grid,
+                "offset": list(offset),
+                "branch": branch,
+                "approach": approach,
+                "cells": radius / surface.spacing,
+                "area_error": area / (math.pi * radius**2) - 1,
+                "force_error": (force - wanted) / max(abs(wanted), _PULL_OFF),
+                "front_residual": float(state.front_residual),
+            }
+        )
+    return rows
+
+
+def sphere_under_load(grid: int, offset=(0.0, 0.0), forces: Sequence[float] = (8.0, 4.0, 0.0, -4.0)) -> list[dict]:
+    """A sphere under given forces (N, falling): errors of area, and of the approach over the unit of length."""
+    surface, top = bump(grid, _PERIOD, offset)
+    contact, exact = BoundaryElements.of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
+    radius = exact.loaded_radius(forces[0])
+    start = top - float(exact.approach(radius))
+    state = contact.released(disc(grid, _PERIOD, radius, offset), start)
+    rows = []
+    for force in forces:
+        state = contact.equilibrium(state, state.separation, Control(PRESSURE, force / contact.area))
+        radius = exact.loaded_radius(force)
+        rows.append(
+            {
+                "grid": grid,
+                "offset": list(offset),
+                "force": force,
+                "cells": radius / surface.spacing,
+                "area_error": force_and_area(contact, state)[1] / (math.pi * radius**2) - 1,
+                "approach_error": top - state.separation - float(exact.approach(radius)),
+            }
+        )
+    return rows
+
+
+def largest_tension(contact: BoundaryElements, state, step: float) -> tuple[float, object]:
+    """Largest tension (N) on the way out from a state, by steps (m), and the last state in contact.
+
+    The top is that of the parabola through the largest and its neighbours; where contact breaks, steps become as short
+    as a hundredth.
+    """
+    way, shortest = [state], step / 100
+    while step >= shortest:
+        new = contact.equilibrium(way[-1], way[-1].separation + step)
+        if contact.spot_count(new):
+            way.append(new)
+        else:
+            step /= 2
+    tension = -np.array([force_and_area(contact, one)[0] for one in way])
+    u = np.array([one.separation for one in way])
+    k = int(np.argmax(tension))
+    if not 0 < k < len(way) - 1:
+        return float(tension[k]), way[-1]
+    left, right = ((tension[k] - tension[k + side]) / (u[k] - u[k + side]) for side in (-1, 1))
+    bend = (right - left) / ((u[k + 1] - u[k - 1]) / 2)
+    slope = left + (right - left) * (u[k] - u[k - 1]) / (u[k + 1] - u[k - 1])
+    return float(tension[k] - slope**2 / (2 * bend)), way[-1]
+
+
+def sphere_pull_off(grid: int, offset=(0.0, 0.0), step: float = 0.05) -> dict:
+    """The largest tension of a sphere that is drawn off, and where contact ends, by steps of the approach (m)."""
+    surface, top = bump(grid, _PERIOD, offset)
+    contact, exact = BoundaryElements.of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
+    first = -0.5
+    state = contact.released(disc(grid, _PERIOD, exact.contact_radius(first), offset), top - first)
+    force, last = largest_tension(contact, state, step)
+    return {
+        "grid": grid,
+        "offset": list(offset),
+        "cells": exact.loaded_radius(-0.999999 * exact.pull_off_force) / surface.spacing,
+        "pull_off_error": force / exact.pull_off_force - 1,
+        "jump_off_approach": top - last.separation,
+        "jump_off_approach_exact": float(exact.approach(exact.jump_off_radius)),
+        "jump_off_cells": exact.jump_off_radius / surface.spacing,
+    }
+
+
+def sphere_jump_in(grid: int, range_: float = MATERIAL.interaction_range) -> dict:
+    """Where a sphere jumps into contact, against Wu's distance, and whether the contact there is that of the law."""
+    material = Material(1.0, 1.0, range_)
+    surface, top = bump(grid, _PERIOD)
+    contact, exact = BoundaryElements.of(surface, material), SphereInCell(material, 1.0, _PERIOD)
+    wu = float(JKR(material).jump_in_approach(1.0))
+    start = contact.untouched()
+    before = contact.equilibrium(start, top - wu + 1e-6)
+    after = contact.equilibrium(start, top - wu - 1e-6)
+    force, area = force_and_area(contact, after)
+    radius = exact.contact_radius(wu)
+    return {
+        "grid": grid,
+        "range": range_,
+        "approach": top - start.separation,
+        "approach_exact": wu,
+        "spots_before": contact.spot_count(before),
+        "spots_after": contact.spot_count(after),
+        "area_error": area / (math.pi * radius**2) - 1,
+        "force_error": (force - float(exact.force(radius))) / _PULL_OFF,
+    }
+
+
+def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.0), ratio: float = 2.0) -> list[dict]:
+    """An elliptic paraboloid of radii of curvature 1/sqrt(ratio) and sqrt(ratio), turned by an angle (degrees)."""
+    radii = (math.sqrt(ratio), 1 / math.sqrt(ratio))
+    surface, top = bump(grid, _PERIOD, (0.3, 0.1), radii, math.radians(angle))
+    contact = BoundaryElements.of(surface, MATERIAL)
+    start = SphereInCell(MATERIAL, 1.0, _PERIOD).contact_radius(approaches[0])
+    state = contact.released(disc(grid, _PERIOD, start), top - approaches[0])
+    rows = []
+    for approach in approaches:
+        state = contact.equilibrium(state, top - approach)
+        force, area = force_and_area(contact, state)
+        rows.append({"grid": grid, "angle": angle, "approach": approach, "force": force, "area": area})
+    tension, _ = largest_tension(contact, state, 0.1)
+    return [row | {"pull_off": tension, "spacing": surface.spacing} for row in rows]
+
+
+def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
+    """Pull-off of a punch of a radius, or half side, of so many cells, and the compliance of its unbroken contact.
+
+    The closed form is that of the round one of the given radius; a square one's force is over that of the circle in it.
+    """
+    period = _PERIOD
+    spacing = period / grid
+    radius = cells * spacing
+    round_ = RoundPunch(MATERIAL, radius)
+    let_go = round_.displacement_in_cell(round_.pull_off_force, period)
+    surface, face = punch(grid, period, radius, 10 * let_go, square)
+    contact = BoundaryElements.of(surface, MATERIAL)
+    base = float(surface.heights.max())
+    state = contact.released(face, base + 0.02 * let_go)
+    compliance = 0.02 * let_go / -force_and_area(contact, state)[0]
+    tension, _ = largest_tension(contact, state, 0.1 * let_go)
+    nodes = math.sqrt(np.count_nonzero(face) / math.pi) * spacing
+    return {
+        "grid": grid,
+        "cells": cells,
+        "square": square,
+        "pull_off": tension / round_.pull_off_force,
+        "pull_off_of_nodes": tension / RoundPunch(MATERIAL, nodes).pull_off_force,
+        "compliance": compliance / round_.displacement_in_cell(1.0, period),
+    }
+
+
+def row_of_strips(grid: int, half_width: float) -> dict:
+    """Pull-off of strips of a half-width (in periods) against Koiter's, and their compliance."""
+    period = _PERIOD
+    cells = round(half_width * grid)
+    exact = Strips(MATERIAL, cells / grid * period, period)
+    let_go = exact.pull_off_tension * exact.compliance
+    surface, face = strips(grid, period, exact.half_width, 10 * let_go)
+    contact = BoundaryElements.of(surface, MATERIAL)
+    base = float(surface.heights.max())
+    state = contact.released(face, base + 0.02 * let_go)
+    compliance = 0.02 * let_go / -contact.pressure(state)
+    tension, _ = largest_tension(contact, state, 0.1 * let_go)
+    return {
+        "grid": grid,
+        "cells": cells,
+        "pull_off_error": tension / contact.area / exact.pull_off_tension - 1,
+        "compliance_error": compliance / exact.compliance - 1,
+    }
+
+
+def sinusoid(
+    grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1, 1.3), back: bool = True
+) -> list[dict]:
+    """A wave in one dimension from a narrow to a wide contact and back, at the separations of given psi = pi a/L.
+
+    alpha : Johnson's parameter. Errors: of the width, of the pressure over the full contact's or its own if larger, and
+    of the energy over that of full contact.
+    """
+    period = 1.0
+    amplitude = 0.02
+    energy = (alpha * math.pi * amplitude) ** 2 / 2
+    material = Material(1.0, energy, 1e-4 * amplitude)
+    exact = Sinusoid(material, amplitude, period)
+    contact = BoundaryElements.of(wave(grid, period, amplitude), material)
+    x = (np.arange(grid) - grid // 2) / grid
+    start = np.broadcast_to(np.abs(x) <= psi[0] / math.pi, (grid, grid))
+    state = contact.released(start, float(exact.separation(psi[0])))
+    unit = exact.full_contact_pressure
+    rows = []
+    for branch, one in (*(("on", one) for one in psi), *(("off", one) for one in psi[-2::-1] if back)):
+        state = contact.equilibrium(state, float(exact.separation(one)))
+        wanted = float(exact.pressure(one))
+        rows.append(
+            {
+                "grid": grid,
+                "alpha": alpha,
+                "branch": branch,
+                "psi": one,
+                "cells": one * grid / math.pi,
+                "width_error": contact.area_fraction(state) / (2 * one / math.pi) - 1,
+                "pressure": contact.pressure(state) / unit,
+                "pressure_exact": wanted / unit,
+                "pressure_error": (contact.pressure(state) - wanted) / unit,
+                "energy_error": (contact.stored_energy(state) - float(exact.stored_energy(one)))
+                / (unit * amplitude / 4),
+            }
+        )
+    return rows
+
+
+def crack(grid: int, radii: Sequence[float] = (0.2, 0.16, 0.12), amplitude: float = 0.02) -> list[dict]:
+    """The last gap in the trough of a wave in two dimensions, of given radii over the period, falling.
+
+    Errors of the pressure are over that of full contact at the trough.
+    """
+    material = Material(1.0, (0.3 * math.pi * amplitude) ** 2 / 2, 1e-4 * amplitude)
+    exact = CrackInTrough(material, amplitude, 1.0)
+    contact = BoundaryElements.of(wave(grid, 1.0, amplitude, dimensions=2), material)
+    x = np.minimum(np.arange(grid), grid - np.arange(grid)) / grid  # from the trough, at the cell's corner
+    distance = np.hypot(x[:, None], x)
+    state = contact.released(distance > radii[0], exact.separation(radii[0]))
+    rows = []
+    for c in radii:
+        state = contact.equilibrium(state, exact.separation(c))
+        area = 1 - contact.area_fraction(state)
+        rows.append(
+            {
+                "grid": grid,
+                "radius": c,
+                "cells": c * grid,
+                "radius_error": math.sqrt(area / math.pi) / c - 1 if area > 0 else -1.0,
+                "pressure": contact.pressure(state) / exact.tearing,
+                "pressure_error": (contact.pressure(state) - exact.pressure(c)) / exact.tearing,
+            }
+        )
+    return rows
+
+
+def pair(
+    grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0.5, -0.5), offset=(0.0, 0.0)
+) -> list[dict]:
+    """Two equal spheres beside each other, against the model of asperities, which is exact where they are far apart.
+
+    asymmetry: largest difference between the fractions of the two spots, mirrored (with no offset).
+    """
+    period = 2 * _PERIOD
+    surface, top = two_bumps(grid, period, distance, offset)
+    contact = BoundaryElements.of(surface, MATERIAL)
+    asperities = InteractingAsperities(JKR(MATERIAL), find_summits(surface), surface.rms_height)
+    radius = float(JKR(MATERIAL).contact_radius(approaches[0], 1.0))
+    half = distance / 2 / surface.spacing
+    region = disc(grid, period, radius, (offset[0] - half, offset[1])) | disc(
+        grid, period, radius, (offset[0] + half, offset[1])
+    )
+    state, spots = contact.released(region, top - approaches[0]), asperities.untouched()
+    rows = []
+    for approach in approaches:
+        state = contact.equilibrium(state, top - approach)
+        spots = asperities.equilibrium(spots, top - approaches[0])
+        spots = asperities.equilibrium(spots, top - approach)
+        force, area = force_and_area(contact, state)
+        other = asperities.pressure(spots) * contact.area
+        fraction = contact.fractions(state)
+        mirrored = np.roll(fraction[:, ::-1], 1, axis=1)
+        rows.append(
+            {
+                "grid": grid,
+                "distance": distance,
+                "approach": approach,
+                "spots": contact.spot_count(state),
+                "asymmetry": float(np.abs(mirrored - fraction).max()),
+                "area_error": area / (asperities.area_fraction(spots) * contact.area) - 1,
+                "force_error": (force - other) / max(abs(other), 2 * _PULL_OFF),
+            }
+        )
+    return rows
+
+
+def offsets(count: int) -> Iterator[tuple[float, float]]:
+    """Places of a centre within its cell: a node, a middle between four, and others (a quasi-random sequence)."""
+    yield (0.0, 0.0)
+    yield (0.5, 0.5)
+    # R. Roberts' sequence with the plastic number.
+    for k in range(1, count - 1):
+        yield ((0.5 + 0.7548776662 * k) % 1 - 0.5, (0.5 + 0.5698402910 * k) % 1 - 0.5)

@@ -1,0 +1,76 @@
+"""Surfaces whose contact is known in closed form, on a grid."""
+
+import numpy as np
+
+from icha.surfaces.surface import Surface
+
+# A summit there has to be, and it must not count: faces of punches are domes of this height over their radius, and what
+# goes on along y for ever has a wave of the second part of its height there.
+_DOME = 1e-9
+_ALONG = 2e-5
+
+
+def _from_centre(grid, spacing, centre):
+    """Ways (n, 1) and (1, n) to all nodes along y and x, m, the shortest, from a place `centre` (x, y) in cells."""
+    x, y = ((np.arange(grid) - place + grid / 2) % grid - grid / 2 for place in centre)
+    return y[:, None] * spacing, x[None, :] * spacing
+
+
+def paraboloid(grid: int, period: float, offset: float = 0.0) -> Surface:
+    """A bump of radius of curvature 1 m in a periodic cell of side `period` (m), whose edges are valleys.
+
+    offset : of the summit from a node, in cells.
+    """
+    x = (np.arange(grid) - grid // 2 - offset) * (period / grid)
+    return Surface(-(x[:, None] ** 2 + x**2) / 2, period)
+
+
+def bump(
+    grid: int, period: float, offset=(0.0, 0.0), radii_of_curvature=(1.0, 1.0), angle: float = 0.0
+) -> tuple[Surface, float]:
+    """An elliptic paraboloid in a cell, and the height of its summit, m.
+
+    offset : (x, y) of its summit from a node near the middle of the cell, in cells. radii_of_curvature : m, along the
+    axes, which are turned by `angle`, rad.
+    """
+    y, x = _from_centre(grid, period / grid, (grid // 2 + offset[0], grid // 2 + offset[1]))
+    along, across = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
+    heights = -(along**2) / (2 * radii_of_curvature[0]) - across**2 / (2 * radii_of_curvature[1])
+    return Surface(heights, period), float(-heights.mean())
+
+
+def two_bumps(grid: int, period: float, distance: float, offset=(0.0, 0.0)) -> tuple[Surface, float]:
+    """The upper envelope of two paraboloids of radius 1 m side by side along x, and the height of their summits, m."""
+    half = distance / (2 * period / grid)
+    heights = []
+    for side in (-half, half):
+        y, x = _from_centre(grid, period / grid, (grid // 2 + offset[0] + side, grid // 2 + offset[1]))
+        heights.append(-(x**2 + y**2) / 2)
+    envelope = np.maximum(*heights)
+    return Surface(envelope, period), float(-envelope.mean())
+
+
+def punch(grid: int, period: float, radius: float, depth: float, square: bool = False) -> tuple[Surface, np.ndarray]:
+    """A flat punch, and its face, (n, n) of bool; round, or square with sides of twice the radius.
+
+    depth : by which all else lies lower, m. Its centre is the middle between nodes.
+    """
+    y, x = _from_centre(grid, period / grid, (grid / 2 - 0.5,) * 2)
+    face = (np.maximum(np.abs(x), np.abs(y)) if square else np.hypot(x, y)) < radius
+    dome = _DOME * (radius**2 - x**2 - y**2) / radius
+    return Surface(np.where(face, dome, -depth), period), face
+
+
+def strips(grid: int, period: float, half_width: float, depth: float) -> tuple[Surface, np.ndarray]:
+    """A flat strip in the direction of y, one a period, and its face, (n, n) of bool."""
+    y, x = _from_centre(grid, period / grid, (grid / 2 - 0.5, grid // 2))
+    face = np.broadcast_to(np.abs(x) < half_width, (grid, grid))
+    along = _ALONG * depth * np.cos(2 * np.pi * y / period)
+    return Surface(np.where(face, 0.0, -depth) + along - _DOME * x**2 / half_width, period), face
+
+
+def wave(grid: int, period: float, amplitude: float, dimensions: int = 1) -> Surface:
+    """amplitude cos(2 pi x/L), or its mean with that along y, with a crest in the middle of the cell."""
+    along = np.cos(2 * np.pi * (np.arange(grid) - grid // 2) / grid)
+    other = 1.0 if dimensions == 2 else _ALONG
+    return Surface(amplitude * (along + other * along[:, None]) / (1 + other), period)
