@@ -22,7 +22,7 @@ def _failures_of_solvers():
     names = {
         "icha.simulation": "ConvergenceError",
         "icha.contact.failures": "NotConverged",
-        "icha.references.failures": "NotSolved",
+        "icha.references.finite_range": "NotSolved",
     }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
 
