@@ -93,7 +93,7 @@ def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: 
     """
     from rich.console import Console
 
-    from icha.deposit.licences import licence_problem
+    from icha.deposit.metadata import licence_problem
     from icha.planning.belonging import belongs_to_another
     from icha.planning.needs import missing_software, wanting
     from icha.planning.plan import plan

@@ -9,7 +9,7 @@ from icha.configuration.load import load_configuration
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.planning.needs import further_software
 from icha.planning.results import campaign_files
-from icha.references.literature import literature
+from icha.references.theories import literature
 
 SHIPPED = sorted([REPOSITORY / "config/config.yaml", *(REPOSITORY / "config/campaigns").glob("*.yaml")])
 

@@ -151,7 +151,6 @@ WRONG = {
         None,
         "defaults.studies: would be 2003000 values, written out in all studies; allowed: 500000 at most",
     ),
-    "authors": ("publication", {"authors": [{"name": f"a{i}"} for i in range(1001)]}, "allowed: 1000 at most"),
     "grid": (
         {"surfaces.rough": measured_surface(grid=32768), "studies.one.seeds": [1]},
         None,
