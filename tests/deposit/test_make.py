@@ -379,7 +379,7 @@ def test_failures_are_published_only_with_their_reason(campaign, tmp_path):
     campaign, results = campaign
     runs, out = list(campaign_files(campaign).runs), tmp_path / "out/small-1.0.0"
     (results / "checks.json").write_text(json.dumps([check(runs[0], 1e-3), check(runs[1], 1e-12)]))
-    with pytest.raises(ValueError, match=f"not published(.|\n)*{runs[0][5:-3]}: residual"):
+    with pytest.raises(ValueError, match=f"{runs[0][5:-3]}: residual"):
         published_as(out, campaign, results)
     known = [KnownFailure(run=runs[0][5:-3], reason="It | shows what stiff springs do.")]
     publication = campaign.publication.model_copy(update={"known_failures": known})
