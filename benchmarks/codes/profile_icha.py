@@ -14,10 +14,9 @@ import numpy as np
 import icha
 from icha import simulation
 from icha.datasets.files import write_dataset
-from icha.equilibrium import observables
+from icha.equilibrium import interacting_asperities
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space import interaction
-from icha.models import asperities
 
 MODULUS, SURFACE_ENERGY, RANGE = 25e6, 0.05, 2.071e-9
 SNAPSHOT = [("reduced_pressure", 0.01)]
@@ -104,9 +103,9 @@ def main(kind, adhesion, answer):
     stages = Stages()
     with contextlib.ExitStack() as watched:
         for owner, name, stage in (
-            (asperities, "find_summits", "summits"),
-            (observables, "gap_distribution", "fields of the snapshot"),
-            (observables, "pressure_distribution", "fields of the snapshot"),
+            (interacting_asperities, "find_summits", "summits"),
+            (interacting_asperities, "gap_distribution", "fields of the snapshot"),
+            (interacting_asperities, "pressure_distribution", "fields of the snapshot"),
         ):
             watched.enter_context(mock.patch.object(owner, name, stages.timed(stage, getattr(owner, name))))
         watched.enter_context(mock.patch.object(simulation, "follow", stages.timed_steps("path", simulation.follow)))

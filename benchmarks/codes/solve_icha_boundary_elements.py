@@ -4,7 +4,7 @@ from task import Task
 from threadpoolctl import threadpool_limits
 
 import icha
-from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.contact import contact_of
 from icha.path.follow import follow
 
 
@@ -16,7 +16,7 @@ def main():
     surface = icha.Surface(task.heights, task.period)
     material = icha.Material(task.contact_modulus, task.surface_energy, task.interaction_range)
     with threadpool_limits(1):
-        contact = BoundaryElements.of(surface, material)
+        contact = contact_of(surface, material)
         for waypoint in follow(contact, path, unit):
             state = waypoint.state
             task.answer_stop(

@@ -26,7 +26,7 @@ from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
 from icha.configuration.studies import MEASURED, Study
 from icha.configuration.surfaces import AnySurface, MaterialSection, SelfAffineSurface
-from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import MODELS, Model
 from icha.support.values import (
     ROUNDING,
     Name,
@@ -242,21 +242,25 @@ class Campaign(Section):
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
         """Surfaces of a study that its models cannot press."""
-        if BOUNDARY_ELEMENTS not in study.models:
-            return
-        at = ("models", study.models.index(BOUNDARY_ELEMENTS))
-        for name in study.surfaces:
-            if self.is_free(name):
-                reason = f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or "
-                yield at, BOUNDARY_ELEMENTS, reason + "another `boundary`, which makes a surface periodic"
-            cells = self._cells_per_short_wave(name)
-            if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
-                reason = (
-                    f"need at least {_LEAST_CELLS} grid cells per shortest wavelength, and {name!r} has {cells:.3g}; "
-                    f"allowed: asperities, or a `grid` of {self._grid_of_cells(name, _LEAST_CELLS)} or more for "
-                    f"{name!r} (recommended: {self._grid_of_cells(name, _ADVISABLE_CELLS)})"
-                )
-                yield at, BOUNDARY_ELEMENTS, reason
+        for index, model in enumerate(study.models):
+            for name in study.surfaces:
+                for reason in self._reasons_against(MODELS[model], name):
+                    yield ("models", index), model, reason
+
+    def _reasons_against(self, model: Model, name: str) -> Iterator[str]:
+        """Reasons why a model cannot press a surface."""
+        if model.periodic_only and self.is_free(name):
+            yield (
+                f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or another "
+                "`boundary`, which makes a surface periodic"
+            )
+        cells, least = self._cells_per_short_wave(name), model.least_cells
+        if cells is not None and cells < least * (1 - ROUNDING):
+            yield (
+                f"need at least {least} grid cells per shortest wavelength, and {name!r} has {cells:.3g}; allowed: "
+                f"asperities, or a `grid` of {self._grid_of_cells(name, least)} or more for {name!r} (recommended: "
+                f"{self._grid_of_cells(name, _ADVISABLE_CELLS)})"
+            )
 
     def _cells_per_short_wave(self, surface: str) -> float | None:
         """Grid cells per shortest wavelength of a self-affine surface; None of another."""
@@ -271,8 +275,11 @@ class Campaign(Section):
     def warnings(self) -> list[str]:
         """What is allowed but not advisable."""
         found = []
-        by_patches = {
-            name for each in self.studies.values() if BOUNDARY_ELEMENTS in each.models for name in each.surfaces
+        by_cells = {
+            name
+            for each in self.studies.values()
+            if any(MODELS[model].least_cells for model in each.models)
+            for name in each.surfaces
         }
         for name in dict.fromkeys(name for study in self.studies.values() for name in study.surfaces):
             surface = self.surfaces[name]
@@ -284,7 +291,7 @@ class Campaign(Section):
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
                     f"{variant}; recommended: {_ADVISABLE_CELLS}, at least {_LEAST_CELLS}"
                 )
-            elif cells is not None and cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_patches:
+            elif cells is not None and cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_cells:
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
                     f"wavelength{variant}, with which areas are off by a few per cent; recommended: "

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import MODELS
 from icha.datasets.files import has_groups, is_refused, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
 from icha.datasets.variables import run as variables_of_run
@@ -75,7 +75,7 @@ SURFACE_NAMES = {
     SYNTHESISED: ("rolloff_wavelength", "short_wavelength", "hurst"),
     MEASURED: ("measured_rms_slope", "psd_wavevector", "psd_wavevector_bounds", "power_spectrum"),
 }
-_OF_RUN = variables_of_run.RUN | variables_of_run.PATCHES | variables_of_run.CYCLE | variables_of_run.LOOP
+_OF_RUN = variables_of_run.RUN | variables_of_run.OF_MODELS | variables_of_run.CYCLE | variables_of_run.LOOP
 
 # Dimensions of every variable of a run in a study of a campaign dataset: those of the run are added.
 DESIGN = LABELS
@@ -169,7 +169,7 @@ def _flaws_of_run(run):
     model, kept = run.attrs.get("contact_model", ""), run.sizes.get("snapshot", 0) > 0
     if model and model not in MODELS:
         yield f"attribute contact_model: {model!r}; allowed: {', '.join(MODELS)}"
-    by_patches = model == BOUNDARY_ELEMENTS
+    by_patches = model in MODELS and MODELS[model].by_cells
     there = {
         SNAPSHOTS: kept,
         WAY_BACK: "hysteresis_loss" in run,

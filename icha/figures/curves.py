@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.legends import legend_below, named_handles, words_handle
 from icha.figures.palette import (
-    ASPERITIES_NAME,
     MODEL_MARKERS,
     PLACE_MARKERS,
     closed_look,
@@ -134,7 +133,7 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
         colours = dict(zip(materials, scale.colours, strict=True))
     layers = material_layers(dataset, materials)
     markers = place_markers(places)
-    by_elements = shown_model(dataset) != ASPERITIES
+    by_elements = shown_model(dataset) != DEFAULT_MODEL
     lines = []
     for (material, *place, applicable), own in members.items():
         place = tuple(place)
@@ -194,7 +193,7 @@ def contact_of(line: Line) -> tuple[str, str, float]:
 
 def model_name(dataset: xr.Dataset) -> str:
     """By what legends call the `shown_model` of a study."""
-    return ASPERITIES_NAME if shown_model(dataset) == ASPERITIES else SHORT_RANGE
+    return MODELS[shown_model(dataset)].words
 
 
 def _curve_handles(dataset, lines, scale, many_places):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from icha.contact.models import MODELS
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.legends import NOT_APPLICABLE
 from icha.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, legend_handle
@@ -22,9 +23,8 @@ MATERIAL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 MATERIAL_COLOURS += ("#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
 PLACE_MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
-ASPERITIES_NAME = "asperities"
 # By what legends call the models. Boundary elements have another cross on the way back.
-MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
+MODEL_MARKERS = {MODELS["asperities"].words: "o", MODELS["boundary_elements"].words: "+", FINITE_RANGE: "1"}
 WAY_BACK_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
 # Lines of boundary elements beside those of asperities.
 BESIDE_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
-from icha.contact.models import ASPERITIES
 from icha.datasets.labels import RunLabels
-from icha.planning.costs import MAP_ARRAYS, PATCH_ARRAYS, job_threads
+from icha.planning.costs import MAP_ARRAYS, RUN_SIZES, job_threads
 from icha.planning.plan import Item, memory_on
 from icha.support import in_words
 from icha.support.in_words import counted
@@ -61,18 +60,17 @@ def run_threads(campaign: Campaign, case: RunLabels) -> int:
 
 def run_memory(campaign: Campaign, case: RunLabels) -> int:
     """Megabytes for a run: some arrays of the surface's size, for boundary elements some dozens, and the program."""
-    if case.model == ASPERITIES:
-        return surface_memory(campaign, case.surface)
-    return int(600 + 1.25 * PATCH_ARRAYS * _ARRAY * campaign.grid(case.surface) ** 2)
+    arrays = max(4, 1.25 * RUN_SIZES[case.model].arrays)
+    return int(600 + arrays * _ARRAY * campaign.grid(case.surface) ** 2)
 
 
 def run_minutes(campaign: Campaign, case: RunLabels) -> int:
     """Minutes after which a run is taken for stuck: many times what such runs have taken."""
+    loading, cycle, several_cores = RUN_SIZES[case.model].minutes
     if surface_threads(campaign, case.surface) > 1:
-        return 240 if case.model == ASPERITIES else 1440
+        return several_cores
     asked = campaign.studies[case.study]
-    minutes = 120 if asked.unload or asked.turning_points else 30
-    return minutes if case.model == ASPERITIES else 8 * minutes
+    return cycle if asked.unload or asked.turning_points else loading
 
 
 def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:

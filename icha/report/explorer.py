@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import MODELS
 from icha.datasets import results
 from icha.datasets.campaign import find_snapshot, run_labels, select_run
 from icha.datasets.files import read_campaign, read_dataset, readable
@@ -156,7 +156,7 @@ def _maps(folder, labels, run):
     Maps are in the file of the run only, which may have its snapshots in another order than the campaign.
     """
     file = folder / results.RUN.format(**parts(labels))
-    if labels.model != BOUNDARY_ELEMENTS or not file.is_file():
+    if not MODELS[labels.model].by_cells or not file.is_file():
         return None
     with readable(file), xr.open_dataset(file, engine="netcdf4") as own:
         states = zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True)

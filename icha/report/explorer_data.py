@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from icha.contact.models import ASPERITIES
+from icha.contact.models import model_of
 from icha.datasets.attributes import why_no_result
 from icha.datasets.campaign import reduced_gap, spots_of
 from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
@@ -89,7 +89,7 @@ def _snapshot(run, at, maps):
     }
     if maps is not None:
         return found | {"map": maps[at]}
-    if run.attrs["contact_model"] != ASPERITIES:
+    if model_of(run.attrs).by_cells:
         return found
     spots = spots_of(run, at)
     return found | {"circles": [floats(spots[f"spot_{name}"]) for name in ("x", "y", "radius")]}
@@ -103,7 +103,7 @@ def _points(curve):
 
 def _pressures(run, at):
     """Points of the density of the pressure, without its thinnest tail; bins of few nodes are joined."""
-    densities = pressure_densities if run.attrs["contact_model"] == ASPERITIES else joined_pressure_densities
+    densities = joined_pressure_densities if model_of(run.attrs).by_cells else pressure_densities
     pressure, (density,) = densities([(run, at)])
     shown = density > LEAST_DENSITY * density.max(initial=0)
     return [floats(pressure[shown]), floats(density[shown])]

@@ -43,7 +43,7 @@ def test_the_vocabulary_keeps_what_is_promised():
     """Names, dimensions and units that users rely on: a change of them is one of the format, and made here, too."""
     promised = PROMISED.read_text().splitlines()
     tables = (
-        (RUN_NAMES, of_run.RUN | of_run.PATCHES | of_run.CYCLE | of_run.LOOP),
+        (RUN_NAMES, of_run.RUN | of_run.OF_MODELS | of_run.CYCLE | of_run.LOOP),
         (SURFACE_NAMES, of_surface.SURFACE),
     )
     kept = [

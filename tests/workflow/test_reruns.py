@@ -129,7 +129,7 @@ SOLVERS = {"solve_boundary_elements", "follow_boundary_elements"}
 def test_scripts_whose_fingerprint_a_module_is_part_of(module, scripts, fingerprint):
     folder = REPOSITORY / "workflow/scripts"
     # A run imports its model by name.
-    told = {"run_sweep": [f"icha.models.{name}" for name in MODELS]}
+    told = {"run_sweep": [model.module for model in MODELS.values()]}
     having = {
         file.stem
         for file in folder.glob("*.py")
@@ -140,7 +140,7 @@ def test_scripts_whose_fingerprint_a_module_is_part_of(module, scripts, fingerpr
 
 def test_what_surrounds_all_scripts_is_part_of_no_fingerprint(fingerprint):
     script = REPOSITORY / "workflow/scripts/run_sweep.py"
-    sweep = fingerprint.files_of(script, *(f"icha.models.{name}" for name in MODELS))
+    sweep = fingerprint.files_of(script, *(model.module for model in MODELS.values()))
     around = {"job.py", *(f"icha/support/{name}.py" for name in ("ownership", "printable", "processes"))}
     assert not around & set(sweep)
     # What writes and reads datasets is.
@@ -149,7 +149,7 @@ def test_what_surrounds_all_scripts_is_part_of_no_fingerprint(fingerprint):
 
 def test_models_of_contact_know_nothing_of_each_other(fingerprint):
     script = REPOSITORY / "workflow/scripts/run_sweep.py"
-    asperities, patches = (set(fingerprint.files_of(script, f"icha.models.{name}")) for name in MODELS)
+    asperities, patches = (set(fingerprint.files_of(script, model.module)) for model in MODELS.values())
     assert "icha/equilibrium/equilibrium.py" in asperities - patches
     assert "icha/boundary_elements/contact.py" in patches - asperities
     assert not any("/equilibrium/" in name for name in patches - asperities)
