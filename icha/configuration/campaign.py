@@ -6,35 +6,19 @@ is wrong with it is worded in `icha.configuration.errors`; the JSON schema is ge
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    PrivateAttr,
-)
+from pydantic import AfterValidator, Field, PrivateAttr
 
-from icha.configuration.boundary_elements import (
-    BesideStudy,
-    BoundaryElementLoops,
-    BoundaryElements,
-)
+from icha.configuration.boundary_elements import BesideStudy, BoundaryElementLoops, BoundaryElements
 from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
 from icha.configuration.studies import MEASURED, Study
-from icha.configuration.surfaces import AnySurface, MaterialSection, SelfAffineSurface
+from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS, Model
-from icha.support.values import (
-    ROUNDING,
-    Name,
-    Problem,
-    Section,
-    Text,
-    distinct,
-)
+from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
@@ -195,20 +179,17 @@ class Campaign(Section):
 
     def solved(self, entry: BesideStudy) -> list[Contact]:
         """The contacts for which an entry beside a study asks."""
+        lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
+        asked = [None if values is None else set(values) for values in lists]
 
-        def among(wanted):
-            return (lambda value: True) if wanted is None else set(wanted).__contains__
+        def is_asked_for(contact):
+            seedless = not self.surfaces[contact.surface].random
+            return all(
+                values is None or value in values or (seedless and name == "seed")
+                for name, value, values in zip(Contact._fields, contact, asked, strict=True)
+            )
 
-        surface, seed = among(entry.surfaces), among(entry.seeds)
-        rms_slope, material = among(entry.rms_slopes), among(entry.materials)
-        return [
-            each
-            for each in self._contacts[entry.study]
-            if surface(each.surface)
-            and (seed(each.seed) or not self.surfaces[each.surface].random)
-            and rms_slope(each.rms_slope)
-            and material(each.material)
-        ]
+        return list(filter(is_asked_for, self._contacts[entry.study]))
 
     def problems(self) -> Iterator[Problem]:
         """What keeps it from being run although each of its values is allowed by itself.
@@ -249,53 +230,44 @@ class Campaign(Section):
 
     def _reasons_against(self, model: Model, name: str) -> Iterator[str]:
         """Reasons why a model cannot press a surface."""
+        surface, least = self.surfaces[name], model.least_cells
         if model.periodic_only and self.is_free(name):
             yield (
                 f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or another "
                 "`boundary`, which makes a surface periodic"
             )
-        cells, least = self._cells_per_short_wave(name), model.least_cells
-        if cells is not None and cells < least * (1 - ROUNDING):
+        if surface.cells_per_short_wave < least * (1 - ROUNDING):
             yield (
-                f"need at least {least} grid cells per shortest wavelength, and {name!r} has {cells:.3g}; allowed: "
-                f"asperities, or a `grid` of {self._grid_of_cells(name, least)} or more for {name!r} (recommended: "
-                f"{self._grid_of_cells(name, _ADVISABLE_CELLS)})"
+                f"need at least {least} grid cells per shortest wavelength, and {name!r} has "
+                f"{surface.cells_per_short_wave:.3g}; allowed: asperities, or a `grid` of "
+                f"{surface.grid_of_cells(least)} or more for {name!r} (recommended: "
+                f"{surface.grid_of_cells(_ADVISABLE_CELLS)})"
             )
-
-    def _cells_per_short_wave(self, surface: str) -> float | None:
-        """Grid cells per shortest wavelength of a self-affine surface; None of another."""
-        section = self.surfaces[surface]
-        return section.cells_per_short_wave if isinstance(section, SelfAffineSurface) else None
-
-    def _grid_of_cells(self, surface: str, cells: int) -> int:
-        """The least grid of a self-affine surface with so many cells per shortest wavelength."""
-        section = self.surfaces[surface]
-        return math.ceil(cells * section.period / section.short_wavelength * (1 - ROUNDING))
 
     def warnings(self) -> list[str]:
         """What is allowed but not advisable."""
         found = []
+        studies = self.studies.values()
         by_cells = {
             name
-            for each in self.studies.values()
+            for each in studies
             if any(MODELS[model].least_cells for model in each.models)
             for name in each.surfaces
         }
-        for name in dict.fromkeys(name for study in self.studies.values() for name in study.surfaces):
-            surface = self.surfaces[name]
-            origin = self.origin("surfaces", name)
+        for name in dict.fromkeys(name for study in studies for name in study.surfaces):
+            surface, origin = self.surfaces[name], self.origin("surfaces", name)
             variant = "" if origin == name else f" (variant {name})"
-            cells = self._cells_per_short_wave(name)
-            if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
+            cells = surface.cells_per_short_wave
+            if cells < _LEAST_CELLS * (1 - ROUNDING):
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
                     f"{variant}; recommended: {_ADVISABLE_CELLS}, at least {_LEAST_CELLS}"
                 )
-            elif cells is not None and cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_cells:
+            elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_cells:
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
                     f"wavelength{variant}, with which areas are off by a few per cent; recommended: "
-                    f"{self._grid_of_cells(name, _ADVISABLE_CELLS)} or more"
+                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)} or more"
                 )
         return found
 

@@ -139,10 +139,12 @@ def read_hdf5(source, how: Preparation) -> Found:
         return Found(with_y_first(heights, how), unit, data=name if len(plane) > 1 else "")
 
 
-def format_of_hdf5(path: Path) -> str:
-    """The format of an HDF5 file whose name does not tell it; netCDF-4 and Zygo's files are HDF5, too."""
+def format_of_hdf5(path: Path) -> str | None:
+    """The format of an HDF5 file whose name does not tell it, None of others; netCDF-4 and Zygo's files are HDF5."""
     import h5py
 
+    if not h5py.is_hdf5(path):
+        return None
     with h5py.File(path) as file:
         if "_NCProperties" in file.attrs:
             return "netcdf"
