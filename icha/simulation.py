@@ -205,7 +205,7 @@ def asperity_applicability(
 
 def _solver(name: str) -> ModuleType:
     """The module that makes the contact. Only this one is imported: what another is made of does not concern a run."""
-    if name not in MODELS:
+    if name not in tuple(MODELS):
         raise ValueError(f"model: {name!r} must be one of {', '.join(MODELS)}")
     return importlib.import_module(MODELS[name].module)
 

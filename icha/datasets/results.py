@@ -52,7 +52,7 @@ def job_file(path: str, kind: str, ending: str) -> str:
     return f"{kind}/{job.rpartition('.')[0]}{ending}"
 
 
-# As measured by benchmarks/storage.py (docs/reference/dataset.md): smaller arrays lose by being cut into chunks what
+# As measured (docs/reference/dataset.md, "How files are kept"): smaller arrays lose by being cut into chunks what
 # compression gains.
 LEAST_COMPRESSED = 1024
 # Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.

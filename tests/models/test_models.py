@@ -20,7 +20,7 @@ from icha.datasets.files import read_campaign, read_run, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, flaws, kind_of
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.variables.run import FURTHER, OF_MODELS
-from icha.figures.palette import MODEL_MARKERS
+from icha.figures.looks import MODEL_MARKERS
 from icha.figures.select import pick_run, study_runs
 from icha.planning.costs import LAWS, RUN_SIZES
 

@@ -1,0 +1,350 @@
+"""Report and page for exploring in headless Chromium: real keys move what they should; nothing comes from outside."""
+
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+import small_campaign as small
+from chromium import WANTED, chromium
+from explorer_results import write_results
+from PIL import Image
+
+from icha.analysis.checks import check_campaign
+from icha.analysis.common_loads import compare_campaign
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.surface_file import write_surface
+from icha.figures import fig1_jkr, fig2_area_and_gap
+from icha.figures.style import save
+from icha.report.explorer import write_explorer
+from icha.report.report import ReportFigure, write_report
+from icha.report.run_times import Benchmark, write_times_page
+from icha.report.sections import read_surface_statistics
+
+pytestmark = WANTED
+
+
+@pytest.fixture(scope="module")
+def explorer_file(tmp_path_factory):
+    folder = write_results(tmp_path_factory.mktemp("results"))
+    write_explorer(folder, folder / "explore.html", largest=20)
+    return folder / "explore.html"
+
+
+@pytest.fixture(scope="module")
+def report_file(tmp_path_factory):
+    """A report with figures, a failed run and run times, in a folder as results have it."""
+    folder = tmp_path_factory.mktemp("report")
+    runs = list(small.runs())
+    runs[1] = (runs[1][0], runs[1][1].assign_attrs(incomplete="no equilibrium at the second stop"))
+    tree = campaign_tree(runs, attrs={"title": "Small campaign", "license": "CC0-1.0"})
+    write_surface(folder / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    pictures = []
+    for name, figure, studies in (
+        ("fig1_jkr", fig1_jkr.figure(), ()),
+        ("fig2_area_and_gap", fig2_area_and_gap.figure(tree, study="slopes"), ("slopes",)),
+    ):
+        files = [folder / "figures" / f"{name}.{ending}" for ending in ("png", "pdf")]
+        save(figure, *files)
+        pictures.append(ReportFigure(name, f"Caption of {name}.", *files, studies))
+    write_times_page(folder / "benchmarks" / "index.html", [Benchmark("runs/one", 75.0, 120.0)])
+    write_report(
+        folder / "report.html",
+        campaign=tree,
+        figures=pictures,
+        checks=check_campaign(tree),
+        comparison=compare_campaign(tree),
+        surfaces=[read_surface_statistics(folder / "s.nc")],
+        dataset_path=folder / "dataset" / "small.nc",
+        times_path=folder / "benchmarks" / "index.html",
+        results=folder,
+    )
+    return folder / "report.html"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    with chromium(tmp_path_factory.mktemp("profile")) as page:
+        yield page
+
+
+def opened(browser, file):
+    """A page, newly opened; nothing that a test does may lead to an error or to a request."""
+    browser.console.clear(), browser.addresses.clear()
+    browser.show(1300)
+    browser.open(file)
+    yield browser
+    assert browser.console == []
+    assert {address for address in browser.addresses if not address.startswith(("file:", "data:"))} == set()
+
+
+@pytest.fixture
+def page(browser, explorer_file):
+    yield from opened(browser, explorer_file)
+
+
+@pytest.fixture
+def report(browser, report_file):
+    yield from opened(browser, report_file)
+
+
+# --- the page for exploring -------------------------------------------------------------------------------------
+
+
+def choose(page, **choices):
+    """Choose from the lists as a reader does."""
+    for name, value in choices.items():
+        page.value(
+            f"{{ const list = document.getElementById('{name}'); list.value = {json.dumps(str(value))};"
+            "list.dispatchEvent(new Event('change')); }"
+        )
+        page.settle()
+
+
+def shown(page):
+    """What the page shows: the place, its words, the table, and by model picture, its opacity, point and curve."""
+    return page.value(
+        """(() => {
+          const at = (id) => document.getElementById(id);
+          const models = Object.keys(runs);
+          return {
+            place: Number(at("stop").value), last: Number(at("stop").max), state: at("state").textContent,
+            table: [...document.querySelectorAll("#values tbody tr")]
+              .map((row) => [...row.cells].map((cell) => cell.textContent)),
+            notices: [...document.querySelectorAll("#notices p")].map((each) => each.textContent),
+            images: models.map((model) => (at(`map-${model}`).layout.images || [])
+              .map((each) => [each.source, each.opacity])[0] || null),
+            points: ["area", "separation"]
+              .map((id) => at(id).data.slice(models.length).map((each) => [each.x[0], each.y[0]])),
+            curves: ["gap_density", "pressure_density", "sizes", "larger"]
+              .map((id) => at(id).data.map((each) => [Array.from(each.y), each.opacity])),
+          };
+        })()"""
+    )
+
+
+def test_the_slider_moves_contact_points_and_distributions_of_both_models(page):
+    choose(page, study="one", material="soft", model="both")
+    page.value("document.getElementById('stop').focus()")
+    page.press("End")
+    last = shown(page)
+    page.press("ArrowLeft")
+    first = shown(page)
+    assert (last["place"], first["place"], last["last"]) == (1, 0, 1)
+    assert last["state"] == "2 of 2: loading, p* = 0.01" and first["state"] == "1 of 2: loading, p* = 0.003"
+    assert [row[:2] for row in first["table"]] == [["asperities", "0.003"], ["boundary elements", "0.003"]]
+    kinds = [re.match(r"data:image/([a-z+]+)", source)[1] for source, _ in first["images"]]
+    assert kinds == ["svg+xml", "png"] and first["notices"] == []
+    for k in range(2):
+        assert first["images"][k][0] != last["images"][k][0] and first["images"][k][1] == last["images"][k][1] == 1
+        assert all(before[k] != after[k] for before, after in zip(first["points"], last["points"], strict=True))
+        assert all(before[k][0] != after[k][0] for before, after in zip(first["curves"], last["curves"], strict=True))
+    area, separation = last["points"]
+    assert area[0][0] == area[1][0] == pytest.approx(0.01) and area[0][1] > first["points"][0][0][1]
+    assert separation[0][1] < first["points"][1][0][1]
+
+
+def test_where_there_is_no_snapshot_the_page_says_so(page):
+    choose(page, study="slopes", rms_slope=1, material="soft")
+    page.value("document.getElementById('stop').focus()")
+    page.press("Home")
+    start = shown(page)
+    assert start["images"] == [None] and start["curves"] == [[], [], [], []]
+    assert start["points"][0][0] != [None, None] and "no snapshot up to here" in start["notices"][0]
+    page.press("ArrowRight")
+    on_it = shown(page)
+    assert on_it["notices"] == [] and on_it["images"][0][1] == 1 and on_it["table"][0][-1] == "yes"
+    page.press("End")
+    later = shown(page)
+    assert "pale, are those of the last one before" in later["notices"][0] and later["table"][0][-1] == "no"
+    assert later["images"][0][1] < 1 and {curve[0][1] for curve in later["curves"]} == {0.3}
+    assert later["points"] != on_it["points"]
+
+
+def test_failures_and_ways_back_are_told(page):
+    choose(page, study="slopes", rms_slope=0.2)
+    assert any("the run failed; the path ends early, at A/A0 < 1 &" in each for each in shown(page)["notices"])
+    choose(page, study="loops")
+    page.value("document.getElementById('stop').focus()")
+    page.press("End")
+    assert "unloading" in shown(page)["state"]
+    # Loads are negative on the way: such axes are not logarithmic.
+    assert page.value("document.getElementById('log').checked") is False
+
+
+def test_everything_is_reached_and_used_by_keys(page):
+    choose(page, study="one", material="soft")
+    page.value("document.activeElement.blur(); scrollTo(0, 0)")
+    order, outlines = [], []
+    for _ in range(40):
+        page.press("Tab")
+        name, outline = page.value(
+            "[document.activeElement.id, getComputedStyle(document.activeElement).outlineStyle"
+            " + parseFloat(getComputedStyle(document.activeElement).outlineWidth)]"
+        )
+        if not name:
+            break
+        order.append(name), outlines.append(outline)
+    # From top to bottom; lists with one entry have nothing to choose.
+    assert order == ["study", "material", "seed", "model", "log", "before", "stop"], order
+    assert set(outlines) == {"solid3"}
+    # The first list, by keys alone.
+    page.value("document.getElementById('study').focus()")
+    before = page.value("document.getElementById('study').value")
+    page.press("ArrowUp")
+    assert page.value("document.getElementById('study').value") != before
+    # The buttons go from snapshot to snapshot.
+    choose(page, study="one", material="soft")
+    page.value("document.getElementById('before').focus()")
+    page.press("Enter")
+    assert shown(page)["place"] == 0
+    spoken = page.value("document.getElementById('stop').getAttribute('aria-valuetext')")
+    assert spoken == "1 of 2, loading, p* = 0.003"
+    assert page.value("document.getElementById('state').getAttribute('role')") == "status"
+
+
+def test_maps_are_enlarged_together(page):
+    choose(page, study="one", material="soft", model="both")
+    page.value("Plotly.relayout('map-asperities', {'xaxis.range': [10, 30], 'yaxis.range': [20, 40]}).then(() => 0)")
+    page.settle()
+    assert page.value("document.getElementById('map-boundary_elements').layout.xaxis.range") == [10, 30]
+    # What is enlarged remains so while the slider moves.
+    page.value("document.getElementById('stop').focus()")
+    page.press("Home")
+    assert page.value("document.getElementById('map-asperities').layout.xaxis.range") == [10, 30]
+
+
+def test_spots_are_where_the_dataset_has_them(page):
+    """Centres of circles are red, and as much of the map is red as spots cover."""
+    choose(page, study="one", material="soft", model="asperities")
+    circles = page.value(
+        "(() => { const kept = leading.snapshots.at(-1).circles.map((text) => Array.from(floats(text)));"
+        "return kept[0].map((x, k) => [x, kept[1][k], kept[2][k]]); })()"
+    )
+    period = page.value("leading.period")
+    place = page.value(
+        "(() => { const map = document.getElementById('map-asperities'), {xaxis, yaxis} = map._fullLayout;"
+        "const box = map.getBoundingClientRect();"
+        "return [xaxis, yaxis].map((axis) => [axis._offset, axis._length, ...axis.range])"
+        ".concat([[box.x + scrollX, box.y + scrollY]]); })()"
+    )
+    pixels = np.asarray(Image.open(io.BytesIO(page.picture())).convert("RGB")).astype(int)
+    (left, width, x_low, x_high), (top, height, y_low, y_high), (box_x, box_y) = place
+    assert x_high - x_low == pytest.approx(period * 1e6)
+    for x, y, radius in circles:
+        column = box_x + left + width * (x * 1e6 - x_low) / (x_high - x_low)
+        row = box_y + top + height * (y_high - y * 1e6) / (y_high - y_low)
+        inside = left + 3 < column - box_x < left + width - 3 and top + 3 < row - box_y < top + height - 3
+        if inside and radius / period * width > 2:
+            red, green, blue = pixels[round(row), round(column)]
+            assert red > 150 and green < 90 and blue < 90, (x, y)
+    inner = pixels[round(box_y + top) + 2 : round(box_y + top + height) - 2, round(box_x + left) + 2 :]
+    inner = inner[:, : round(width) - 4]
+    part = (inner[..., 0] > inner[..., 1] + 60).mean()
+    assert part == pytest.approx(sum(np.pi * radius**2 for *_, radius in circles) / period**2, rel=0.25)
+
+
+def brightness(colour):
+    return sum(map(int, re.findall(r"\d+", colour)[:3])) / 3
+
+
+def test_dark_and_light_follow_the_reader(page):
+    def looks():
+        found = page.value(
+            "[getComputedStyle(document.body).backgroundColor, document.getElementById('area').layout.font.color,"
+            " document.getElementById('area').data[0].line.color]"
+        )
+        return map(brightness, found)
+
+    paper, ink, curve = looks()
+    page.show(1300, scheme="dark")
+    dark_paper, dark_ink, dark_curve = looks()
+    assert paper > 200 > 80 > dark_paper and ink < 80 < 200 < dark_ink
+    assert curve < paper - 80 and dark_curve > dark_paper + 80
+
+
+@pytest.mark.parametrize("width", [320, 400, 700])
+def test_nothing_is_wider_than_the_window(page, width):
+    page.show(width, 800)
+    choose(page, study="one", material="soft")
+    assert page.value("[document.documentElement.scrollWidth, innerWidth]") == [width, width]
+    # The slider stays in sight, and leaves room for what it moves.
+    page.value("scrollTo(0, 1500)")
+    page.settle()
+    top, bottom = page.value(
+        "(({top, bottom}) => [top, bottom])(document.getElementById('path').getBoundingClientRect())"
+    )
+    assert top == 0 and bottom < 250
+
+
+def test_errors_and_requests_would_be_seen(browser, explorer_file, tmp_path):
+    text = re.sub("<meta http-equiv.*?>", "", explorer_file.read_text(encoding="utf-8"))
+    wrong = '<img src="http://localhost:9/x.png"><script>nothing.at.all;</script></body>'
+    (tmp_path / "wrong.html").write_text(text.replace("</body>", wrong), encoding="utf-8")
+    browser.console.clear(), browser.addresses.clear()
+    browser.open(tmp_path / "wrong.html")
+    assert "http://localhost:9/x.png" in browser.addresses
+    assert any("nothing is not defined" in line for line in browser.console)
+
+
+# --- the report -------------------------------------------------------------------------------------------------
+
+
+def test_figures_are_enlarged_by_a_click_and_left_again(report):
+    states = report.value("""(async () => {
+      const viewer = document.getElementById("viewer");
+      const pause = () => new Promise((go) => setTimeout(go, 200));
+      const image = () => viewer.querySelector("img");
+      const at = () => figures.findIndex((figure) => figure.querySelector("img").src === image().src);
+      const states = [viewer.open];
+      const state = () => states.push([viewer.open, at(), image().getBoundingClientRect().width]);
+      const key = (name) => viewer.dispatchEvent(new KeyboardEvent("keydown", {key: name}));
+      document.querySelectorAll("figure button")[1].click(); await pause(); state();
+      key("ArrowRight"); await pause(); state();
+      viewer.querySelector(".previous").click(); await pause(); state();
+      states.push(viewer.querySelector(".words").textContent.startsWith("Figure 2."));
+      states.push(document.querySelector("figure img").getBoundingClientRect().width);
+      image().click(); states.push(viewer.open);
+      return states;
+    })()""")
+    closed, one, following, before, caption, small_width, at_last = states
+    assert closed is at_last is False and caption is True
+    # After the last figure comes the first.
+    assert [state[:2] for state in (one, following, before)] == [[True, 1], [True, 0], [True, 1]]
+    assert one[2] > small_width
+
+
+def test_every_link_of_the_contents_leads_to_its_heading(report):
+    found = report.value("""(async () => {
+      document.documentElement.style.scrollBehavior = "auto";
+      const found = [];
+      for (const link of document.querySelectorAll("nav a")) {
+        link.click();
+        await new Promise((go) => setTimeout(go, 60));
+        const place = document.getElementById(link.hash.slice(1)).getBoundingClientRect();
+        const end = scrollY + innerHeight >= document.documentElement.scrollHeight - 2;
+        found.push([link.hash, place.top >= -1 && place.top < (end ? innerHeight : 120),
+                    document.querySelectorAll("nav a[aria-current]").length]);
+      }
+      return found;
+    })()""")
+    there = {at for at, *_ in found}
+    assert {"#failures", "#studies", "#study-slopes", "#surfaces", "#checks", "#times", "#data"} <= there
+    assert all(there and current == 1 for _, there, current in found), found
+
+
+def test_the_report_is_read_on_a_telephone_and_in_the_dark(report):
+    report.show(500)
+    assert report.value("document.documentElement.scrollWidth <= innerWidth")
+    colours = "[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color]"
+    paper, ink = map(brightness, report.value(colours))
+    other_paper, other_ink = map(brightness, report.value(f"(document.getElementById('theme').click(), {colours})"))
+    assert (paper - ink) * (other_paper - other_ink) < 0
+    assert min(abs(paper - ink), abs(other_paper - other_ink)) > 150
+
+
+def test_run_times_are_shown_where_they_are(report):
+    report.value("document.querySelector('object.times').scrollIntoView()")
+    report.settle()
+    assert report.value("document.querySelector('object.times p').getBoundingClientRect().height") == 0
