@@ -58,6 +58,12 @@ _BEYOND = 32
 # Rows or columns of the grid, and points between them, that are worked on at a time, which bounds the memory.
 _LINES = 16
 _POINTS = 4096
+# Largest share of the load, and of the summits, that may be without support before asperities do not stand for the
+# surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
+MAX_SHARE = 0.1
+# Rows and columns between a node and the summit that stands for it: on a crest oblique to the grid there are two nodes
+# higher than their neighbours beside one summit.
+_NEAR = range(-2, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,14 +290,6 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
     return concave, determinant, step
 
 
-# Largest share of the load, and of the summits, that may be without support before asperities do not stand for the
-# surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
-MAX_SHARE = 0.1
-# Rows and columns between a node and the summit that stands for it: on a crest oblique to the grid there are two nodes
-# higher than their neighbours beside one summit.
-_NEAR = range(-2, 3)
-
-
 @dataclass(frozen=True, eq=False)
 class SummitCoverage:
     """The highest places of a surface, and whether summits stand for them.
@@ -338,8 +336,8 @@ class SummitCoverage:
 
     def unsupported_share(self, separation: float) -> float:
         """Share of the summits above the plane of separation (m) that their nodes do not support."""
-        unsupported = np.count_nonzero(self.unsupported_height > separation)
-        return unsupported / max(unsupported + np.count_nonzero(self.summit_height > separation), 1)
+        unsupported = int(np.count_nonzero(self.unsupported_height > separation))
+        return unsupported / max(unsupported + int(np.count_nonzero(self.summit_height > separation)), 1)
 
     def reasons_against(self, separations: Iterable[float]) -> list[str]:
         """Reasons why asperities do not stand for the surface at these mean separations (m); none if they do."""

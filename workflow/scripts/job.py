@@ -2,14 +2,15 @@
 
 import contextlib
 import os
-import select
 import sys
 import threading
+import time
 import traceback
 from contextlib import contextmanager
 from pathlib import Path
 
 from icha.support import checksums
+from icha.support.atomic_files import move_only_while_owned
 from icha.support.in_words import printable_lines
 from icha.support.program import beginning_of, end_with_parent
 
@@ -22,7 +23,7 @@ def _failures_of_solvers():
     names = {
         "icha.simulation": "ConvergenceError",
         "icha.contact.model": "NotConverged",
-        "icha.references.failures": "NotSolved",
+        "icha.references.finite_range": "NotSolved",
     }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
 
@@ -37,6 +38,7 @@ def guarded(snakemake):
     all in their message. The traceback of any other one is for the developers and is kept beside the log.
     """
     _end_with_snakemake()
+    move_only_while_owned()
     log, results = snakemake.log[0], _results(snakemake)
     outputs = [_result(results, path) for path in snakemake.output]
     terminal = os.dup(2)
@@ -137,28 +139,23 @@ def _end_with_snakemake():
 
     Worse, it could replace those of the next call, which computes them, too, and maybe of other values.
     """
-    if SNAKEMAKE not in os.environ or not hasattr(os, "pidfd_open"):
+    number, _, began = os.environ.get(SNAKEMAKE, "").partition(" ")
+    if not number:
         return  # no job of Snakemake, or not on Linux
-    number, _, began = os.environ[SNAKEMAKE].partition(" ")
-    number = int(number)
-    try:
-        snakemake = os.pidfd_open(number)
-    except OSError:  # it is gone, which is seen next, or processes may not be watched here
-        snakemake = None
-    try:
-        # Another process may have the number by now.
-        is_gone = beginning_of(number) != began
-    except (ProcessLookupError, FileNotFoundError):
-        is_gone = True
-    if is_gone:
-        os._exit(1)
-    if os.getppid() == number:
-        end_with_parent(number)
-    if snakemake is None:
-        return
+
+    def is_gone():
+        try:
+            return beginning_of(int(number)) != began  # another process may have the number by now
+        except (ProcessLookupError, FileNotFoundError):
+            return True
 
     def wait():
-        select.select([snakemake], [], [])
+        while not is_gone():
+            time.sleep(0.2)
         os._exit(1)
 
+    if is_gone():
+        os._exit(1)
+    if os.getppid() == int(number):
+        end_with_parent(int(number))
     threading.Thread(target=wait, daemon=True).start()

@@ -126,7 +126,10 @@ def _read(path, how):
         # Two columns are x and z.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
     if heights.ndim != 2 or not heights.size:
-        raise UnfitTopography("path", f"holds an array of shape {heights.shape}; allowed: rows and columns of heights")
+        nothing = "" if heights.size else ", no heights"
+        raise UnfitTopography(
+            "path", f"holds an array of shape {heights.shape}{nothing}; allowed: rows and columns of heights"
+        )
     return name, found
 
 
@@ -145,6 +148,6 @@ def _format_of(path: Path) -> str:
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:
         return known[suffix]
-    if (known := format_of_hdf5(path)) is not None:
-        return known
+    if (hdf5 := format_of_hdf5(path)) is not None:
+        return hdf5
     return "xyz" if path.name.lower().endswith(".xyz.gz") else "text"

@@ -25,11 +25,26 @@ from icha.surfaces.measured.text_tables import SourceFile, without_scales
 
 # A surface has at least so many columns of heights.
 _FEWEST_COLUMNS = 8
+# How Gwyddion begins the line with the width of an image that it exports, in the languages of its menus. The line with
+# its height follows.
+WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
+_VALUE = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
+_LENGTH = re.compile(rf"{_VALUE}\s*(\S+)?$")
+_TWO_LENGTHS = re.compile(rf"{_VALUE}\s*(\S+)?\s*[x×*]\s*{_VALUE}\s*(\S+)?$")
+# A line of a heading: a name, a colon, an equals sign, a delimiter or blanks, and a value.
+_LINE = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
+# Names in small letters, without punctuation.
+_SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
+_PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
+_UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
+_MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
+# The spectrum, its conjugate, their difference, the heights, and what is where.
+_BYTES_OF_NODE = 64
 
 
 def read_matrix(file: SourceFile, how: Preparation) -> Found:
     """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
-    values, lines = file.values, file.layout.heading
+    values, lines = file.values, file.layout.heading  # type: ignore[union-attr]
     if lines and (known := _as_instrument_file(file, how)):
         return known
     heights, steps, remark = without_scales(values)
@@ -56,7 +71,7 @@ def _as_instrument_file(file, how):
 def read_xyz(file: SourceFile, how: Preparation) -> Found:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
     points = _columns_of_points(file.values, how)
-    heading = read_heading(file.layout.heading, points.shape)
+    heading = read_heading(file.layout.heading, points.shape)  # type: ignore[union-attr]
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
     (column, nx, dx), (row, ny, dy) = (_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
@@ -136,21 +151,6 @@ def looks_like_fourier(values: np.ndarray) -> bool:
     return max(differences, default=0.0) <= 1e-4 * np.max(np.abs(modes), initial=1e-300)
 
 
-# How Gwyddion begins the line with the width of an image that it exports, in the languages of its menus. The line with
-# its height follows.
-WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
-_VALUE = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
-_LENGTH = re.compile(rf"{_VALUE}\s*(\S+)?$")
-_TWO_LENGTHS = re.compile(rf"{_VALUE}\s*(\S+)?\s*[x×*]\s*{_VALUE}\s*(\S+)?$")
-# A line of a heading: a name, a colon, an equals sign, a delimiter or blanks, and a value.
-_LINE = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
-# Names in small letters, without punctuation.
-_SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
-_PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
-_UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
-_MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
-
-
 @dataclass(frozen=True)
 class Heading:
     """What a heading says.
@@ -170,7 +170,7 @@ class Heading:
 
 def read_heading(lines: Sequence[str], shape: tuple[int, int]) -> Heading:
     """Read the heading of a table of a shape (rows, columns)."""
-    said = {}
+    said: dict[str, str] = {}
     for line in lines:
         if found := _LINE.match(line):
             said.setdefault(re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(), found[2].strip())
@@ -214,10 +214,6 @@ def _length(text):
 
 def _value(text):
     return float(text.replace(",", "."))
-
-
-# The spectrum, its conjugate, their difference, the heights, and what is where.
-_BYTES_OF_NODE = 64
 
 
 def read_fourier(file: SourceFile, how: Preparation) -> Found:
