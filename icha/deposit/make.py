@@ -25,7 +25,7 @@ from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_
 from icha.planning.costs import Cost
 from icha.planning.plan import read_attributes
 from icha.planning.results import campaign_files
-from icha.support.atomic_files import sync_folder, while_owned, whole_file
+from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, made_as, sha256_of, stale
 
 _BLOCK = 2**20
@@ -86,7 +86,7 @@ def make_deposit(
         with whole_file(archive) as temporary:
             _write_zip(temporary, part, folder.name)
             sync_folder(part)
-            with while_owned():
+            with moving():
                 # What was here before goes at once, and its checksums with it.
                 archive.unlink(missing_ok=True)
                 _remove(folder)
