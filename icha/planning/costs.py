@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from icha.datasets.results import COMPRESSED_SIZES, LEFT_IN_FILE
-from icha.path.limits import DEFAULT_STEP
+from icha.path.targets import DEFAULT_STEP
 from icha.support.parallel import LARGE_GRID
 
 MiB = 2**20
