@@ -20,7 +20,7 @@ from rocrate.model import ContextEntity, Dataset, Entity, File
 from rocrate.rocrate import ROCrate
 
 from icha.configuration.publication import Author, Publication
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
 from icha.deposit.metadata import TABLES, known_licence, web_address
 from icha.deposit.verify import CRATE, README, SOURCE

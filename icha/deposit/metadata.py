@@ -11,7 +11,7 @@ from packaging.licenses import InvalidLicenseExpression, canonicalize_license_ex
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import MODEL_PAPER
 from icha.deposit.verify import ZENODO, read_text
 
 _FOLDER = Path(__file__).parent

@@ -10,7 +10,7 @@ from outside_validators import sealed, validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import RELATIONS, RESOURCES, RelatedIdentifier
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import DEFAULT_MODEL, MODEL_PAPER, MODELS
 from icha.deposit.metadata import (
     citation_cff,
     datacite_metadata,
@@ -21,7 +21,6 @@ from icha.deposit.metadata import (
     web_address,
     zenodo_metadata,
 )
-from icha.models import asperities
 
 NEWER = LEAST.model_copy(update={"license": "CC-BY-3.0-IGO"})  # than the licences of the Citation File Format
 RELATED = [
@@ -70,7 +69,7 @@ def test_statements_are_the_same_everywhere(publication):
     # The paper of the model is cited as the program and every run cite it.
     paper = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))["preferred-citation"]
     assert cff["references"] == [paper]
-    assert zenodo["references"] == [asperities.MODEL.references.split("; ")[0]] == [MODEL_PAPER.line]
+    assert zenodo["references"] == [MODELS[DEFAULT_MODEL].references.split("; ")[0]] == [MODEL_PAPER.line]
     assert web_address(datacite["relatedIdentifiers"][-1]["relatedIdentifier"]) == paper["url"]
     # Nothing is said of what is not given.
     for content in (cff, zenodo, datacite):
