@@ -21,7 +21,7 @@ from icha.surfaces.measured.settings import (
     regular_ticks,
     with_y_first,
 )
-from icha.surfaces.measured.text_tables import SourceFile, without_scales
+from icha.surfaces.measured.text_tables import AMBIGUOUS_COMMA, WIDTH, SourceFile, without_scales
 
 # A surface has at least so many columns of heights.
 _FEWEST_COLUMNS = 8
@@ -29,15 +29,37 @@ _FEWEST_COLUMNS = 8
 
 def read_matrix(file: SourceFile, how: Preparation) -> Found:
     """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
-    values, lines = file.values, file.layout.heading
-    if lines and (known := _as_instrument_file(file, how)):
-        return known
+    values, layout = file.values, file.layout
+    file.refuse_blocks()
     heights, steps, remark = without_scales(values)
+    _check_counts(layout.heading, (values.shape, heights.shape))
+    if layout.heading and (known := _as_instrument_file(file, how)):
+        return known
     rows, columns = heights.shape
-    heading = read_heading(lines, heights.shape)
+    heading = read_heading(layout.heading, heights.shape, layout.decimal_comma)
+    if heading.ambiguous and how.size is None:
+        raise UnfitTopography(
+            "size",
+            f"is {heading.ambiguous!r} in the file, where the comma may be decimal or separate thousands; allowed: "
+            "give it here",
+        )
     coordinates = heading.coordinates or (steps and (columns * steps[0], rows * steps[1]))
     heights = with_y_first(_without_missing(heights, heading), how)
-    return Found(heights, heading.height_unit, heading.size, coordinates, remark=remark)
+    known = bool(layout.images)
+    return Found(heights, heading.height_unit, heading.size, coordinates, "", remark, layout.data, known)
+
+
+def _check_counts(lines, shapes):
+    """Refuse a table which has other numbers of rows and columns than its heading says."""
+    said = _said(lines)
+    for axis, (names, what) in enumerate(((_ROWS, "rows"), (_COLUMNS, "columns"))):
+        counts = [int(said[name]) for name in names if said.get(name, "").isdecimal()]
+        if counts and counts[0] not in [shape[axis] for shape in shapes]:
+            raise UnfitTopography(
+                "path",
+                f"has {shapes[-1][axis]} {what} of numbers and {counts[0]} by its heading, as if cut off or damaged; "
+                "allowed: a whole table. Export it again, or correct the heading",
+            )
 
 
 def _as_instrument_file(file, how):
@@ -45,6 +67,8 @@ def _as_instrument_file(file, how):
     try:
         found = read_instrument(file, how)
     except Exception:  # whatever it raises at texts of other kinds
+        return None
+    if file.layout.images:
         return None
     if found.unit is None or found.heights.shape != file.values.shape or np.isnan(file.values).any():
         return None
@@ -55,8 +79,10 @@ def _as_instrument_file(file, how):
 
 def read_xyz(file: SourceFile, how: Preparation) -> Found:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
-    points = _columns_of_points(file.values, how)
-    heading = read_heading(file.layout.heading, points.shape)
+    layout = file.layout
+    titles = _titles(layout, how)
+    points = _columns_of_points(file.values, how, titles)
+    heading = read_heading(layout.heading, points.shape, layout.decimal_comma)
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
     (column, nx, dx), (row, ny, dy) = (_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
@@ -68,18 +94,52 @@ def read_xyz(file: SourceFile, how: Preparation) -> Found:
     require_room(2 * 8 * nx * ny)
     heights = np.full(nx * ny, np.nan)
     heights[place] = _without_missing(points[:, 2], heading)
-    sides, lateral = (nx * dx, ny * dy), heading.lateral_unit
-    size = (sides[0] * lateral, sides[1] * lateral) if lateral and how.lateral_unit is None else None
-    return Found(heights.reshape(ny, nx), heading.height_unit, size, coordinates=sides)
+    sides, units = (nx * dx, ny * dy), [titles[axis].unit if axis in titles else None for axis in "xyz"]
+    lateral = [unit or heading.lateral_unit for unit in units[:2]]
+    size = tuple(np.multiply(sides, lateral)) if all(lateral) and how.lateral_unit is None else None
+    named = titles and sorted(titles, key=lambda axis: titles[axis].column) != ["x", "y", "z"]
+    remark = f"columns {', '.join(f'{axis} {titles[axis].column}' for axis in 'xyz')} by their names" if named else ""
+    known = _said(layout.heading).get("channel") == how.data
+    unit = units[2] or heading.height_unit
+    return Found(heights.reshape(ny, nx), unit, size, sides, remark=remark, data_known=known)
 
 
-def _columns_of_points(values, how):
+@dataclass(frozen=True)
+class _Title:
+    """What the line above a column says: number of the column, from 1, and metres of its unit, None if it has none."""
+
+    column: int
+    unit: float | None
+
+
+_TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE)
+_NAMES_OF_Z = ("z", "h", "height")
+
+
+def _titles(layout, how):
+    """The titles of the columns x, y and z, by these names; none if there are not just these three."""
+    if not layout.heading:
+        return {}
+    fields = re.split(r"[,;\t]" if layout.delimiter else r"\s+(?![\[(])", layout.heading[-1].strip(' \t\r\n#%"'))
+    found = [_TITLE.fullmatch(field.strip(" \"'")) for field in fields]
+    names = [match[1].lower() if match else "" for match in found]
+    names = ["z" if name in _NAMES_OF_Z else name for name in names]
+    if len(names) != layout.columns or any(names.count(axis) != 1 for axis in "xyz"):
+        return {}
+    titles = {
+        axis: _Title(names.index(axis) + 1, metres_of(found[names.index(axis)][2] or "")) for axis in "xyz"
+    }
+    meant = how.columns is None or list(how.columns) == [titles[axis].column for axis in "xyz"]
+    return titles if meant else {}
+
+
+def _columns_of_points(values, how, titles):
     """The columns x, y and z (k, 3) of a table."""
     count = values.shape[1]
-    columns = how.columns or (1, 2, 3)
+    columns = how.columns or tuple(titles[axis].column for axis in titles) or (1, 2, 3)
     if max(columns) > count:
-        raise UnfitTopography("columns", f"is {list(columns)}, and a line has {count} numbers; allowed: 1 to {count}")
-    if how.columns is None and count != 3:
+        raise UnfitTopography("columns", f"exceeds the {count} numbers of a line; allowed: 1 to {count}")
+    if how.columns is None and not titles and count != 3:
         if not 3 < count < _FEWEST_COLUMNS:
             raise ValueError(f"{count} numbers in a line, not x y z")
         other = ", and no Fourier series, whose opposite waves have conjugate amplitudes" if count == 4 else ""
@@ -104,7 +164,9 @@ def _ticks(values, axis):
 
 def _without_missing(heights, heading):
     """Heights with nan in the place of the numbers that, by the heading, stand for missing ones."""
-    return np.where(np.isin(heights, heading.missing), np.nan, heights) if heading.missing else heights
+    for number in heading.missing:
+        heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)
+    return heights
 
 
 def format_of_text(file: SourceFile) -> str | None:
@@ -114,7 +176,7 @@ def format_of_text(file: SourceFile) -> str | None:
         return None
     if any(map(WIDTH.match, layout.heading)):
         return "matrix"
-    if layout.columns == 4 and looks_like_fourier(file.values):
+    if layout.columns == 4 and not _titles(layout, Preparation("auto", "")) and looks_like_fourier(file.values):
         return "fourier"
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS else "matrix"
 
@@ -136,9 +198,6 @@ def looks_like_fourier(values: np.ndarray) -> bool:
     return max(differences, default=0.0) <= 1e-4 * np.max(np.abs(modes), initial=1e-300)
 
 
-# How Gwyddion begins the line with the width of an image that it exports, in the languages of its menus. The line with
-# its height follows.
-WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
 _VALUE = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 _LENGTH = re.compile(rf"{_VALUE}\s*(\S+)?$")
 _TWO_LENGTHS = re.compile(rf"{_VALUE}\s*(\S+)?\s*[x×*]\s*{_VALUE}\s*(\S+)?$")
@@ -148,6 +207,12 @@ _LINE = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s
 _SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
 _PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
 _UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
+_ROWS = ("nrows", "rows", "lines", "number of rows", "number of lines")
+_COLUMNS = ("ncols", "cols", "columns", "samples", "number of columns")
+# ESRI's grids have this one if their headings give no other.
+_ESRI_MISSING = "-9999"
+# Numbers that are written with seven digits, or were of single precision, agree to this part.
+_FEW_DIGITS = 1e-6
 _MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
 
 
@@ -159,6 +224,7 @@ class Heading:
     size : (x, y) of the scan, m, None if it does not say.
     coordinates : (x, y) of the scan in a unit that the heading does not say, None if it does not say it either.
     missing : numbers that stand for a missing height.
+    ambiguous : a size with a comma that may be decimal or not, empty if there is none.
     """
 
     height_unit: float | None = None
@@ -166,19 +232,32 @@ class Heading:
     size: tuple[float, float] | None = None
     coordinates: tuple[float, float] | None = None
     missing: tuple[float, ...] = ()
+    ambiguous: str = ""
 
 
-def read_heading(lines: Sequence[str], shape: tuple[int, int]) -> Heading:
-    """Read the heading of a table of a shape (rows, columns)."""
+def _said(lines):
+    """Values of the lines of a heading, by their names in small letters."""
     said = {}
     for line in lines:
         if found := _LINE.match(line):
             said.setdefault(re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(), found[2].strip())
+    return said
+
+
+def read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool = False) -> Heading:
+    """Read the heading of a table of a shape (rows, columns), whose numbers have decimal commas or not."""
+    said = _said(lines)
+    if {"ncols", "nrows", "cellsize"} <= said.keys():
+        said.setdefault(_MISSING[0], _ESRI_MISSING)
     units = [metres_of(said[name]) for name in _UNITS if name in said]
     missing = [_value(found[1]) for name in _MISSING if name in said and (found := _LENGTH.match(said[name]))]
     size, coordinates = _sizes(lines, said, shape)
     lateral = metres_of(said["lateral units"]) if "lateral units" in said else None
-    return Heading(next((unit for unit in units if unit), None), lateral, size, coordinates, tuple(missing))
+    lengths = [said[name] for name in (*_SIZES, *_PIXELS) if name in said]
+    lengths += [text for line in lines if (found := WIDTH.match(line)) for text in found.groups()]
+    unclear = [text for text in lengths if not decimal_comma and AMBIGUOUS_COMMA.match(text)]
+    unit = next((unit for unit in units if unit), None)
+    return Heading(unit, lateral, size, coordinates, tuple(missing), unclear[0] if unclear else "")
 
 
 def _sizes(lines, said, shape):
@@ -255,7 +334,7 @@ def read_fourier(file: SourceFile, how: Preparation) -> Found:
         raise ValueError("opposite wave vectors have amplitudes that are not conjugate: the heights would be complex")
     spectrum[alone[np.ix_(opposite, opposite)]] = conjugate[alone[np.ix_(opposite, opposite)]]
     heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
-    return Found(heights, coordinates=(period, period))
+    return Found(heights, coordinates=(period, period), data_known=False)
 
 
 def _require_few(highest):
