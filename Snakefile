@@ -5,7 +5,8 @@ import os
 import sys
 
 # Files that lie here or in the working directory go after all else of their names, unless PYTHONPATH asks for them.
-HERE = {os.path.realpath(workflow.basedir), os.path.realpath("")}
+ROOT = str(workflow.current_basedir)
+HERE = {os.path.realpath(ROOT), os.path.realpath("")}
 ASKED = os.environ.get("PYTHONPATH", "").split(os.pathsep)
 sys.path.sort(key=lambda folder: os.path.realpath(folder) in HERE and folder not in filter(None, ASKED))
 
@@ -27,33 +28,22 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/publish.smk"
 
 
-before_jobs.end_jobs_with_this_process()
-before_jobs.import_nothing_from_here()
-before_jobs.quote_python()
+before_jobs.prepare_process()
 
 if workflow.is_main_process:
     before_jobs.end_with_caller()
-    origin = before_jobs.Origin(RESULTS, CAMPAIGN.name, CONFIGURATION.origin, workflow.basedir)
-    here = before_jobs.Campaign(RESULTS, dry_run=workflow.output_settings.dryrun)
-    if Path(RESULTS).is_dir() and not workflow.output_settings.dryrun:
-        origin.claim()  # those of an older version, of which nothing may be left to do
+    here = before_jobs.Campaign(
+        RESULTS, CAMPAIGN.name, CONFIGURATION.origin, ROOT, dry_run=workflow.output_settings.dryrun
+    )
     here.have_stale_made_again([FILES.configuration, *COPIED, *FILES.computed, FILES.run_times], workflow.rules)
 else:
     before_jobs.refuse_superseded()
 
 
 onstart:
-    before_jobs.collect_again()
-    before_jobs.start_without_limit(workflow)
-    here.refuse_second()
-    here.refuse_unreadable()
-    here.refuse_unwritable()
-    if DeploymentMethod.CONDA not in workflow.deployment_settings.deployment_method:
-        here.refuse_without(missing_software(CAMPAIGN))
-    here.own()
-    here.remove_left_over()
-    origin.claim()
-    origin.note_versions()
+    before_jobs.start_jobs_freely(workflow)
+    installs = DeploymentMethod.CONDA in workflow.deployment_settings.deployment_method
+    here.begin(None if installs else missing_software(CAMPAIGN))
 
 
 # Of jobs that were killed while this call went on: the next one may have nothing to do.

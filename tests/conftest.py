@@ -1,15 +1,22 @@
 """The smoke campaign, run once for real, for all tests that look at the workflow."""
 
+import contextlib
 import fcntl
+import multiprocessing
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
+import time
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from snakemake.cli import main
+
+import icha
 
 REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
@@ -60,12 +67,39 @@ def snakemake_command(*arguments, configuration=SMOKE):
 
 
 def snakemake(project, *arguments, configuration=SMOKE):
-    """Call Snakemake in a copy of the project; return the finished process with all that it said as `stdout`."""
+    """Call Snakemake in a copy of the project; return the finished process with all that it said as `stdout`.
+
+    It is called in a fork of this process, which has imported it: a dry run takes a fifth of a new process.
+    """
     command, environment = snakemake_command(*arguments, configuration=configuration)
     environment["PYTHONPATH"] = modules_of(project)
-    return subprocess.run(
-        command, cwd=project, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as said:
+        call = multiprocessing.get_context("fork").Process(target=_call, args=(project, command[2:], environment, said))
+        call.start()
+        call.join()
+        said.seek(0)
+        return subprocess.CompletedProcess(command, call.exitcode, said.read())
+
+
+def _call(project, arguments, environment, said):
+    """Be Snakemake, with the modules of a copy of the project."""
+    for descriptor in (1, 2):
+        os.dup2(said.fileno(), descriptor)
+    sys.stdout, sys.stderr = (open(descriptor, "w", buffering=1, encoding="utf-8") for descriptor in (1, 2))
+    os.chdir(project)
+    os.environ.clear()
+    os.environ.update(environment)
+    sys.argv = arguments
+    sys.path[:0] = modules_of(project).split(os.pathsep)
+    icha.__file__ = icha.__spec__.origin = str(project / "icha/__init__.py")
+    icha.__path__[:] = icha.__spec__.submodule_search_locations[:] = [str(project / "icha")]
+    for file in (REPOSITORY / "workflow").glob("*.py"):
+        sys.modules.pop(file.stem, None)
+    try:
+        main(arguments[1:])
+    finally:
+        if "fingerprint" in sys.modules:
+            sys.modules["fingerprint"].keep()  # no handlers of `atexit` run in a fork
 
 
 def smoke_at_finite_ranges():
@@ -117,6 +151,34 @@ def smoke(tmp_path_factory):
             run = snakemake(project, "all", "references", "publish")
             assert run.returncode == 0, run.stdout
     return project
+
+
+def wait_for(what, seconds=120):
+    """Wait until something is true; files that are not there yet are no error."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        with contextlib.suppress(FileNotFoundError):
+            if what():
+                return
+        time.sleep(0.02)
+    raise AssertionError("in vain")
+
+
+def is_alive(process):
+    """Whether a process runs: one that has ended and that nobody asked for its status does not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.fixture
+def before_jobs(monkeypatch):
+    """The module of the workflow."""
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    import before_jobs
+
+    return before_jobs
 
 
 @pytest.fixture

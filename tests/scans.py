@@ -1,9 +1,12 @@
 """A small scan, neither square nor symmetric in any way, and what reads and prepares it."""
 
+from contextlib import contextmanager
+
 import numpy as np
+import pytest
 
 from icha.surfaces.measured.scan import load_scan
-from icha.surfaces.measured.settings import Preparation
+from icha.surfaces.measured.settings import Preparation, UnfitTopography
 
 NM, UM = 1e-9, 1e-6
 # 10 rows along y, 16 columns along x: neither square nor symmetric in any way.
@@ -18,6 +21,14 @@ def preparation(**keys):
 
 def scan(path, **keys):
     return load_scan(path, Preparation(**preparation(**keys)))
+
+
+@contextmanager
+def refused(key, words=""):
+    """Within, a file is refused because of a setting, with a message that has these words (a pattern)."""
+    with pytest.raises(UnfitTopography, match=words) as raised:
+        yield
+    assert raised.value.key == key
 
 
 def assert_read(read, unit=NM):

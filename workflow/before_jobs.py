@@ -2,6 +2,7 @@
 
 import atexit
 import contextlib
+import fcntl
 import gc
 import json
 import multiprocessing
@@ -11,7 +12,6 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from campaign_lock import hold_lock
 from snakemake.logging import logger
 from snakemake_records import METADATA, file_of, mark_incomplete, record_of
 
@@ -22,19 +22,14 @@ from icha.support.atomic_files import Superseded, is_left_over, take_over, while
 from icha.support.program import beginning_of, end_with_parent
 
 
-def end_jobs_with_this_process() -> None:
-    """Tell jobs which process wants them, for they end with it: see workflow/scripts/job.py."""
+def prepare_process() -> None:
+    """Set what jobs inherit from this process."""
     if sys.platform == "linux":
+        # Jobs end with the process that wants them: see workflow/scripts/job.py.
         os.environ["ICHA_SNAKEMAKE"] = f"{os.getpid()} {beginning_of(os.getpid())}"
-
-
-def import_nothing_from_here() -> None:
-    """Have no Python that is started from here take a file of the working directory for the module of its name."""
+    # No Python that is started from here takes a file of the working directory for the module of its name.
     os.environ["PYTHONSAFEPATH"] = "1"
-
-
-def quote_python() -> None:
-    """Have Snakemake call Python by its path as a shell reads it, for it puts that into commands as it stands."""
+    # Snakemake puts the path of Python into commands of a shell as it stands.
     multiprocessing.set_executable(sys.executable)
     sys.executable = shlex.quote(sys.executable)
 
@@ -64,73 +59,61 @@ def plan_without_collecting() -> None:
     atexit.register(gc.freeze)
 
 
-def collect_again() -> None:
-    """Collect garbage from now on, but do not look for it in the plan, which stays."""
+def start_jobs_freely(workflow) -> None:
+    """Collect garbage from now on, but not in the plan; do without Snakemake's limit of jobs started a second.
+
+    For the sake of that limit every local job that ends wakes the scheduler once a second from then on: of a thousand
+    short jobs that takes most of a core. There is no option to leave it out.
+    """
     gc.collect()
     gc.freeze()
     gc.enable()
-
-
-def start_without_limit(workflow) -> None:
-    """Do without Snakemake's limit of jobs started a second, where jobs run on this machine.
-
-    For the limit's sake every job that ends wakes the scheduler once a second from then on: of a thousand short jobs
-    that takes most of a core. There is no option to leave it out.
-    """
     if workflow.local_exec:
         workflow.scheduler.job_rate_limiter = None
-
-
-class Origin:
-    """The configuration file of a campaign, to which its results are to belong."""
-
-    def __init__(self, results: str, name: str, file: str, workflow: str):
-        """Refuse results that belong to another file, before anything of them is touched."""
-        self.results, self.file, self.workflow = Path(results), Path(file).resolve(), Path(workflow)
-        if reason := belongs_to_another(self.results, name, self.file, self.workflow):
-            raise SystemExit(f"{reason} Nothing was computed.")
-
-    def claim(self) -> None:
-        """Record that the results belong to it, where that can be written."""
-        with contextlib.suppress(OSError):
-            claim(self.results, self.file, self.workflow)
-
-    def note_versions(self) -> None:
-        """Record with which versions of packages results are made from now on."""
-        with contextlib.suppress(OSError):
-            note_versions(self.results)
 
 
 class Campaign:
     """A campaign in this working directory that is about to be run: its results looked at, its lock held.
 
     The Snakefile is read before all else, also for calls that only report or clean up. Those are not kept from it by
-    the lock: what has jobs to start is (`refuse_second`).
+    the lock: what has jobs to start is (`begin`).
     """
 
-    def __init__(self, results: str, *, dry_run: bool):
-        """Look at the folder `results`; a dry run changes nothing."""
+    def __init__(self, results: str, name: str, file: str, workflow: str, *, dry_run: bool):
+        """Look at the folder `results`; refuse those of another configuration file before. A dry run changes nothing.
+
+        Parameters
+        ----------
+        results : the folder, from the working directory.
+        name : of the campaign.
+        file : its configuration file.
+        workflow : the folder of the workflow.
+        """
         self.results, self.dry_run = results, dry_run
+        self._origin = Path(file).resolve(), Path(workflow)
+        if reason := belongs_to_another(Path(results), name, *self._origin):
+            raise SystemExit(f"{reason} Nothing was computed.")
         self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
         not_whole = checksums.damaged(results)
         unknown = dict(_of_unknown_origin(results))
-        if self._other and (not_whole or unknown):
-            self.refuse_second()
+        if not_whole or unknown:
+            self._refuse_second()
         for path in not_whole:
-            self._set_aside(path, "damaged", dry_run)
+            self._set_aside(path, "damaged")
         for path, record in unknown.items():
             if path not in not_whole and os.path.exists(f"{results}/{path}"):
-                self._set_aside(path, "Snakemake's record of it is damaged", dry_run)
+                self._set_aside(path, "Snakemake's record of it is damaged")
             if not dry_run:
                 record.unlink()  # Snakemake breaks off at some of them
         if dry_run:
             return
+        if os.path.isdir(results):
+            self._claim()  # results of an older version, of which nothing may be left to do
         if not METADATA.is_dir() or not os.access(".snakemake", os.W_OK):
-            self.refuse_unwritable()  # nothing was computed yet, or Snakemake could not keep its records
+            self._refuse_unwritable()  # nothing was computed yet, or Snakemake could not keep its records
         elif os.path.isdir(results) and not os.access(results, os.W_OK):
             # Of what is missing there Snakemake says only that it is protected.
-            text = f"{results} cannot be written to: what is not there cannot be computed"
-            logger.warning(text, extra={"remark": text})
+            _remark(f"{results} cannot be written to: what is not there cannot be computed")
 
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
         """Have results made again that are not those of what is asked for, where Snakemake does not see it.
@@ -152,17 +135,13 @@ class Campaign:
         unseen = [(path, why) for path, why in found if why != checksums.OTHER_SETTINGS or not self._is_seen(path)]
         if not unseen:
             return
-        if self._other:
-            self.refuse_second()
+        self._refuse_second()
         for path, _ in [] if self.dry_run else unseen:
-            try:
+            with _writing(".snakemake"):
                 mark_incomplete(f"{self.results}/{path}")
-            except OSError as error:
-                raise SystemExit(_unwritable(".snakemake", error.strerror)) from None
         first, why = unseen[0]
         others = f" and {len(unseen) - 1} more results" if len(unseen) > 1 else ""
-        text = f"to be made again: {self.results}/{first} ({why}){others}"
-        logger.warning(text, extra={"remark": text})
+        _remark(f"to be made again: {self.results}/{first} ({why}){others}")
 
     def _is_seen(self, path):
         """Whether Snakemake's record of a result belongs to what is there, so that it sees for itself what differs."""
@@ -172,74 +151,65 @@ class Campaign:
         except (OSError, ValueError, KeyError, TypeError):
             return False
 
-    def _set_aside(self, path: str, why: str, dry_run: bool) -> None:
+    def _set_aside(self, path: str, why: str) -> None:
         """Rename a result that cannot be trusted, so that it is made again, and say so."""
         file = f"{self.results}/{path}"
         aside = ""
-        if not dry_run:
-            try:
+        if not self.dry_run:
+            with _writing(f"{file} is not what was written, by its checksum, and cannot be set aside: its folder"):
                 aside = f" (what was there is {checksums.set_aside(self.results, path).name} now)"
-            except OSError as error:
-                raise SystemExit(
-                    f"{file} is not what was written, by its checksum, and cannot be set aside: {error.strerror}. "
-                    f"Make {os.path.dirname(file)} writable, or copy the results elsewhere."
-                ) from None
-        text = f"{why}, to be made again: {file}{aside}"
-        logger.warning(text, extra={"remark": text})
+        _remark(f"{why}, to be made again: {file}{aside}")
 
-    def own(self) -> None:
+    def begin(self, missing: str | None = None) -> None:
         """Own the results from now on, with jobs to start: what an earlier call has left running changes none of them.
 
-        A call that only reports takes nothing from jobs that run. So what one of those has done since the results were
-        looked at is looked for once more.
+        Ends the program with a message if another one runs the campaign, if results could not be written or read, or if
+        software is `missing`. A call that only reports takes nothing from jobs that run. So what one of those has done
+        since the results were looked at is looked for once more.
         """
-        try:
+        self._refuse_second()
+        if "\\" in os.path.abspath(self.results):
+            raise SystemExit(
+                f"{os.path.abspath(self.results)} has a backslash, which the library of netCDF takes for a slash: no "
+                f"result could be read. Nothing was computed. Rename the folder, or {_ELSEWHERE}."
+            )
+        self._refuse_unwritable()
+        if missing:
+            raise SystemExit(f"{missing} Nothing was computed.")
+        with _writing(".snakemake"):
             take_over(f".snakemake/{Path(self.results).name}.owner")
-        except OSError as error:
-            raise SystemExit(_unwritable(".snakemake", error.strerror)) from None
         if changed := checksums.damaged(self.results):
             raise SystemExit(
                 f"{self.results}/{changed[0]} has changed since the results were looked at, maybe by a job of an "
                 f"earlier call. Nothing was computed; give the same command again."
             )
+        self.remove_left_over()
+        self._claim()
+        with contextlib.suppress(OSError):
+            note_versions(Path(self.results))
 
-    def refuse_second(self) -> None:
-        """End the program with a message if another one runs the campaign."""
+    def _claim(self) -> None:
+        """Record that the results belong to the configuration file, where that can be written."""
+        with contextlib.suppress(OSError):
+            claim(Path(self.results), *self._origin)
+
+    def _refuse_second(self) -> None:
         if self._other:
             raise SystemExit(
                 f"Process {self._other} is running this campaign in this directory; wait for it to end, or end it "
                 f"first."
             )
 
-    @staticmethod
-    def refuse_without(missing: str | None) -> None:
-        """End the program with a message if software is missing that the campaign needs."""
-        if missing:
-            raise SystemExit(f"{missing} Nothing was computed.")
-
-    def refuse_unreadable(self) -> None:
-        """End the program with a message if results could be written and not read again."""
-        place = os.path.abspath(self.results)
-        if "\\" in place:
-            raise SystemExit(
-                f"{place} has a backslash, which the library of netCDF takes for a slash: no result could be read. "
-                f"Nothing was computed. Rename the folder, or work in another one: `icha run --directory FOLDER`, "
-                f"`snakemake --directory FOLDER`."
-            )
-
-    def refuse_unwritable(self) -> None:
-        """End the program with a message if jobs could not write their results."""
+    def _refuse_unwritable(self) -> None:
         for folder in (self.results, ".snakemake"):
-            try:
+            with _writing(folder):
                 Path(folder).mkdir(parents=True, exist_ok=True)
-                reason = why_not_writable(Path(folder))
-            except OSError as error:
-                reason = error
-            if reason is not None:
-                raise SystemExit(_unwritable(folder, reason.strerror))
+                if reason := why_not_writable(Path(folder)):
+                    raise reason
         for folder, _, _ in os.walk(self.results):
-            if not os.access(folder, os.W_OK | os.X_OK):
-                raise SystemExit(_unwritable(folder, "Permission denied"))
+            with _writing(folder):
+                if not os.access(folder, os.W_OK | os.X_OK):
+                    raise PermissionError(0, "Permission denied")
 
     def remove_left_over(self) -> None:
         """Remove what killed programs have left among the results, which are this call's own by now."""
@@ -262,11 +232,24 @@ def _asked_now(rules, path):
     return checksums.asked_of(map(repr, values))
 
 
-def _unwritable(folder, reason):
-    return (
-        f"{folder} cannot be written to: {reason}. Nothing was computed. Make room there or make it writable, or work "
-        f"in another folder: `icha run --directory FOLDER`, `snakemake --directory FOLDER`."
-    )
+_ELSEWHERE = "work in another one: `icha run --directory FOLDER`, `snakemake --directory FOLDER`"
+
+
+@contextlib.contextmanager
+def _writing(folder):
+    """End the program with a message if the folder cannot be written to."""
+    try:
+        yield
+    except OSError as error:
+        raise SystemExit(
+            f"{folder} cannot be written to: {error.strerror}. Nothing was computed. Make room there or make it "
+            f"writable, or {_ELSEWHERE}."
+        ) from None
+
+
+def _remark(text: str) -> None:
+    """Warn; `icha run` shows it, too."""
+    logger.warning(text, extra={"remark": text})
 
 
 def _of_unknown_origin(results: str) -> Iterator[tuple[str, Path]]:
@@ -286,3 +269,34 @@ def _is_record(file: Path) -> bool:
         return isinstance(json.loads(file.read_bytes()), dict)
     except ValueError:
         return False
+
+
+# Open as long as this process lives: the lock ends with it, however it ends.
+locks = []
+
+
+def hold_lock(path: str) -> str | None:
+    """Hold the lock `path` until this process ends; return the process that holds it if that is another one.
+
+    Snakemake's own lock is a file, which stays behind when the program is killed; every later call then asks for an
+    `--unlock` that nobody dares to give.
+    """
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        # Opened so that starting jobs do not inherit it: what they leave behind must not keep the lock.
+        file = open(path, "a+", encoding="ascii")
+    except OSError:
+        return None  # where nothing can be written nothing will be computed
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.seek(0)
+        return file.read().strip() or "?"
+    except OSError:
+        return None  # a file system without locks: nothing to hold
+    locks.append(file)
+    with contextlib.suppress(OSError):  # a full disk
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n")
+        file.flush()
+    return None

@@ -11,8 +11,8 @@ from icha.support.in_words import printable, printable_lines
 DEFAULT = "config/config.yaml"
 
 
-def campaign_configuration(workflow) -> Configuration:
-    """Read the file of `--configfile`, or else the default one, with the values of `--config` in place.
+def campaign_configuration(workflow, root: str) -> Configuration:
+    """Read the file of `--configfile`, or else the default one below `root`, with the values of `--config` in place.
 
     Snakemake's own `config` is not used: it would mix the campaigns of two files, and lets keys be given twice.
     A wrong configuration ends the program with its message alone.
@@ -23,9 +23,7 @@ def campaign_configuration(workflow) -> Configuration:
         if len(files) > 1:
             names = ", ".join(map(str, files))
             raise ConfigurationError(f"--configfile: {names}; allowed: one file, for one campaign is one file")
-        configuration = load_configuration(
-            files[0] if files else _as_given(Path(workflow.basedir, DEFAULT)), dict(settings.config)
-        )
+        configuration = load_configuration(files[0] if files else _as_given(Path(root, DEFAULT)), dict(settings.config))
     except ConfigurationError as error:
         raise SystemExit(f"The configuration cannot be run:\n{printable_lines(error)}") from None
     for warning in configuration.warnings:

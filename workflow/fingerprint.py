@@ -1,19 +1,24 @@
 """Fingerprints of code: what a job computes depends on its script and on the modules that the script imports.
 
-Snakemake's own trigger looks at the time stamp of the script, and at nothing behind it. A fingerprint is taken
-from the syntax trees, so comments, docstrings, formatting, touched files and fresh clones change nothing, and an
-edit of a module changes exactly the jobs that use it.
+Snakemake's own trigger looks at the time stamp of the script, and at nothing behind it. A fingerprint is taken from the
+syntax trees, so comments, docstrings, formatting, touched files and fresh clones change nothing, and an edit of a
+module changes exactly the jobs that use it.
 
-(`grimp` knows what imports what as well, and as fast, but only within a package: not of scripts, nor of data files. The
-trees are read for the fingerprints in any case.)
+(`grimp` also follows imports, as fast, but only within a package: not those of scripts, and no data files.)
 """
 
+import ast
+import atexit
+import contextlib
 import hashlib
 import importlib.util
+import json
+import sys
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
-from syntax import syntax_of
+from icha.support.atomic_files import whole_file
 
 PACKAGE = "icha"
 # What surrounds the work of every script, from beside it: it says how jobs begin, fail and end, and changes no number.
@@ -25,7 +30,7 @@ def code_fingerprint(script: str | Path, *modules: str) -> str:
     files = files_of(script, *modules)
     digest = hashlib.sha256("".join(files).encode())
     for file in files.values():
-        digest.update(bytes.fromhex(syntax_of(file).digest))
+        digest.update(bytes.fromhex(_syntax_of(file).digest))
         for data in _data_files(file):
             digest.update(data.name.encode() + hashlib.sha256(data.read_bytes()).digest())
     return digest.hexdigest()[:16]
@@ -34,9 +39,9 @@ def code_fingerprint(script: str | Path, *modules: str) -> str:
 def files_of(script: str | Path, *modules: str) -> dict[str, Path]:
     """Files of a script, of what it imports from the package or from beside itself, and so on, by their sorted names.
 
-    `modules` are those that the script imports by a name it is told only when it runs. Packages on the way to a
-    module are not part of it, nor is what surrounds all scripts, with what only that imports; data files are, if they
-    lie beside a module whose text names them.
+    `modules` are those that the script imports by a name that it gets when it runs. Packages on the way to a module are
+    not part of it, nor is what surrounds all scripts, with what only that imports; data files are, if they lie beside a
+    module whose text names them.
     """
     around = Path(script).with_name(AROUND)
     found: set[Path] = set()
@@ -61,16 +66,14 @@ def _name(file: Path) -> str:
 
 
 @cache
-def _imports(file: Path) -> list[Path]:
-    found = (_resolve(file, _absolute(file, level, module), name) for level, module, name in syntax_of(file).imports)
-    return sorted({each for each in found if each is not None})
-
-
-def _absolute(file: Path, level: int, module: str) -> str:
-    if not level:
-        return module
-    package = file.relative_to(_package_folder().parent).parts[:-level]
-    return ".".join([*package, *([module] if module else [])])
+def _imports(file: Path) -> set[Path]:
+    found = set()
+    for level, module, name in _syntax_of(file).imports:
+        if level:
+            package = file.relative_to(_package_folder().parent).parts[:-level]
+            module = ".".join([*package, *([module] if module else [])])
+        found.add(_resolve(file, module, name))
+    return found - {None}
 
 
 def _resolve(file: Path, module: str, name: str | None) -> Path | None:
@@ -102,7 +105,7 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
 def _data_files(file: Path) -> list[Path]:
     """Files in the module's folder that its text names by their path from there, or by that of their folder."""
     found = set()
-    for name in syntax_of(file).names:
+    for name in _syntax_of(file).names:
         place = file.parent / name
         if Path(name).is_absolute():
             continue  # a file of the system, such as one in /proc that says something else every time
@@ -111,3 +114,76 @@ def _data_files(file: Path) -> list[Path]:
         elif place.is_dir() and place.parent == file.parent and not name.startswith((".", "_")):
             found |= {data for data in place.iterdir() if data.is_file() and data.suffix not in (".py", ".pyc")}
     return sorted(found)
+
+
+class _Syntax(NamedTuple):
+    """What the text of a module says.
+
+    Attributes
+    ----------
+    digest : of its syntax tree, without what changes nothing.
+    imports : level (0 but for relative ones), module and the name that is imported from it (None in `import module`).
+    names : the texts in it that could be names of files.
+    """
+
+    digest: str
+    imports: list[tuple[int, str, str | None]]
+    names: list[str]
+
+
+# Syntax trees of all modules take a second to read. So what they say is kept beside Python's bytecode, by the checksum
+# of the module's text, for the same reader: this module and this version of Python.
+_READER = hashlib.sha256(Path(__file__).read_bytes() + sys.version.encode()).hexdigest()[:16]
+_KEPT = Path(importlib.util.cache_from_source(__file__)).with_suffix(f".{_READER}.json")
+_syntaxes: dict[str, list] = {}
+
+
+@cache
+def _syntax_of(file: Path) -> _Syntax:
+    text = file.read_bytes()
+    sha256 = hashlib.sha256(text).hexdigest()
+    if not _syntaxes:
+        with contextlib.suppress(OSError, ValueError):
+            _syntaxes.update(json.loads(_KEPT.read_text(encoding="ascii")))
+    if sha256 not in _syntaxes:
+        atexit.unregister(keep)
+        atexit.register(keep)
+        _syntaxes[sha256] = list(_read(ast.parse(text, file.name)))
+    return _Syntax(*_syntaxes[sha256])
+
+
+def keep() -> None:
+    """Keep what the modules say for the next process; where nothing can be written, that reads them again."""
+    with contextlib.suppress(OSError), whole_file(_KEPT, lasting=False) as temporary:
+        temporary.write_text(json.dumps(_syntaxes), encoding="ascii")
+
+
+def _read(tree: ast.Module) -> _Syntax:
+    imports, names = [], set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imports += [(0, alias.name, None) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            imports += [(node.level, node.module or "", alias.name) for alias in node.names]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and _could_be_a_file(node.value):
+            names.add(node.value)
+    return _Syntax(hashlib.sha256(repr(_canonical(tree)).encode()).hexdigest(), imports, sorted(names))
+
+
+def _could_be_a_file(text: str) -> bool:
+    return 0 < len(text) < 80 and all(c.isalnum() or c in "._-/" for c in text)
+
+
+def _canonical(node):
+    """A syntax tree without positions, docstrings and empty fields (which differ between versions of Python)."""
+    if isinstance(node, ast.AST):
+        fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
+        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            fields = ((name, value[1:] if name == "body" else value) for name, value in fields)
+        return type(node).__name__, *((name, _canonical(value)) for name, value in fields if name != "kind")
+    if isinstance(node, list):
+        return [_canonical(item) for item in node]
+    return repr(node)
+
+
+_DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef

@@ -21,14 +21,13 @@ from icha.support.in_words import printable
 _TARGETS = ("all", "surfaces", "runs", "references", "dataset", "figures", "report", "publish")
 # How much of the time so far must be behind us before it is trusted more than what was expected, in s.
 _PRIOR = 5.0
+# Expected of a job of which nothing is known, in core-seconds: it writes a few lines.
+DEFAULT_SECONDS = 0.1
 
 
 @dataclass(frozen=True)
 class Job:
-    """A job: its rule, what it says of itself, its outputs and log files, when it started and ended (s), its cores.
-
-    `waits` are the seconds that it waits for the imports of the first jobs.
-    """
+    """A job: its rule, what it says of itself, its outputs and log files, when it started and ended (s), its cores."""
 
     rule: str
     title: str
@@ -37,7 +36,6 @@ class Job:
     started: float
     ended: float | None = None
     threads: int = 1
-    waits: float = 0.0
 
     @property
     def seconds(self) -> float:
@@ -53,14 +51,12 @@ class Watch:
     ----------
     expected : core-seconds that the job of an output file is expected to take, by the file's path.
     clock : time in s.
-    environment : seconds that the first jobs are expected to wait for imports.
 
     Whoever reads it while another thread feeds it holds its `lock`.
     """
 
     expected: Mapping[str, float] = field(default_factory=dict)
     clock: Callable[[], float] = time.monotonic
-    environment: float = 0.0
     total: dict[str, int] = field(default_factory=dict)
     running: dict[int, Job] = field(default_factory=dict)
     done: list[Job] = field(default_factory=list)
@@ -94,7 +90,6 @@ class Watch:
                     tuple(_path(log) for log in event["log"] or ()),
                     self.clock(),
                     threads=event.get("threads") or 1,
-                    waits=0.0 if self.done or self.failed else self.environment,
                 )
                 self.running[event["jobid"]] = job
             case "job_finished" if event["job_id"] in self.running:
@@ -122,8 +117,7 @@ class Watch:
 
     def work_of(self, job: Job) -> float:
         """Core-seconds that a job is expected to take."""
-        known = max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0)
-        return (known or DEFAULT_SECONDS) + job.waits * job.threads
+        return max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0) or DEFAULT_SECONDS
 
     def seconds_left(self) -> float | None:
         """Time until everything is done, from what is expected of the jobs and how long others took; None if unknown.
@@ -141,8 +135,7 @@ class Watch:
         running = self.running.values()
         begun = sum(max(self.work_of(job) * slowness - (now - job.started) * job.threads, 0.0) for job in running)
         waiting = Counter(self.total) - Counter(job.rule for job in [*ended, *running])
-        left = (begun + self._work_waiting(waiting) * slowness) / max(self.cores, 1)
-        return left if ended or running else left + self.environment
+        return (begun + self._work_waiting(waiting) * slowness) / max(self.cores, 1)
 
     def _work_waiting(self, waiting):
         """Expected core-seconds of the jobs that have not begun: by rule, for which files they are for is not told."""
@@ -158,9 +151,6 @@ class Watch:
             work += count * (sum(seconds) / len(seconds) if seconds else DEFAULT_SECONDS)
         return work
 
-
-# Expected of a job of which nothing is known: it writes a few lines.
-DEFAULT_SECONDS = 0.1
 
 # By what their files begin with, below the folder of results; the first that fits.
 _RULES = {

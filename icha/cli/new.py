@@ -4,7 +4,6 @@ import os
 import re
 import shutil
 from pathlib import Path
-from string import Template
 from typing import Annotated
 
 import typer
@@ -12,14 +11,9 @@ import typer
 from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, say, shown, workflow_folder
 from icha.cli.scans import MeasuredSection, about_scan, check_picture, draw_scans, measured_section
 
-TEMPLATES = Path(__file__).parent / "templates"
+_TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
 # What explains the keys of a configuration to editors and to people.
 _SCHEMA, _README = Path("workflow/schemas/config.schema.json"), Path("config/README.md")
-# Whether boundary elements stand beside the model.
-_MODELS = {
-    False: "# models: [asperities, boundary_elements]",
-    True: "models: [asperities, boundary_elements]",
-}
 
 
 def new(
@@ -68,42 +62,19 @@ def new(
     if plot is not None and measured is None:
         raise Mistake("--plot: draws a measured file; allowed: only with --measured")
     own = None if measured is None else measured_section(measured, data, file.parent)
-    surface, section = ("rough", _part("self_affine")) if own is None else (own.name, own.text)
-    slopes = "[0.5]" if own is None else "measured"
-    values = dict(
-        name=name,
-        title=name.replace("_", " ").replace("-", " ").capitalize(),
-        schema=_relative(_schema(folder), file.parent),
-        readme=_README.as_posix(),
-        surface=surface,
-        surfaces=section.rstrip("\n"),
-        seeds="    seeds: 1..3                  # or a list; the figures show means and their confidence\n"
-        if own is None
-        else "",
-        slopes=slopes,
-        vary="hurst: [0.6, 0.8]" if own is None else "contact_modulus: [1 GPa, 2 GPa]",
-        # Scans are as a rule so smooth that a soft material would stick to them without load.
-        modulus="2 MPa" if own is None else "2 GPa",
-        energy="5 mJ/m^2" if own is None else "0.5 mJ/m^2",
-        pull_off=_part("pull_off", surface=surface, slopes=slopes) if pull_off else "",
-        models=_MODELS[boundary_elements],
-        figures="".join(
-            f"  {figure}\n"
-            for figure, wanted in (
-                ("fig13_loops: {study: pull}", pull_off),
-                ("fig15_loss: {studies: [pull]}", pull_off),
-                ("fig10_model_error: {study: load}", boundary_elements),
-            )
-            if wanted
-        ),
-    )
+    values = {
+        "name": name,
+        "schema": _relative(_schema(folder), file.parent),
+        "readme": _README.as_posix(),
+        "scan": own,
+        "pull_off": pull_off,
+        "boundary_elements": boundary_elements,
+    }
     file.parent.mkdir(parents=True, exist_ok=True)
-    _write(
-        file, values, "It runs as it is." if own is None else "It runs once the keys marked `to fill in` have values."
-    )
+    _write(file, values, "as it is" if own is None else "once the keys marked `to fill in` have values")
     against = [] if own is None else _against(file, own)
     if against:
-        _write(file, values, f"It runs once `icha describe {name}` says nothing against it any more.")
+        _write(file, values, f"once `icha describe {name}` says nothing against it any more")
     say(f"{shown(file)} written")
     if own is not None:
         _tell(own, against, plot)
@@ -112,7 +83,10 @@ def new(
 
 def _write(file: Path, values: dict, runs: str) -> None:
     """Write the campaign; `runs` says when it can be run."""
-    file.write_text(_part("campaign", **values, runs=runs).rstrip("\n") + "\n", encoding="utf-8")
+    from jinja2 import Template
+
+    template = Template(_TEMPLATE.read_text(encoding="utf-8"), trim_blocks=True, keep_trailing_newline=True)
+    file.write_text(template.render(values, runs=runs), encoding="utf-8")
 
 
 def _tell(section: MeasuredSection, against: list[str], plot: Path | None) -> None:
@@ -141,11 +115,6 @@ def _schema(folder: Path) -> Path:
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(workflow / file, copy)
     return copies[0]
-
-
-def _part(template: str, **values: str) -> str:
-    """A template with the values in their places."""
-    return Template((TEMPLATES / f"{template}.yaml").read_text(encoding="utf-8")).substitute(values)
 
 
 def _relative(path: Path, start: Path) -> str:

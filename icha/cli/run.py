@@ -114,7 +114,6 @@ def run(
     from rich.console import Console
 
     from icha.cli.live import LiveView, PlainView, Watch
-    from icha.planning.costs import WORKFLOW
     from icha.planning.plan import expected_seconds, plan, time_on
     from icha.planning.validity import expected_validity
 
@@ -125,7 +124,7 @@ def run(
         _ask_if_wanting(items, asked, core_count(cores), folder / "results" / campaign.name, settings)
     if not set(asked) - set(TARGETS):
         _say_what_holds(expected_validity(campaign))
-    watch = Watch(expected_seconds(items, f"results/{campaign.name}"), environment=WORKFLOW.environment)
+    watch = Watch(expected_seconds(items, f"results/{campaign.name}"))
     if plain or not console.is_terminal:
         view = PlainView(watch, campaign.name, folder, say)
     else:

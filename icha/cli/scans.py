@@ -5,7 +5,6 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from string import Template
 from typing import Any, NamedTuple
 
 from icha.cli.project import Mistake
@@ -164,7 +163,6 @@ def _short(length):
     return quantity(float(f"{length:.2g}"), "m")
 
 
-_TEMPLATE = Path(__file__).parent / "templates/measured.yaml"
 # What stands in the place of what is left to fill in while the rest is checked, in SI units and in a configuration.
 _GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
 _GUESSED = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
@@ -172,33 +170,28 @@ _EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"
 # Bytes that show whether anything is in a file.
 _BEGINNING = 2**16
 
-_BOUNDARY = """\
-    # What lies beyond the edges. One of:
-    #   free        nothing: one square on a half-space that extends beyond it, for asperities only
-    #   window      the same square again, after its heights have been made to fall to their mean towards the edges;
-    #               the rim is flat and smooth, and with adhesion it may stick as a whole
-    #   mirror      its mirror images, in a cell of twice the side, with four times the nodes
-    #   periodic    the same square again, as it is: only if opposite edges fit, as those of computed ones do
-    boundary:        # to fill in
-"""
-_PERIODIC = "    boundary: periodic           # a Fourier series is\n"
-
 
 class MeasuredSection(NamedTuple):
-    """Name and text of a section; what is to fill in, by key, and with what it can be checked; the scan.
+    """What a new campaign has of a scan.
 
-    scan : its `icha.surfaces.measured.resolution.ScanResolution`.
+    name, path : of the surface, and of its file from the configuration. lines : what the file says, and what it does
+    not. to_fill_in : why, by key. filled_in : values with which the rest can be checked. periodic : whether it is a
+    Fourier series. advice : keys that are advised, as a configuration has them. scan : its
+    `icha.surfaces.measured.resolution.ScanResolution`.
     """
 
     name: str
-    text: str
+    path: str
+    lines: list[str]
     to_fill_in: dict[str, str]
     filled_in: dict[str, str]
+    periodic: bool
+    advice: dict[str, str]
     scan: Any
 
 
 def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSection:
-    """Read the file of a measured topography, and write its section for a configuration in a folder.
+    """Read the file of a measured topography for its section in a configuration of a folder.
 
     Raises
     ------
@@ -230,21 +223,13 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     if gaps:
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
     advice = {} if missing else in_yaml(resolution.advice)
-    cutoff, grid = advice.get("cutoff", "1 um"), advice.get("grid", "128")
-    advised = {key: "advised: " if key in advice else "" for key in ("cutoff", "grid")}
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
-    text = Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
-        surface=name,
-        path=Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix(),
-        found="".join(f"    {line}\n" for line in lines),
-        boundary=_PERIODIC if boundary == "periodic" else _BOUNDARY,
-        cutoff=f"    # cutoff: {cutoff:<18} # {advised['cutoff']}shorter waves are filtered out\n",
-        grid=f"# grid: {grid:<20} # {advised['grid']}nodes along a side; fewer are quicker, but lose short waves",
-    )
     if boundary != "periodic":
         missing = missing | {"boundary": "what lies beyond the edges: free, window, mirror or periodic"}
     guessed = _GUESSED | {"size": [f"{columns} um", f"{rows} um"]}
-    return MeasuredSection(name, text, missing, {key: guessed[key] for key in missing}, resolution)
+    filled_in = {key: guessed[key] for key in missing}
+    path = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    return MeasuredSection(name, path, lines, missing, filled_in, boundary == "periodic", advice, resolution)
 
 
 def _check_file(path):

@@ -3,10 +3,7 @@
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    Field,
-)
+from pydantic import AfterValidator, Field
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
@@ -32,19 +29,19 @@ from icha.support.values import (
     unknown,
 )
 
+_Labels = list_of_names("Some of the study's.", Label)
+
 
 class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
     study: Name = Field(description="Name of the study on whose topographies they are solved.")
-    surfaces: list_of_names("Surfaces, from those of the study. Left out: all.", Label) | None = Field(
-        default=None, description="Surfaces, from those of the study. Left out: all."
-    )
+    surfaces: _Labels | None = Field(default=None, description="Surfaces, from those of the study. Left out: all.")
     seeds: Seeds | None = Field(default=None, description="Seeds, from those of the study. Left out: all.")
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
         default=None, description="Rms slopes, from those of the study. Left out: all."
     )
-    materials: list_of_names("Materials, from those of the study. Left out: all.", Label) | None = Field(
+    materials: _Labels | None = Field(
         default=None,
         description="Materials, from those of the study. Left out: all. With adhesion the grid must resolve their "
         "`interaction_range`.",

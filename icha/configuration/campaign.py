@@ -6,35 +6,19 @@ is wrong with it is worded in `icha.configuration.errors`; the JSON schema is ge
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    PrivateAttr,
-)
+from pydantic import AfterValidator, Field, PrivateAttr
 
-from icha.configuration.boundary_elements import (
-    BesideStudy,
-    BoundaryElementLoops,
-    BoundaryElements,
-)
+from icha.configuration.boundary_elements import BesideStudy, BoundaryElementLoops, BoundaryElements
 from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
 from icha.configuration.studies import MEASURED, Study
-from icha.configuration.surfaces import AnySurface, MaterialSection, SelfAffineSurface
+from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
-from icha.support.values import (
-    ROUNDING,
-    Name,
-    Problem,
-    Section,
-    Text,
-    distinct,
-)
+from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
@@ -195,20 +179,17 @@ class Campaign(Section):
 
     def solved(self, entry: BesideStudy) -> list[Contact]:
         """The contacts for which an entry beside a study asks."""
+        lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
+        asked = [None if values is None else set(values) for values in lists]
 
-        def among(wanted):
-            return (lambda value: True) if wanted is None else set(wanted).__contains__
+        def is_asked_for(contact):
+            seedless = not self.surfaces[contact.surface].random
+            return all(
+                values is None or value in values or (seedless and name == "seed")
+                for name, value, values in zip(Contact._fields, contact, asked, strict=True)
+            )
 
-        surface, seed = among(entry.surfaces), among(entry.seeds)
-        rms_slope, material = among(entry.rms_slopes), among(entry.materials)
-        return [
-            each
-            for each in self._contacts[entry.study]
-            if surface(each.surface)
-            and (seed(each.seed) or not self.surfaces[each.surface].random)
-            and rms_slope(each.rms_slope)
-            and material(each.material)
-        ]
+        return list(filter(is_asked_for, self._contacts[entry.study]))
 
     def problems(self) -> Iterator[Problem]:
         """What keeps it from being run although each of its values is allowed by itself.
@@ -241,54 +222,43 @@ class Campaign(Section):
             yield from _within(("measurements", label), entry.table_problems())
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
-        """Surfaces of a study that its models cannot press."""
+        """Surfaces of a study that boundary elements cannot press."""
         if BOUNDARY_ELEMENTS not in study.models:
             return
         at = ("models", study.models.index(BOUNDARY_ELEMENTS))
         for name in study.surfaces:
+            surface = self.surfaces[name]
             if self.is_free(name):
                 reason = f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or "
                 yield at, BOUNDARY_ELEMENTS, reason + "another `boundary`, which makes a surface periodic"
-            cells = self._cells_per_short_wave(name)
-            if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
+            if surface.cells_per_short_wave < _LEAST_CELLS * (1 - ROUNDING):
+                cells = f"{surface.cells_per_short_wave:.3g}"
                 reason = (
-                    f"need at least {_LEAST_CELLS} grid cells per shortest wavelength, and {name!r} has {cells:.3g}; "
-                    f"allowed: asperities, or a `grid` of {self._grid_of_cells(name, _LEAST_CELLS)} or more for "
-                    f"{name!r} (recommended: {self._grid_of_cells(name, _ADVISABLE_CELLS)})"
+                    f"need at least {_LEAST_CELLS} grid cells per shortest wavelength, and {name!r} has {cells}; "
+                    f"allowed: asperities, or a `grid` of {surface.grid_of_cells(_LEAST_CELLS)} or more for {name!r} "
+                    f"(recommended: {surface.grid_of_cells(_ADVISABLE_CELLS)})"
                 )
                 yield at, BOUNDARY_ELEMENTS, reason
-
-    def _cells_per_short_wave(self, surface: str) -> float | None:
-        """Grid cells per shortest wavelength of a self-affine surface; None of another."""
-        section = self.surfaces[surface]
-        return section.cells_per_short_wave if isinstance(section, SelfAffineSurface) else None
-
-    def _grid_of_cells(self, surface: str, cells: int) -> int:
-        """The least grid of a self-affine surface with so many cells per shortest wavelength."""
-        section = self.surfaces[surface]
-        return math.ceil(cells * section.period / section.short_wavelength * (1 - ROUNDING))
 
     def warnings(self) -> list[str]:
         """What is allowed but not advisable."""
         found = []
-        by_patches = {
-            name for each in self.studies.values() if BOUNDARY_ELEMENTS in each.models for name in each.surfaces
-        }
-        for name in dict.fromkeys(name for study in self.studies.values() for name in study.surfaces):
-            surface = self.surfaces[name]
-            origin = self.origin("surfaces", name)
+        studies = self.studies.values()
+        by_patches = {name for each in studies if BOUNDARY_ELEMENTS in each.models for name in each.surfaces}
+        for name in dict.fromkeys(name for study in studies for name in study.surfaces):
+            surface, origin = self.surfaces[name], self.origin("surfaces", name)
             variant = "" if origin == name else f" (variant {name})"
-            cells = self._cells_per_short_wave(name)
-            if cells is not None and cells < _LEAST_CELLS * (1 - ROUNDING):
+            cells = surface.cells_per_short_wave
+            if cells < _LEAST_CELLS * (1 - ROUNDING):
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
                     f"{variant}; recommended: {_ADVISABLE_CELLS}, at least {_LEAST_CELLS}"
                 )
-            elif cells is not None and cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_patches:
+            elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_patches:
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
                     f"wavelength{variant}, with which areas are off by a few per cent; recommended: "
-                    f"{self._grid_of_cells(name, _ADVISABLE_CELLS)} or more"
+                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)} or more"
                 )
         return found
 

@@ -91,38 +91,31 @@ def _lists(label: str, study: Study) -> dict[str, list[_Placed]]:
 def _points(label: str, study: Study) -> Iterator[dict[str, _Placed]]:
     """Everything that is named for one run, run by run."""
     lists = _lists(label, study)
-    groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
-    if study.cases is None:
-        yield from _product(lists, groups, {})
-        return
-    for index, case in enumerate(study.cases):
-        given = case.model_dump(exclude_none=True)
+    for index, given in enumerate(_cases(study)):
         fixed = {name: (("studies", label, "cases", index, name), value) for name, value in given.items()}
-        yield from _product(lists, groups, fixed)
+        axes = [
+            [dict(zip(group, values, strict=True)) for values in zip(*(lists[name] for name in group), strict=True)]
+            for group in _axes(study, lists, fixed)
+        ]
+        for parts in itertools.product(*axes):
+            yield fixed | {name: placed for part in parts for name, placed in part.items()}
 
 
-def _product(lists, groups, fixed) -> Iterator[dict[str, _Placed]]:
-    axes = [
-        [dict(zip(group, values, strict=True)) for values in zip(*(lists[n] for n in group), strict=True)]
-        for group in _axes(lists, groups, fixed)
-    ]
-    for parts in itertools.product(*axes):
-        point = dict(fixed)
-        for part in parts:
-            point |= part
-        yield point
+def _cases(study: Study) -> list[dict[str, Any]]:
+    """Values that each case of a study fixes; one that fixes none where the study has no cases."""
+    return [{}] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
 
 
-def _axes(lists, groups, fixed) -> Iterator[list[str]]:
+def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
     """Names of the lists that are multiplied with each other, those that go along together in one group."""
+    groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
     done = set(fixed)
     for name in lists:
-        if name in done:
-            continue
-        group = next((group for group in groups if name in group), [name])
-        group = [each for each in group if each not in fixed]
-        done |= set(group)
-        yield group
+        if name not in done:
+            group = next((group for group in groups if name in group), [name])
+            group = [each for each in group if each not in fixed]
+            done |= set(group)
+            yield group
 
 
 def _too_many(campaign: Campaign) -> Iterator[Problem]:
@@ -152,66 +145,62 @@ def _excess(section: str, counts: Mapping[str, int], what: str, most: int) -> It
     large = {label: count for label, count in counts.items() if count > most}
     for label, count in large.items():
         yield (section, label), NOTHING, f"asks for {count} {what}; allowed: {most} at most"
-    total = sum(counts.values())
-    if total > most and not large:
-        yield (section,), NOTHING, f"ask for {total} {what} together; allowed: {most} at most"
+    if not large and sum(counts.values()) > most:
+        yield (section,), NOTHING, f"ask for {sum(counts.values())} {what} together; allowed: {most} at most"
 
 
 def _run_count(label: str, study: Study) -> int:
     """Number of runs of a study by all its models; those that turn out to be the same are counted each."""
     lists = _lists(label, study)
-    groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
-
-    def count(fixed):
-        return math.prod(len(lists[group[0]]) for group in _axes(lists, groups, fixed))
-
-    cases = [()] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
-    return len(study.models) * sum(map(count, cases))
+    counts = (math.prod(len(lists[group[0]]) for group in _axes(study, lists, given)) for given in _cases(study))
+    return len(study.models) * sum(counts)
 
 
 def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Problem]:
     at = ("studies", label)
-    lists = _lists(label, study)
-    cases = study.cases or []
+    lists, cases = _lists(label, study), study.cases or []
+
+    def values(one):
+        """Places and values of a list, and of what cases have in the place of its entries."""
+        placed = (((*at, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
+        return [*lists[one], *((place, value) for place, value in placed if value is not None)]
+
     for many, one in _LISTS.items():
         if not lists[one] and (not cases or any(getattr(case, one) is None for case in cases)):
-            meaning = Study.model_fields[many].description
-            yield (*at, many), NOTHING, f"the key is missing; needed: {meaning}"
+            yield (*at, many), NOTHING, f"the key is missing; needed: {Study.model_fields[many].description}"
     for one, names in (("surface", campaign.surfaces), ("material", campaign.materials)):
-        placed = [*lists[one], *((((*at, "cases", i, one), getattr(c, one))) for i, c in enumerate(cases))]
-        for location, name in placed:
-            if name is not None and name not in names:
-                yield location, name, f"is not defined; allowed: {listed(names)}"
+        for place, name in values(one):
+            if name not in names:
+                yield place, name, f"is not defined; allowed: {listed(names)}"
     yield from _zip_problems(at, study, lists)
-    slopes = [*lists["rms_slope"], *(((*at, "cases", i, "rms_slope"), c.rms_slope) for i, c in enumerate(cases))]
-    for location, slope in slopes:
-        if slope == MEASURED:
-            index = location[3] if location[2] == "cases" else None
-            named = [cases[index].surface] if index is not None and cases[index].surface else study.surfaces
-            for name in named:
-                if name in campaign.surfaces and campaign.surfaces[name].random:
-                    reason = f"surface {name!r} is made at random and has no slope of its own; allowed: numbers"
-                    yield location, slope, reason
+    for place, slope in values("rms_slope"):
+        if slope != MEASURED:
+            continue
+        own = cases[place[3]].surface if place[2] == "cases" else None
+        for name in [own] if own else study.surfaces:
+            if name in campaign.surfaces and campaign.surfaces[name].random:
+                reason = f"surface {name!r} is made at random and has no slope of its own; allowed: numbers"
+                yield place, slope, reason
 
 
 def _zip_problems(at, study, lists) -> Iterator[Problem]:
     seen = set()
-    names = {_LISTS.get(name, name): name for name in [*_LISTS, *lists]} | {one: many for many, one in _LISTS.items()}
+    plural = {one: many for many, one in _LISTS.items()}
+    allowed = ", ".join(plural.get(each, each) for each in lists)
     for index, group in enumerate(study.zip):
         lengths = {}
         for position, name in enumerate(group):
-            one = _LISTS.get(name, name)
-            allowed = ", ".join(names[each] for each in lists)
-            if name in _LISTS.values() or one not in lists:
-                yield (*at, "zip", index, position), name, f"is no list of this study; allowed: {allowed}"
+            place, one = (*at, "zip", index, position), _LISTS.get(name, name)
+            if name in plural or one not in lists:
+                yield place, name, f"is no list of this study; allowed: {allowed}"
                 continue
             if one in seen:
-                yield (*at, "zip", index, position), name, "is in two groups; allowed: every list in one group only"
+                yield place, name, "is in two groups; allowed: every list in one group only"
             seen.add(one)
             lengths[name] = len(lists[one])
         if len(set(lengths.values())) > 1:
-            listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-            yield (*at, "zip", index), group, f"{listed} entries; allowed: lists of the same length"
+            said = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+            yield (*at, "zip", index), group, f"{said} entries; allowed: lists of the same length"
 
 
 class _Variants:
@@ -235,11 +224,8 @@ class _Variants:
         for name, (location, value) in varied.items():
             if name not in of_surface and name not in of_material:
                 kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
-                self.problems[location[:4]] = (
-                    location[:4],
-                    value,
-                    f"surface {surface!r} is of another kind; allowed: surfaces of kind {kinds}, or separate studies",
-                )
+                reason = f"surface {surface!r} is of another kind; allowed: kind {kinds}, or separate studies"
+                self.problems[location[:4]] = (location[:4], value, reason)
         seed = point["seed"][1] if self._campaign.surfaces[surface].random else 0
         return Contact(
             self._variant("surfaces", surface, of_surface),
@@ -257,37 +243,34 @@ class _Variants:
         return self._names[key]
 
     def _made(self, section: str, base: str, changes: Mapping[str, _Placed]) -> str:
-        model = type(getattr(self._campaign, section)[base])
+        entries = getattr(self._campaign, section)
         values = {name: value for name, (_, value) in changes.items()}
         try:
-            made = model.model_validate(dict(self._content[section][base]) | values)
+            made = type(entries[base]).model_validate(dict(self._content[section][base]) | values)
         except ValidationError as error:
             for details in error.errors():
-                self._add_problem(section, base, changes, details)
+                self._add_problem(base, changes, details)
             return base
-        if section == "surfaces" and not made.random and hasattr(made, "path"):
-            made = made.model_copy(update={"path": getattr(self._campaign, section)[base].path})
+        if hasattr(made, "path"):
+            made = made.model_copy(update={"path": entries[base].path})
         name = "-".join([base, *(f"{key}{value_label(made, key)}" for key in changes)])
-        if name in getattr(self._campaign, section):
-            location, value = next(iter(changes.values()))
+        location, value = next(iter(changes.values()))
+        if name in entries:
             reason = f"gives {base!r} a variant named {name!r}, but this name is taken; allowed: rename that entry"
             self.problems[(section, name)] = (location, value, reason)
         if len(name) > LONGEST_LABEL:
-            location, value = next(iter(changes.values()))
             reason = f"gives {base!r} a variant with a name of {len(name)} letters, which files cannot have"
             self.problems[(section, name)] = (location, value, f"{reason}; allowed: {LONGEST_LABEL} at most")
         self.derived[section][name] = made
         self.origin[section, name] = base
         return name
 
-    def _add_problem(self, section, base, changes, details):
+    def _add_problem(self, base, changes, details):
         key = str(details["loc"][0]) if details["loc"] else ""
         context = details.get("ctx", {})
         reason = str(context.get("error") or f"{details['msg']}; allowed: {context.get('expected', 'see its key')}")
-        if key in changes:
-            location, value = changes[key]
-        else:  # a parameter of the surface that does not go with the one that is varied
-            location, value = next(iter(changes.values()))
+        location, value = changes.get(key) or next(iter(changes.values()))
+        if key not in changes:  # a parameter of the surface that does not go with the one that is varied
             reason = f"{key} of {base!r}: {details['input']!r} {reason}"
         self.problems.setdefault(location, (location, value, reason))
 
@@ -316,29 +299,26 @@ def _with_variants_for_their_origin(campaign: Campaign, origin: Mapping[tuple[st
 
     def variants(section, study, name):
         there = getattr(campaign.studies[study], section) if study in campaign.studies else []
-        return [each for each in there if origin.get((section, each)) == name] if name not in there else []
+        found = [each for each in there if origin.get((section, each)) == name] if name not in there else []
+        return found or [name]
 
     def entry_with_variants(entry):
-        update = {}
-        for section in ("surfaces", "materials"):
-            names = getattr(entry, section)
-            if names is not None:
-                update[section] = [each for name in names for each in variants(section, entry.study, name) or [name]]
+        named = {section: getattr(entry, section) for section in ("surfaces", "materials")}
+        update = {
+            section: [each for name in names for each in variants(section, entry.study, name)]
+            for section, names in named.items()
+            if names is not None
+        }
         return entry.model_copy(update=update)
 
     def figure_with_variant(figure):
-        update = {}
-        for section, key in (("surfaces", "surface"), ("materials", "material")):
-            name = getattr(figure, key, None)
-            if name is not None:
-                update[key] = next(iter(variants(section, figure.study, name)), name)
+        named = {key: getattr(figure, key, None) for key in ("surface", "material")}
+        update = {key: variants(f"{key}s", figure.study, name)[0] for key, name in named.items() if name is not None}
         return figure.model_copy(update=update)
 
+    update: dict[str, Any] = {
+        section: {label: entry_with_variants(entry) for label, entry in getattr(campaign, section).items()}
+        for section in BESIDE_STUDIES
+    }
     figures = {name: figure_with_variant(figure) for name, figure in campaign.figures.drawn().items()}
-    return campaign.model_copy(
-        update={
-            section: {label: entry_with_variants(entry) for label, entry in getattr(campaign, section).items()}
-            for section in BESIDE_STUDIES
-        }
-        | {"figures": campaign.figures.model_copy(update=figures)}
-    )
+    return campaign.model_copy(update=update | {"figures": campaign.figures.model_copy(update=figures)})

@@ -24,6 +24,18 @@ _FORMER_KEYS = {
     ("Campaign", "one_asperity"): "is no longer a section; allowed: `python -m validation.one_asperity` in a clone",
     ("Figures", "fig12_error_sources"): "is no longer a figure of campaigns; allowed: `make error-sources` in a clone",
 }
+# By the kind of pydantic's error.
+_REASONS = dict.fromkeys(("too_short", "string_too_short"), "is empty; allowed: at least one entry")
+_REASONS |= dict.fromkeys(("too_long", "string_too_long"), "is too long; allowed: at most {max_length} {what}")
+_REASONS |= dict.fromkeys(
+    ("model_type", "model_attributes_type"), "is not a section; allowed: a mapping of keys to values"
+)
+_REASONS |= {
+    "literal_error": "is not a choice; allowed: {expected}",
+    "list_type": "is not a list; allowed: a list, such as [a, b]",
+    "dict_type": "is not a mapping; allowed: names with their sections",
+    "string_type": "is not text; allowed: text (in quotes if it looks like a number)",
+}
 
 
 class ConfigurationError(ValueError):
@@ -33,12 +45,8 @@ class ConfigurationError(ValueError):
 def line(origin: str, location: tuple, value: Any, reason: str) -> str:
     """A problem as a line for the author of the file, or for whoever has got it from a stranger."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{_cut(str(part), 80)}" for part in location).lstrip(".")
-    shown = "" if value is NOTHING else " (empty)" if value is None else f" {_short(value)}"
+    shown = "" if value is NOTHING else " (empty)" if value is None else f" {_cut(repr(value), 80)}"
     return printable(f"{origin}: {key or 'top level'}:{shown} {_cut(reason, 2000)}")
-
-
-def _short(value: Any) -> str:
-    return _cut(repr(value), 80)
 
 
 def _cut(text: str, most: int) -> str:
@@ -48,49 +56,34 @@ def _cut(text: str, most: int) -> str:
 def problem_of(details: Mapping, content: Mapping) -> Problem:
     """One error of pydantic as (location, value, reason and what is allowed), in this project's words."""
     location = _without_tags(details["loc"])
-    value, kind, context = details["input"], details["type"], details.get("ctx", {})
+    value, kind, context = details["input"], details["type"], dict(details.get("ctx", {}))
     if location[-1:] == ("[key]",):
         location = location[:-1]
     if kind == "value_error":
         reason = str(context["error"])
         # A model's own error concerns all its keys; the reason names them.
         return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, reason
-    if kind == "extra_forbidden":
-        section = _section_at(location[:-1], content)
-        if section and (former := _FORMER_KEYS.get((section.__name__, location[-1]))):
-            return location, NOTHING, former
-        allowed = sorted(section.model_fields) if section else []
-        near = difflib.get_close_matches(str(location[-1]), allowed, 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
-        return location, NOTHING, f"unknown key{hint}; allowed: {', '.join(allowed)}"
-    if kind == "missing":
-        section = _section_at(location[:-1], content)
-        field = section.model_fields.get(location[-1]) if section else None
-        return location, NOTHING, f"the key is missing; needed: {field.description if field else 'a value'}"
+    if kind in ("extra_forbidden", "missing"):
+        return location, NOTHING, _of_key(kind, location, _section_at(location[:-1], content))
     if kind in ("union_tag_not_found", "union_tag_invalid"):
         given = value.get("kind", NOTHING) if isinstance(value, Mapping) else value
         return (*location, "kind"), given, f"is no kind of surface; allowed: {', '.join(SURFACE_KINDS)}"
     if kind == "string_pattern_mismatch" and context.get("pattern") == NAME_PATTERN:
-        return (
-            location,
-            value,
-            "is not a name; allowed: lower-case letters, digits, '_' and, but not first, '-'",
-        )
-    if kind in ("too_short", "string_too_short"):
-        return location, value, "is empty; allowed: at least one entry"
-    if kind in ("too_long", "string_too_long"):
-        what = "characters" if isinstance(value, str) else "entries"
-        return location, value, f"is too long; allowed: at most {context['max_length']} {what}"
-    if kind == "literal_error":
-        return location, value, f"is not a choice; allowed: {context['expected']}"
-    wrong_type = {
-        "list_type": "is not a list; allowed: a list, such as [a, b]",
-        "dict_type": "is not a mapping; allowed: names with their sections",
-        "model_type": "is not a section; allowed: a mapping of keys to values",
-        "model_attributes_type": "is not a section; allowed: a mapping of keys to values",
-        "string_type": "is not text; allowed: text (in quotes if it looks like a number)",
-    }
-    return location, value, wrong_type.get(kind, f"{details['msg'].lower()}")
+        return location, value, "is not a name; allowed: lower-case letters, digits, '_' and, but not first, '-'"
+    context |= {"what": "characters" if isinstance(value, str) else "entries"}
+    return location, value, _REASONS[kind].format(**context) if kind in _REASONS else details["msg"].lower()
+
+
+def _of_key(kind: str, location: tuple, section: type[BaseModel] | None) -> str:
+    """What is wrong with a key that is unknown or missing in a section."""
+    name, fields = location[-1], section.model_fields if section else {}
+    if kind == "missing":
+        return f"the key is missing; needed: {fields[name].description if name in fields else 'a value'}"
+    if section and (section.__name__, name) in _FORMER_KEYS:
+        return _FORMER_KEYS[section.__name__, name]
+    allowed = sorted(fields)
+    near = difflib.get_close_matches(str(name), allowed, 1)
+    return f"unknown key{f' (did you mean {near[0]!r}?)' if near else ''}; allowed: {', '.join(allowed)}"
 
 
 def _without_tags(location: tuple) -> tuple:

@@ -49,22 +49,13 @@ _WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
 _SLOPE = Usual("1", "1e-4", "5", "from superpolished mirrors, 1e-3, to fracture surfaces, about 1")
 # Why a measured slope may be unusual.
 _OF_SLOPE = "as units, size, or a number for missing points make it"
+_OF_ENERGY = "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2"
+_OF_RANGE = "chemical bonds reach less than 1 nm, van der Waals forces some nm, what grids resolve some 100 nm"
 # By key. Wide on purpose: what is asked for by reason lies in it, a wrong prefix of a unit as a rule does not.
 USUAL = {
     "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond against something rigid, 1150 GPa"),
-    "surface_energy": Usual(
-        "J/m^2",
-        "0.001 mJ/m^2",
-        "3 J/m^2",
-        "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2",
-        True,
-    ),
-    "interaction_range": Usual(
-        "m",
-        "0.05 nm",
-        "1 um",
-        "chemical bonds reach less than 1 nm, van der Waals forces some nm, what grids resolve some 100 nm",
-    ),
+    "surface_energy": Usual("J/m^2", "0.001 mJ/m^2", "3 J/m^2", _OF_ENERGY, or_zero=True),
+    "interaction_range": Usual("m", "0.05 nm", "1 um", _OF_RANGE),
     "period": _SIDE,
     "size": _SIDE,
     "rolloff_wavelength": _WAVE,
@@ -164,8 +155,7 @@ def full_contact_energy(campaign: Campaign, surface: str) -> float:
     """U_full/E* of a surface at rms slope 1, m."""
     section = campaign.surfaces[surface]
     if isinstance(section, SelfAffineSurface):
-        lengths = section.period, section.rolloff_wavelength, section.short_wavelength
-        return self_affine_full_contact_energy(*lengths, section.hurst)
+        return self_affine_full_contact_energy(*section.lengths_and_hurst)
     return campaign.topography(surface).full_contact_energy
 
 

@@ -1,5 +1,6 @@
 """Section `studies`: surfaces, materials, and the path along which one is pressed against the other."""
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal, get_args, get_origin
 
@@ -254,10 +255,6 @@ class Study(Section):
             return self.targets.states
         return [snapshot.target for snapshot in self.snapshots]
 
-    def check_path(self, snapshots: list[tuple[str, float]] | None) -> None:
-        """Raise ValueError naming the argument of `icha.Path` that is not allowed."""
-        Path(**self.path_settings(snapshots))
-
     def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
         """Arguments of the path of the runs (`icha.Path`) but for those that are left at their defaults."""
         settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
@@ -273,32 +270,23 @@ class Study(Section):
 
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
         """What keeps it from being run with these snapshots (`Campaign.snapshots_of`)."""
-        yield from self._load_problems()
-        yield from self._path_problems(snapshots)
-
-    def _load_problems(self):
-        """Loads that a slope, the smallest for one, makes too large for the model."""
-        slopes = [slope for slope in self.rms_slopes if slope != MEASURED]
-        if not slopes:
-            return
-        slope = min(slopes)
+        # The smallest slope makes the largest reduced pressure.
+        slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
+        most = MAX_REDUCED_PRESSURE * slope
         kept = [] if self.snapshots == EVERY_STOP else self.snapshots
         for key, states in (("snapshots", kept), ("turning_points", self.turning_points)):
             for index, state in enumerate(states or []):
-                if (state.relative_load or 0) / slope > MAX_REDUCED_PRESSURE:
-                    yield (
-                        (key, index, "relative_load"),
-                        state.relative_load,
-                        f"at rms slope {slope:g} is a reduced pressure of {state.relative_load / slope:g}; "
-                        f"allowed: relative loads up to {MAX_REDUCED_PRESSURE * slope:g}",
-                    )
+                load = state.relative_load or 0
+                if load > most:
+                    reason = f"at rms slope {slope:g} is a reduced pressure of {load / slope:g}"
+                    yield (key, index, "relative_load"), load, f"{reason}; allowed: relative loads up to {most:g}"
+        if self.unload or self.turning_points or self.control != "separation":
+            yield from self._path_problems(snapshots)
 
     def _path_problems(self, snapshots):
         """What keeps the way back from being a path."""
-        if not (self.unload or self.turning_points or self.control != "separation"):
-            return
         try:
-            self.check_path(snapshots)
+            Path(**self.path_settings(snapshots))
         except ValueError as error:
             key, _, reason = str(error).partition(": ")
             name, _, index = key.partition("[")

@@ -42,10 +42,9 @@ def _unit_of_length(value: Any) -> float:
     allowed = "allowed: a unit of length, such as 'um', or a multiple of one, such as '0.1 mm'"
     if not isinstance(value, str):
         raise ValueError(f"is not a unit; {allowed}")
+    is_multiple = value.strip()[:1] in tuple("+-.0123456789")
     try:
-        metres = (
-            to_si(value, "m") if value.strip()[:1] in tuple("+-.0123456789") else float(conversion_factor(value, "m"))
-        )
+        metres = to_si(value, "m") if is_multiple else float(conversion_factor(value, "m"))
     except ValueError as error:
         raise ValueError(f"{error}; {allowed}") from None
     if not LENGTH.holds(metres):
@@ -62,19 +61,16 @@ Position = quantity(Real("m", least=0), "20 um")
 def _sides(value: Any) -> tuple[float, float]:
     """The sides of a scan along x and y, m: one length, or a list of two."""
     sides = value if isinstance(value, list | tuple) else [value, value]
+    allowed = "allowed: one length, such as '90 um', or a list of two: along x and y"
     if len(sides) != 2:
-        raise ValueError(f"has {len(sides)} entries; allowed: one length, such as '90 um', or two: along x and y")
-    metres = []
-    for side in sides:
-        try:
-            metres.append(to_si(side, "m"))
-        except ValueError as error:
-            raise ValueError(
-                f"{error}; allowed: one length, such as '90 um', or a list of two: along x and y"
-            ) from None
-        if not LENGTH.holds(metres[-1]):
-            raise ValueError(f"is not in {LENGTH.interval} m; allowed: one length, such as '90 um', or two")
-    return tuple(metres)
+        raise ValueError(f"has {len(sides)} entries; {allowed}")
+    try:
+        metres = tuple(to_si(side, "m") for side in sides)
+    except ValueError as error:
+        raise ValueError(f"{error}; {allowed}") from None
+    if not all(map(LENGTH.holds, metres)):
+        raise ValueError(f"is not in {LENGTH.interval} m; {allowed}")
+    return metres
 
 
 _LENGTH_SCHEMA = {"type": "string", "pattern": PATTERN, "examples": ["90 um"]}
@@ -104,6 +100,8 @@ class MeasuredSurface(Section):
     """A measured topography, prepared as the keys say. The mean height is always removed."""
 
     random: ClassVar[bool] = False
+    # Nothing is known of the waves of a file.
+    cells_per_short_wave: ClassVar[float] = math.inf
 
     kind: Literal["measured"] = Field(description="Topography from a measurement.")
     path: File = Field(description="File of the topography. Relative to the configuration file.")
@@ -238,35 +236,32 @@ class SelfAffineSurface(Section):
     )
 
     @property
+    def lengths_and_hurst(self) -> tuple[float, float, float, float]:
+        """Period, roll-off and shortest wavelength (m), and the Hurst exponent."""
+        return self.period, self.rolloff_wavelength, self.short_wavelength, self.hurst
+
+    @property
     def cells_per_short_wave(self) -> float:
         """Grid cells per shortest wavelength."""
         return self.grid * self.short_wavelength / self.period
 
-    @field_validator("rolloff_wavelength")
-    @classmethod
-    def _q0_not_below_ql(cls, value, info):
-        period = info.data.get("period")
-        if period is not None and value > period * (1 + ROUNDING):
-            raise ValueError(f"is longer than the period (q0 < qL); allowed: at most {period:g} m")
-        return value
+    def grid_of_cells(self, cells: int) -> int:
+        """The least grid with so many cells per shortest wavelength."""
+        return math.ceil(cells * self.period / self.short_wavelength * (1 - ROUNDING))
 
-    @field_validator("short_wavelength")
+    @field_validator("rolloff_wavelength", "short_wavelength", "grid")
     @classmethod
-    def _q1_above_q0(cls, value, info):
-        rolloff = info.data.get("rolloff_wavelength")
-        if rolloff is not None and value >= rolloff * (1 - ROUNDING):
-            raise ValueError(
-                f"is not shorter than the roll-off wavelength (q1 <= q0); allowed: less than {rolloff:g} m"
-            )
-        return value
-
-    @field_validator("grid")
-    @classmethod
-    def _grid_holds_the_spectrum(cls, value, info):
-        period, short = info.data.get("period"), info.data.get("short_wavelength")
-        if period is None or short is None:
-            return value
-        if value * short / period < 2 * (1 - ROUNDING):
+    def _waves_fit_into_one_another(cls, value, info):
+        """Order of the wave vectors qL <= q0 < q1, and a grid that holds them."""
+        period, rolloff, short = map(info.data.get, ("period", "rolloff_wavelength", "short_wavelength"))
+        if info.field_name == "rolloff_wavelength":
+            if period is not None and value > period * (1 + ROUNDING):
+                raise ValueError(f"is longer than the period (q0 < qL); allowed: at most {period:g} m")
+        elif info.field_name == "short_wavelength":
+            if rolloff is not None and value >= rolloff * (1 - ROUNDING):
+                reason = "is not shorter than the roll-off wavelength (q1 <= q0)"
+                raise ValueError(f"{reason}; allowed: less than {rolloff:g} m")
+        elif None not in (period, short) and value * short / period < 2 * (1 - ROUNDING):
             least = math.ceil(2 * period / short * (1 - ROUNDING))
             raise ValueError(
                 f"gives {value * short / period:.3g} grid cells per shortest wavelength, but at least 2 are needed; "
@@ -279,30 +274,23 @@ class FileSurface(Section):
     """A periodic height map from a file, for example a surface that others have published."""
 
     random: ClassVar[bool] = False
+    # Nothing is known of the waves of a file.
+    cells_per_short_wave: ClassVar[float] = math.inf
 
     kind: Literal["file"] = Field(description="Surface read from a file.")
     path: File = Field(
         description="File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a "
         "variable `height`. Relative to the configuration file. Heights point towards the elastic body."
     )
-    height_unit: Annotated[str, Field(strict=True)] = Field(
+    height_unit: UnitOfLength = Field(
         description="Unit of the heights in the file, such as `um`. All studies scale the heights to their rms slopes."
     )
     period: Length = Field(description="Side L of the periodic cell.")
 
-    @field_validator("height_unit")
-    @classmethod
-    def _is_a_length(cls, value):
-        try:
-            conversion_factor(value, "m")
-        except ValueError as error:
-            raise ValueError(f"{error}; allowed: a unit of length, such as 'um'") from None
-        return value
-
     @property
     def metres_per_unit(self) -> float:
         """The unit of the heights, in m."""
-        return float(conversion_factor(self.height_unit, "m"))
+        return self.height_unit
 
 
 # By the value of their key `kind`.

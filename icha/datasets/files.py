@@ -12,7 +12,6 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Container, Hashable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 import netCDF4
 import numpy as np
@@ -23,9 +22,6 @@ from icha.datasets.variables.campaign import COMPLETE
 from icha.datasets.variables.run import CELLS
 from icha.datasets.variables.terms import INFINITE
 from icha.support.atomic_files import whole_file
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
@@ -205,17 +201,13 @@ def define_text(
     along = f"string{width}"
     if along not in group.dimensions:
         group.createDimension(along, width)
-    return _define_variable(group, name, "S1", (*dims, along), {**attrs, **TEXT}, storage)
+    return define_numbers(group, name, (*dims, along), "S1", {**attrs, **TEXT}, **storage)
 
 
 def define_numbers(
-    group: netCDF4.Dataset, name: str, dims: tuple[str, ...], dtype: np.dtype, attrs: Mapping, **storage
+    group: netCDF4.Dataset, name: str, dims: tuple[str, ...], dtype: np.dtype | str, attrs: Mapping, **storage
 ) -> netCDF4.Variable:
     """Make a variable of numbers; `storage` as `netCDF4.Dataset.createVariable` takes it."""
-    return _define_variable(group, name, dtype, dims, attrs, storage)
-
-
-def _define_variable(group, name, dtype, dims, attrs, storage):
     variable = group.createVariable(name, dtype, dims, **storage)
     variable.setncatts(dict(attrs))
     # Values are written, and read, as they are.

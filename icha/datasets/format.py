@@ -7,6 +7,8 @@ every one has its units and its long name, too.
 import os
 import re
 from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -14,9 +16,6 @@ import xarray as xr
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.files import has_groups, is_refused, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
-from icha.datasets.variables import run as variables_of_run
-from icha.datasets.variables.surface import SURFACE as SURFACE_TABLE
-from icha.datasets.variables.terms import Variable
 from icha.support.input_files import bounded_memory, flaw_of_path, most_memory, refuse_traps, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
@@ -38,67 +37,43 @@ class UnknownFile(ValueError):
     """A file that is none of those that are documented, or no readable netCDF file at all."""
 
 
-# Conditions under which a variable must be there.
-ALWAYS, SNAPSHOTS, WAY_BACK = "", "snapshots", "a way back to separation"
-PATCHES, MAPS = "boundary elements", "snapshots of boundary elements"
-SYNTHESISED, MEASURED = "a spectrum", "a measurement"
+class Promise(NamedTuple):
+    """A variable that is promised: its name, dimensions and unit, and the condition under which a file has it."""
 
-# The names that are promised, by the condition under which a file has them.
-RUN_NAMES = {
-    ALWAYS: (
-        *("mean_separation", "nominal_pressure", "contact_area_fraction", "spot_count", "contact_stiffness"),
-        *("residual", "converged", "branch", "leg", "reduced_pressure", "reduced_separation", "jump_in_count"),
-        *("jump_off_count", "coalescence_count", "split_count", "step_kind", "step_target"),
-        *("contact_modulus", "surface_energy", "interaction_range", "rms_slope", "rms_height", "period", "seed"),
-    ),
-    SNAPSHOTS: (
-        *("snapshot_step", "snapshot_kind", "snapshot_target", "overlap_fraction"),
-        *("gap_density", "pressure_density", "pressure_bin_mean"),
-        *("gap_bin_edges", "gap_bin_centre", "gap_bin_bounds"),
-        *("pressure_bin_edges", "pressure_bin_centre", "pressure_bin_bounds"),
-        *("spot_snapshot", "spot_x", "spot_y", "spot_radius", "spot_area", "spot_perimeter", "spot_force"),
-    ),
-    PATCHES: ("front_residual", "gap_residual"),
-    MAPS: ("contact_map", "contact_pressure"),
-    WAY_BACK: (
-        *("work", "stored_energy", "dissipated_by_jump_in", "dissipated_by_jump_off", "dissipated_by_coalescence"),
-        *("dissipated_by_load_jump", "pull_off_pressure", "pull_off_separation", "detachment_pressure"),
-        *("hysteresis_loss", "loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump"),
-        *("loss_unattributed", "event_kind", "event_step", "event_x", "event_y", "event_members"),
-    ),
-}
-SURFACE_NAMES = {
-    ALWAYS: (
-        *("height", "x", "y", "period", "grid", "seed", "rms_slope", "rms_height", "rms_curvature"),
-        *("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"),
-    ),
-    SYNTHESISED: ("rolloff_wavelength", "short_wavelength", "hurst"),
-    MEASURED: ("measured_rms_slope", "psd_wavevector", "psd_wavevector_bounds", "power_spectrum"),
-}
-_OF_RUN = variables_of_run.RUN | variables_of_run.PATCHES | variables_of_run.CYCLE | variables_of_run.LOOP
+    name: str
+    dims: tuple[str, ...]
+    units: str
+    condition: str
 
+
+def _promised() -> dict[str, list[Promise]]:
+    """Promised variables by the kind of file, as `promised_variables.txt` lists them."""
+    found: dict[str, list[Promise]] = {}
+    for line in Path(__file__).with_name("promised_variables.txt").read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            of_kind = found.setdefault(line.strip("[]"), [])
+        elif match := re.fullmatch(r"(\w+)\((.*?)\) ([^;]+)(?:; (.+))?", line):
+            name, dims, units, condition = match.groups()
+            of_kind.append(Promise(name, tuple(filter(None, dims.split(", "))), units, condition or ""))
+    return found
+
+
+PROMISED = _promised()
 # Dimensions of every variable of a run in a study of a campaign dataset: those of the run are added.
 DESIGN = LABELS
-_OF_STUDY = {name: Variable(DESIGN, "1", "") for name in ("status", "step_count", "failure")} | {
-    name: _OF_RUN[name]._replace(dims=(*DESIGN, "step"))
-    for name in RUN_NAMES[ALWAYS]
-    if _OF_RUN[name].dims == ("step",)
-}
+_OF_STUDY = [Promise(name, DESIGN, "1", "") for name in ("status", "step_count", "failure")] + [
+    each._replace(dims=(*DESIGN, "step")) for each in PROMISED[RUN] if each.dims == ("step",) and not each.condition
+]
 
 # Values asked for have the unit of what is asked for, where that is the same of all.
 _UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))
 
 # Global attributes. Those of a campaign are written by the workflow, not by `icha.simulate`.
+_EVERYWHERE = ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level")
 ATTRIBUTES = {
-    RUN: (
-        *("title", "summary", "keywords", "Conventions", "source", "history", "processing_level", "references"),
-        "contact_model",
-    ),
-    SURFACE: ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level"),
-    CAMPAIGN: (
-        *("title", "summary", "keywords", "Conventions", "source", "history", "processing_level", "references"),
-        *("campaign", "config_sha256", "license"),
-    ),
+    RUN: (*_EVERYWHERE, "references", "contact_model"),
+    SURFACE: _EVERYWHERE,
+    CAMPAIGN: (*_EVERYWHERE, "references", "campaign", "config_sha256", "license"),
 }
 IN_CAMPAIGN = ("campaign", "study", "config_sha256", "license")
 _REFUSED_ATTRIBUTES = ("date_created", "date_modified", "date_issued", "creator_email", "user", "host", "hostname")
@@ -171,12 +146,12 @@ def _flaws_of_run(run):
         yield f"attribute contact_model: {model!r}; allowed: {', '.join(MODELS)}"
     by_patches = model == BOUNDARY_ELEMENTS
     there = {
-        SNAPSHOTS: kept,
-        WAY_BACK: "hysteresis_loss" in run,
-        PATCHES: by_patches,
-        MAPS: by_patches and kept,
+        "snapshots": kept,
+        "a way back to separation": "hysteresis_loss" in run,
+        "boundary elements": by_patches,
+        "snapshots of boundary elements": by_patches and kept,
     }
-    missing = list(_flaws_of_variables(run, _OF_RUN, RUN_NAMES, there))
+    missing = list(_flaws_of_variables(run, PROMISED[RUN], there))
     yield from missing
     yield from _flaws_of_numbers(run)
     if missing:
@@ -219,8 +194,8 @@ def _flaws_of_steps(data, scalars):
 
 def _flaws_of_surface(surface):
     yield from _flaws_of_attributes(surface.attrs, ATTRIBUTES[SURFACE])
-    there = {SYNTHESISED: "hurst" in surface, MEASURED: "source_sha256" in surface.attrs}
-    missing = list(_flaws_of_variables(surface, SURFACE_TABLE, SURFACE_NAMES, there))
+    there = {"a spectrum": "hurst" in surface, "a measurement": "source_sha256" in surface.attrs}
+    missing = list(_flaws_of_variables(surface, PROMISED[SURFACE], there))
     yield from missing
     yield from _flaws_of_numbers(surface)
     boundary = surface.attrs.get("boundary", "periodic")
@@ -238,7 +213,7 @@ def _flaws_of_study(study):
     for dim in (*DESIGN, "step"):
         if dim not in study.dims:
             yield f"dimension {dim} is missing"
-    missing = list(_flaws_of_variables(study, _OF_STUDY, {ALWAYS: tuple(_OF_STUDY)}, {}))
+    missing = list(_flaws_of_variables(study, _OF_STUDY, {}))
     yield from missing
     if missing:
         return
@@ -249,13 +224,14 @@ def _flaws_of_study(study):
         return
     complete = study["status"] == meanings.index("complete")
     wanted = complete & (study["step"] < study["step_count"])
-    for name, description in _OF_STUDY.items():
-        if "step" in description.dims and study[name].dtype.kind == "f":
+    along = [each.name for each in _OF_STUDY if "step" in each.dims]
+    for name in along:
+        if study[name].dtype.kind == "f":
             gaps = int((wanted & ~np.isfinite(study[name])).sum())
             if gaps:
                 yield f"{name}: {gaps} values of complete runs are not finite"
     # Runs that are not complete may lack any value.
-    numbers = study[[name for name in _OF_STUDY if "step" in study[name].dims and name not in _WORDS]]
+    numbers = study[[name for name in along if name not in _WORDS]]
     numbers = numbers.reset_coords(["reduced_pressure", "reduced_separation"]).reset_coords(drop=True)
     yield from _flaws_of_steps(numbers.where(complete).assign(branch=study["branch"].variable), study)
 
@@ -277,20 +253,19 @@ def _flaws_of_attributes(attributes, needed, refused=(*_REFUSED_ATTRIBUTES, *_MA
         yield f"attribute Conventions: {conventions!r}; allowed: CF-1.11 or another of CF"
 
 
-def _flaws_of_variables(data, table, names, there) -> Iterator[str]:
-    """Of promised names by the condition under which they must be there, and of all that a file has."""
-    for condition, promised in names.items():
-        for name in promised:
-            if name not in data.variables:
-                if condition == ALWAYS or there[condition]:
-                    yield f"{name} is missing" + (f" in a file with {condition}" if condition else "")
-                continue
-            variable, (dims, units, *_) = data[name], table[name]
-            if variable.dims != dims:
-                yield f"{name}: has the dimensions ({', '.join(variable.dims)}); allowed: ({', '.join(dims)})"
-            allowed = _UNITS_OF_TARGETS.get(name, (units,))
-            if variable.attrs.get("units") not in allowed:
-                yield f"{name}: has the units {variable.attrs.get('units')!r}; allowed: {', '.join(map(repr, allowed))}"
+def _flaws_of_variables(data, promised, there) -> Iterator[str]:
+    """Of promised variables, and of all that a file has; `there` says which conditions a file meets."""
+    for name, dims, units, condition in promised:
+        if name not in data.variables:
+            if not condition or there[condition]:
+                yield f"{name} is missing" + (f" in a file with {condition}" if condition else "")
+            continue
+        variable = data[name]
+        if variable.dims != dims:
+            yield f"{name}: has the dimensions ({', '.join(variable.dims)}); allowed: ({', '.join(dims)})"
+        allowed = _UNITS_OF_TARGETS.get(name, (units,))
+        if variable.attrs.get("units") not in allowed:
+            yield f"{name}: has the units {variable.attrs.get('units')!r}; allowed: {', '.join(map(repr, allowed))}"
     for name, variable in data.variables.items():
         for attribute in ("units", "long_name"):
             if attribute not in variable.attrs:

@@ -41,7 +41,7 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
 
 
 def _differs(file: Path, sha256: str) -> bool:
-    return read_attributes(file).get("config_sha256") != sha256
+    return (read_attributes(file) or {}).get("config_sha256") != sha256
 
 
 def _lines(results: Path, wrong: Mapping[str, str]) -> Iterable[str]:

@@ -26,7 +26,7 @@ from icha.deposit.readme import readme
 from icha.deposit.source import Source
 from icha.deposit.strangers_files import flaw_of_name
 from icha.planning.costs import Cost
-from icha.support.atomic_files import moving, sync_folder, whole_file
+from icha.support.atomic_files import sync_folder, while_owned, whole_file
 from icha.support.checksums import is_whole, sha256_of
 
 _BLOCK = 2**20
@@ -86,7 +86,7 @@ def make_deposit(
         with whole_file(archive) as temporary:
             _write_zip(temporary, part, folder.name)
             sync_folder(part)
-            with moving():
+            with while_owned():
                 # What was here before goes at once, and its checksums with it.
                 archive.unlink(missing_ok=True)
                 _remove(folder)

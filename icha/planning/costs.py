@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from icha.contact.models import ASPERITIES
@@ -121,32 +121,6 @@ class Cost:
     disk: float
     recorded: Recorded | None = None
 
-    def slower(self, factor: float) -> Cost:
-        """The same on a machine that takes `factor` times as long."""
-        return replace(self, seconds=self.seconds * factor)
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """Path and material of a run, as far as its cost depends on them.
-
-    Parameters
-    ----------
-    load : largest reduced pressure p/(E* h'_rms) of the first loading.
-    stops : number of its stops.
-    snapshots : number of stops that keep their fields.
-    adhesive : whether the surface energy is not zero.
-    legs : legs after the first loading: 0, or 1 and more for unloading and loading again.
-    max_step : longest step of the mean separation, in h_rms.
-    """
-
-    load: float
-    stops: int
-    snapshots: int
-    adhesive: bool
-    legs: int = 0
-    max_step: float = DEFAULT_STEP
-
 
 def job_threads(grid: int) -> int:
     """Cores that a job of a surface takes, and is given: two where they pay, else one."""
@@ -177,30 +151,48 @@ PATCH_ARRAYS = 20
 _MAPS = 1.5
 
 
-def run_cost(model: str, grid: int, summits: float, sweep: Sweep) -> Cost:
-    """A run of `icha.simulate` on a surface of `grid` nodes a side with so many summits."""
-    most, nodes = spots(summits, sweep.load), grid**2
-    seconds = run_law(model, sweep).seconds(nodes=nodes, spots=most, stops=sweep.stops)
-    steps: float = sweep.stops
-    if sweep.legs:
+def run_cost(
+    model: str,
+    grid: int,
+    summits: float,
+    *,
+    load: float,
+    stops: int,
+    snapshots: int,
+    adhesive: bool,
+    legs: int = 0,
+    max_step: float = DEFAULT_STEP,
+) -> Cost:
+    """A run of `icha.simulate`.
+
+    Parameters
+    ----------
+    model, grid, summits : contact model; nodes a side of the surface, and number of its summits.
+    load : largest reduced pressure p/(E* h'_rms) of the first loading.
+    stops : number of its stops.
+    snapshots : number of stops that keep their fields.
+    adhesive : whether the surface energy is not zero.
+    legs : legs after the first loading: 0, or 1 and more for unloading and loading again.
+    max_step : longest step of the mean separation, in h_rms.
+    """
+    most, nodes = spots(summits, load), grid**2
+    law = LAWS[", ".join([model, *["adhesion"] * adhesive, *["cycle"] * bool(legs)])]
+    seconds = law.seconds(nodes=nodes, spots=most, stops=stops)
+    steps: float = stops
+    if legs:
         # Every spot comes and goes, and with adhesion each of its jumps is resolved.
-        further = DEFAULT_STEP / sweep.max_step
-        steps = (1 + sweep.legs) / 2 * (120 * further + (40 if sweep.adhesive else 0.75) * most)
-        seconds *= (1 + sweep.legs) / 2 * further
-    kept = sweep.snapshots + bool(sweep.legs)
-    disk = 60e3 + 57 * most * max(kept, 1) + 160 * steps + 20e3 * bool(sweep.legs)
-    memory = _memory_before(grid) + 9 * MiB * (1 + bool(sweep.legs))
+        further = DEFAULT_STEP / max_step
+        steps = (1 + legs) / 2 * (120 * further + (40 if adhesive else 0.75) * most)
+        seconds *= (1 + legs) / 2 * further
+    kept = snapshots + bool(legs)
+    disk = 60e3 + 57 * most * max(kept, 1) + 160 * steps + 20e3 * bool(legs)
+    memory = _memory_before(grid) + 9 * MiB * (1 + bool(legs))
     if model == ASPERITIES:
         memory += _DOUBLE * nodes + 9 * 1024 * summits
     else:
         memory += PATCH_ARRAYS * _DOUBLE * nodes
         disk += _MAPS * nodes * kept
     return Cost(seconds, memory, disk, Recorded(steps, kept, most * kept))
-
-
-def run_law(model: str, sweep: Sweep) -> PowerLaw:
-    """The power law of a kind of run."""
-    return LAWS[", ".join([model, *["adhesion"] * sweep.adhesive, *["cycle"] * bool(sweep.legs)])]
 
 
 def solution_cost(nodes: int, reduced_pressure: float, *, adhesive: bool) -> Cost:
@@ -215,6 +207,11 @@ def loop_cost(nodes: int, separation_step: float, *, adhesive: bool) -> Cost:
     # Without adhesion there are no jumps, at which steps are divided.
     seconds = LAWS["finite range, cycle"].seconds(nodes=nodes**2, step=separation_step) * (1 if adhesive else 0.2)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 33e3)
+
+
+def theories_cost() -> Cost:
+    """Theories and literature for a surface."""
+    return Cost(LAWS["theories"].seconds(), WORKFLOW.forked, 35e3)
 
 
 # Edges of the bins of `icha.contact.bins`, whose imports `icha describe` would wait for.

@@ -40,30 +40,36 @@ def _sections(campaign):
     return [name for name in BY_TAMAAS if getattr(campaign, name)]
 
 
-_ARRAY = 8e-6
-"""Megabytes of a number."""
-
-
 def surface_threads(campaign: Campaign, surface: str) -> int:
-    """Cores for a surface and its sweeps: one, with sweeps side by side, but where transforms of large arrays pay."""
+    """Cores for a surface and its runs: one, with runs side by side, but where transforms of large arrays pay."""
     return job_threads(campaign.grid(surface))
 
 
+def _megabytes(program: float, arrays: float, nodes: int) -> int:
+    """Memory of a job that holds some arrays of `nodes` a side besides its program, MB."""
+    return int(program + arrays * 8e-6 * nodes**2)
+
+
 def surface_memory(campaign: Campaign, surface: str) -> int:
-    """Megabytes for making a surface, or a sweep of it: some arrays of its size, and the program."""
-    return int(600 + 4 * _ARRAY * campaign.grid(surface) ** 2)
-
-
-def run_threads(campaign: Campaign, case: RunLabels) -> int:
-    """Cores for a run: those of its surface."""
-    return surface_threads(campaign, case.surface)
+    """Megabytes for making a surface, or a run of asperities on it."""
+    return _megabytes(600, 4, campaign.grid(surface))
 
 
 def run_memory(campaign: Campaign, case: RunLabels) -> int:
-    """Megabytes for a run: some arrays of the surface's size, for boundary elements some dozens, and the program."""
-    if case.model == ASPERITIES:
-        return surface_memory(campaign, case.surface)
-    return int(600 + 1.25 * PATCH_ARRAYS * _ARRAY * campaign.grid(case.surface) ** 2)
+    """Megabytes for a run."""
+    arrays = 4 if case.model == ASPERITIES else 1.25 * PATCH_ARRAYS
+    return _megabytes(600, arrays, campaign.grid(case.surface))
+
+
+def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
+    """Megabytes for boundary elements at a finite range."""
+    return _megabytes(400, 30, campaign.grid(surface) * entry.refinement)
+
+
+def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
+    """Megabytes for a figure, which may hold the largest topography, and who is in contact where by both models."""
+    largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
+    return _megabytes(1000, max(MAP_ARRAYS.values()) * holds_topography, largest)
 
 
 def run_minutes(campaign: Campaign, case: RunLabels) -> int:
@@ -73,17 +79,6 @@ def run_minutes(campaign: Campaign, case: RunLabels) -> int:
     asked = campaign.studies[case.study]
     minutes = 120 if asked.unload or asked.turning_points else 30
     return minutes if case.model == ASPERITIES else 8 * minutes
-
-
-def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
-    """Megabytes for boundary elements: some thirty arrays of their grid, and the program."""
-    return int(400 + 30 * _ARRAY * (campaign.grid(surface) * entry.refinement) ** 2)
-
-
-def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
-    """Megabytes for a figure, which may hold the largest topography, and who is in contact where by both models."""
-    largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
-    return int(1000 + max(MAP_ARRAYS.values()) * _ARRAY * largest**2 * holds_topography)
 
 
 def memory_of_machine() -> int:

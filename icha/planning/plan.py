@@ -77,7 +77,7 @@ def _items(campaign, results) -> list[Item]:
     items = list(_computed(campaign, results, files))
     made_anew = {item.path for item in items if item.to_do}
     for part, path, stage, inputs, cost in _gathered(campaign, files, items):
-        state = _there(results, path)
+        state = _state(results, path)
         if state == DONE and not made_anew.isdisjoint(inputs):
             state = TO_DO
         items.append(Item(part, path, state, cost, stage=stage))
@@ -86,56 +86,41 @@ def _items(campaign, results) -> list[Item]:
     return items
 
 
-def _there(results, path):
+def _state(results, path):
     return TO_DO if not (results / path).is_file() else DONE if is_whole(results, path) else DAMAGED
 
 
 def _computed(campaign, results, files) -> Iterator[Item]:
     """Surfaces, runs, and what is computed beside them."""
     summits, run_cost = cache(lambda surface: expected_summits(campaign, surface)), cache(costs.run_cost)
-
-    def there(part, path, cost, threads=1):
-        return Item(part, path, _there(results, path), cost, threads)
-
-    def beside(part, entries, cases, cost, asked):
-        for path, case in cases.items():
-            entry = entries[case.entry]
-            adhesive = campaign.materials[case.material].surface_energy > 0
-            nodes = campaign.grid(case.surface) * entry.refinement
-            yield there(f"{part} {case.entry}", path, cost(nodes, asked(entry, case), adhesive=adhesive))
-
     for path, (name, _) in files.surfaces.items():
         grid = campaign.grid(name)
-        yield there("surfaces", path, costs.surface_cost(grid), costs.job_threads(grid))
+        yield Item("surfaces", path, _state(results, path), costs.surface_cost(grid), costs.job_threads(grid))
     for path, case in files.runs.items():
         state, reason = run_state(results / path, run_sha256(campaign, case))
         if not is_whole(results, path):
             state, reason = DAMAGED, ""
+        grid = campaign.grid(case.surface)
         sweep = _sweep_of(run_settings(campaign, case), case.rms_slope)
-        cost = run_cost(case.model, campaign.grid(case.surface), summits(case.surface), sweep)
+        cost = run_cost(case.model, grid, summits(case.surface), **sweep)
         part = f"study {case.study}" + (", boundary elements" if case.model != ASPERITIES else "")
-        yield Item(part, path, state, cost, costs.job_threads(campaign.grid(case.surface)), reason)
+        yield Item(part, path, state, cost, costs.job_threads(grid), reason)
     for path in files.theories:
-        yield there("theories", path, costs.Cost(costs.LAWS["theories"].seconds(), WORKFLOW.forked, 35e3))
-    yield from beside(
-        "boundary elements",
-        campaign.finite_range,
-        files.solutions,
-        costs.solution_cost,
-        lambda entry, case: case.reduced_pressure,
-    )
-    yield from beside(
-        "boundary elements both ways",
-        campaign.boundary_element_loops,
-        files.loops,
-        costs.loop_cost,
-        lambda entry, case: entry.separation_step,
-    )
+        yield Item("theories", path, _state(results, path), costs.theories_cost())
+    for path, case in {**files.solutions, **files.loops}.items():
+        both_ways = path in files.loops
+        entry = (campaign.boundary_element_loops if both_ways else campaign.finite_range)[case.entry]
+        nodes = campaign.grid(case.surface) * entry.refinement
+        adhesive = campaign.materials[case.material].surface_energy > 0
+        if both_ways:
+            cost = costs.loop_cost(nodes, entry.separation_step, adhesive=adhesive)
+        else:
+            cost = costs.solution_cost(nodes, case.reduced_pressure, adhesive=adhesive)
+        part = f"boundary elements{' both ways' if both_ways else ''} {case.entry}"
+        yield Item(part, path, _state(results, path), cost)
 
 
-def _gathered(
-    campaign, files: CampaignFiles, computed: list[Item]
-) -> Iterator[tuple[str, str, int, Iterable[str], costs.Cost]]:
+def _gathered(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
     """What is made of runs: part, path, stage, inputs and cost."""
     runs, held = len(files.runs), _dataset_memory(files, computed)
     size = sum(item.cost.disk for item in computed if item.is_run)
@@ -149,9 +134,10 @@ def _gathered(
     for kind, paths, stage, inputs, count, disk in tables:
         for path in paths:
             yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, held)
+    result_files = ResultFiles(campaign.name)
     for name in campaign.figures.drawn():
-        path = ResultFiles(campaign.name).path(results_files.FIGURE, name=name, ending="png")
-        inputs = campaign.figures.inputs(name, campaign, ResultFiles(campaign.name))
+        path = result_files.path(results_files.FIGURE, name=name, ending="png")
+        inputs = campaign.figures.inputs(name, campaign, result_files).values()
         shown = set(campaign.figures.studies_of(name, campaign))
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
         cost = costs.figure_cost(
@@ -160,7 +146,8 @@ def _gathered(
             max((len(campaign.studies[study].models) for study in shown), default=1),
             held,
         )
-        yield "figures", path, 3, _flat(inputs), cost
+        flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
+        yield "figures", path, 3, flat, cost
     yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, held)
 
 
@@ -177,11 +164,7 @@ def _dataset_memory(files, computed):
     )
 
 
-def _flat(inputs):
-    return [path for each in inputs.values() for path in ([each] if isinstance(each, str) else each)]
-
-
-def _sweep_of(settings, rms_slope) -> costs.Sweep:
+def _sweep_of(settings, rms_slope) -> dict:
     """What of a run's settings its cost depends on."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
     # Reduced pressures, roughly: half of the area fractions; of separations a guess.
@@ -193,14 +176,14 @@ def _sweep_of(settings, rms_slope) -> costs.Sweep:
     }
     stops = {(kind, value) for kind in loads for value in path.get(f"{kind}s") or ()}
     stops |= {tuple(snapshot) for snapshot in snapshots or ()}
-    return costs.Sweep(
-        load=max(loads[kind](value) for kind, value in stops),
-        stops=len(stops),
-        snapshots=1 if snapshots is None else len(snapshots),
-        adhesive=settings["material"]["surface_energy"] > 0,
-        legs=len(path.get("turning_points", ())) + bool(path.get("unload")),
-        max_step=path["max_step"],
-    )
+    return {
+        "load": max(loads[kind](value) for kind, value in stops),
+        "stops": len(stops),
+        "snapshots": 1 if snapshots is None else len(snapshots),
+        "adhesive": settings["material"]["surface_energy"] > 0,
+        "legs": len(path.get("turning_points", ())) + bool(path.get("unload")),
+        "max_step": path["max_step"],
+    }
 
 
 # Attributes of a run's file that say with which settings it was computed and what it is worth.
@@ -211,31 +194,17 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
     """State of a run's file, and the reason why the run failed, if it did."""
     if not file.is_file():
         return TO_DO, ""
-    try:
-        attributes = read_attributes(file)
-    except DamagedFile:
+    attributes = read_attributes(file)
+    if attributes is None:
         return DAMAGED, ""
     if attributes.get("config_sha256") != sha256:
         return CHANGED, ""
-    if reason := why_no_result(attributes):
-        return FAILED, reason
-    return DONE, ""
+    reason = why_no_result(attributes)
+    return (FAILED, reason) if reason else (DONE, "")
 
 
-class DamagedFile(Exception):
-    """A file that is there but is no netCDF-4 file, or only a part of one."""
-
-
-def read_attributes(file: Path) -> dict[str, str]:
-    """What a file says of the settings and the end of a run, read without its variables.
-
-    Raises
-    ------
-    DamagedFile
-        If its content cannot be read.
-    OSError
-        If the system does not let it be read.
-    """
+def read_attributes(file: Path) -> dict[str, str] | None:
+    """Attributes of a run's settings and end, read without its variables; None of a file that is no whole netCDF-4."""
     import h5py
 
     try:
@@ -244,7 +213,7 @@ def read_attributes(file: Path) -> dict[str, str]:
     except OSError as error:
         if error.errno is not None:  # no permission, for one: that says nothing of the content
             raise
-        raise DamagedFile(file) from None
+        return None
 
 
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
@@ -270,25 +239,22 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
     return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)
 
 
-def _calibrated(items: Iterable[Item], results: Path) -> Iterator[Item]:
-    """The items with times and memories scaled to what the jobs of their kind that are done have taken."""
-    items = list(items)
+def _calibrated(items: list[Item], results: Path) -> Iterator[Item]:
+    """The items with times scaled to what the jobs of their kind that are done have taken."""
     kinds: dict[str, list[Item]] = {}
     for item in items:
         kinds.setdefault(_kind(item), []).append(item)
     factors = {}
     for kind, members in kinds.items():
         done = [item for item in members if item.state in (DONE, FAILED)]
-        done = done[:: max(1, len(done) // _SAMPLE)]
-        measured = [(item, _benchmark(results, item)) for item in done]
-        pairs = [(item.cost.seconds, seconds) for item, seconds in measured if seconds]
-        factors[kind] = costs.correction(pairs)
+        measured = [(item, _benchmark(results, item)) for item in done[:: max(1, len(done) // _SAMPLE)]]
+        factors[kind] = costs.correction([(item.cost.seconds, seconds) for item, seconds in measured if seconds])
     for item in items:
-        yield replace(item, cost=item.cost.slower(factors[_kind(item)]))
+        yield replace(item, cost=replace(item.cost, seconds=item.cost.seconds * factors[_kind(item)]))
 
 
 def _kind(item):
-    return item.part if item.part.startswith("study ") else item.path.rsplit("/", 1)[0].split("/")[0] + item.part
+    return item.part if item.part.startswith("study ") else item.path.split("/")[0] + item.part
 
 
 def _benchmark(results: Path, item: Item) -> float | None:
@@ -341,16 +307,12 @@ def time_on(items: Iterable[Item], cores: int) -> float:
     The work of every stage is shared out, but takes never less than its longest job; jobs are handed out one by one.
     """
     items = list(items)
-    stages: dict[int, list[Item]] = {}
-    for item in items:
-        stages.setdefault(item.stage, []).append(item)
-    return start_up(items) + sum(_stage_on(stage, cores) for stage in stages.values())
-
-
-def _stage_on(items, cores):
-    sums = total(items)
-    handing_out = WORKFLOW.job * sums.to_do
-    return max((sums.work + handing_out) / cores, sums.longest, handing_out)
+    seconds = start_up(items)
+    for stage in {item.stage for item in items}:
+        sums = total(item for item in items if item.stage == stage)
+        handing_out = WORKFLOW.job * sums.to_do
+        seconds += max((sums.work + handing_out) / cores, sums.longest, handing_out)
+    return seconds
 
 
 def start_up(items: Collection[Item]) -> float:

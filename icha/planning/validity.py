@@ -53,7 +53,7 @@ def expected_summits(campaign: Campaign, name: str) -> float:
     """Number of summits of a random surface by its spectrum; those of a surface from a file are counted."""
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
-        moments = _moments_of(section)
+        moments = self_affine_moments(*section.lengths_and_hurst)
         return section.period**2 * summit_density(moments.m2, moments.m4)
     from icha.surfaces.summits import count_summits
 
@@ -63,7 +63,11 @@ def expected_summits(campaign: Campaign, name: str) -> float:
 def rms_curvature(campaign: Campaign, name: str) -> float:
     """Rms curvature of a profile of a surface at rms slope 1, 1/m."""
     section = campaign.surfaces[name]
-    moments = _moments_of(section) if isinstance(section, SelfAffineSurface) else spectral_moments(_read(section))
+    moments = (
+        self_affine_moments(*section.lengths_and_hurst)
+        if isinstance(section, SelfAffineSurface)
+        else spectral_moments(_read(section))
+    )
     return math.sqrt(moments.m4 / (2 * moments.m2))
 
 
@@ -74,7 +78,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
-        moments, grid, unsupported = _moments_of(section), section.grid, 0
+        moments, grid, unsupported = self_affine_moments(*section.lengths_and_hurst), section.grid, 0
         skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, False
         summits = expected_summits(campaign, name)
     else:
@@ -95,10 +99,6 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         "unsupported_summits": unsupported / max(summits, 1),
         "free_edges": float(free),
     }
-
-
-def _moments_of(section: SelfAffineSurface) -> SpectralMoments:
-    return self_affine_moments(section.period, section.rolloff_wavelength, section.short_wavelength, section.hurst)
 
 
 def _read(section):

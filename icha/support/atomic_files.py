@@ -5,17 +5,19 @@ another machine or stopped at a bad moment, can complete no result any more: wha
 and no call begins in between.
 """
 
-import contextlib
 import fcntl
 import os
 import secrets
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 # As much as libraries want to write at once; a disk on which less is free is full.
 _PROBE = 2**20
 _ENDING = ".part"
+# For the programs that an owner starts, wherever they run: what the file says while the results are its own; the file.
+_TOLD = "ICHA_OWNER"
+_SUPERSEDED = "the campaign was begun again since, and the later call makes this result; nothing was written"
 
 
 @contextmanager
@@ -27,6 +29,8 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
 
     Raises
     ------
+    Superseded
+        If this process was started by an owner of results that are another's by now.
     OSError
         If the folder cannot be written to. Libraries for data files have other errors for a full disk, which say
         nothing of it: whatever the block raises, this one is raised instead where that is the case.
@@ -38,12 +42,14 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
         yield temporary
         if lasting:
             _sync(temporary)
-        with moving():
+        with while_owned():
             os.replace(temporary, path)
         if lasting:
             # Some file systems do not know how.
             with suppress(OSError):
                 _sync(path.parent)
+    except Superseded:
+        raise
     except Exception as error:
         reason = why_not_writable(path.parent)
         if reason is not None:
@@ -51,17 +57,6 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
         raise
     finally:
         _remove(temporary)
-
-
-def move_only_within(permission: Callable[[], AbstractContextManager]) -> None:
-    """From now on, move files into place only within a context of `permission`, which may raise an error instead."""
-    global _permission
-    _permission = permission
-
-
-def moving() -> AbstractContextManager:
-    """The context in which files are moved into place."""
-    return _permission()
 
 
 def is_left_over(name: str) -> bool:
@@ -101,9 +96,6 @@ def why_not_writable(folder: Path) -> OSError | None:
     return None
 
 
-_permission: Callable[[], AbstractContextManager] = nullcontext
-
-
 def _sync(path: Path) -> None:
     """Have a file's content, or the names in a folder, on the disk; on macOS that may still have it in its memory."""
     descriptor = os.open(path, os.O_RDONLY)
@@ -116,10 +108,6 @@ def _sync(path: Path) -> None:
 def _remove(file: Path) -> None:
     with suppress(OSError):  # it is not there, or was never, for the folder is read-only
         file.unlink()
-
-
-# For the programs that an owner starts, wherever they run: what the file says while the results are its own; the file.
-_TOLD = "ICHA_OWNER"
 
 
 class Superseded(ValueError):
@@ -146,7 +134,7 @@ def take_over(file: str | os.PathLike) -> None:
     os.environ[_TOLD] = f"{word} {file}"
 
 
-@contextlib.contextmanager
+@contextmanager
 def while_owned() -> Iterator[None]:
     """A context in which nobody takes the results over from the owner that has started this process, if one has.
 
@@ -170,10 +158,7 @@ def while_owned() -> Iterator[None]:
         yield
 
 
-_SUPERSEDED = "the campaign was begun again since, and the later call makes this result; nothing was written"
-
-
 def _lock(file, kind):
     """Lock a file until it is closed."""
-    with contextlib.suppress(OSError):  # a file system without locks: a moment remains
+    with suppress(OSError):  # a file system without locks: a moment remains
         fcntl.flock(file, kind)

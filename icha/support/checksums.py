@@ -110,11 +110,6 @@ def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
     return [path for path in with_sidecar(results) if not is_whole(results, path, thorough=thorough)]
 
 
-def lost(results: str | os.PathLike) -> list[str]:
-    """Paths of all results of a campaign that have a sidecar but are not there, sorted."""
-    return [path for path in with_sidecar(results) if not os.path.exists(os.path.join(results, path))]
-
-
 def stale(
     results: str | os.PathLike, paths: Iterable[str], asked: Callable[[str], str] | None = None
 ) -> Iterator[tuple[str, str]]:

@@ -9,6 +9,7 @@ import math
 import os
 import re
 import stat
+import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,9 @@ VARIABLE = "ICHA_INPUT_MB"
 _USUAL_MB = 2000
 # Arrays of the size of a file that reading it may take.
 _COPIES = 3
+# Names in an HDF5 file, and groups in one another: to go through more takes minutes.
+_MOST_NAMES, _DEEPEST = 100_000, 50
+_WHOLE = "allowed: files that hold all of their data"
 
 _KINDS = {
     stat.S_IFDIR: "is a folder",
@@ -111,19 +115,12 @@ def bounded_memory(most: int | None = None) -> Iterator[None]:
 
 
 def _taken() -> int | None:
-    """Bytes of data of this process, None where the system does not tell."""
-    try:
-        found = re.search(r"^VmData:\s*(\d+) kB$", Path("/proc/self/status").read_text(), re.MULTILINE)
-    except OSError:
+    """Bytes of data of this process, None where they cannot be bounded."""
+    if sys.platform != "linux":
         return None
-    return int(found[1]) * 1024 if found else None
+    import psutil
 
-
-# https://support.hdfgroup.org/documentation/hdf5/latest/_f_m_t3.html, section II.A.
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-# Names in a file, and groups in one another: to go through more takes minutes.
-_MOST_NAMES, _DEEPEST = 100_000, 50
-_WHOLE = "allowed: files that hold all of their data"
+    return psutil.Process().memory_info().data
 
 
 def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
@@ -146,11 +143,10 @@ def refuse_traps(path: str | os.PathLike) -> None:
     OSError
         If the file is damaged.
     """
-    if not is_hdf5(path):
-        return
-    # Not for every text.
     import h5py
 
+    if not h5py.is_hdf5(path):
+        return
     with h5py.File(path, "r") as file:
         groups, count = {h5py.h5o.get_info(file.id).addr}, 0
 
@@ -176,21 +172,6 @@ def refuse_traps(path: str | os.PathLike) -> None:
 
         if found := file.id.links.visit(trap, info=True):
             raise RefusedFile(found)
-
-
-def is_hdf5(path):
-    """Tell whether a file is HDF5.
-
-    Its signature is at the beginning, or after a block of the user's own of 512, 1024, 2048, … bytes.
-    """
-    with open(path, "rb") as file:
-        size, place = os.fstat(file.fileno()).st_size, 0
-        while place < size:
-            file.seek(place)
-            if file.read(len(_SIGNATURE)) == _SIGNATURE:
-                return True
-            place = max(512, 2 * place)
-    return False
 
 
 def _lies_elsewhere(properties):

@@ -25,14 +25,9 @@ _LONGEST = 100
 # The quantities of a configuration, by the SI unit in which the model gets them.
 PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "1": "ratio"}
 
-# What most configurations are written in, for pint takes longer to get ready than all else takes to read one. These are
-# its own factors, which tests/support/test_units.py sees to.
+# What most configurations are written in, besides lengths: pint takes longer to get ready than all else takes to read
+# one. These are its own factors, which tests/support/test_units.py sees to.
 USUAL = {
-    ("m", "m"): "1",
-    ("mm", "m"): "1e-3",
-    ("um", "m"): "1e-6",
-    ("µm", "m"): "1e-6",
-    ("nm", "m"): "1e-9",
     ("Pa", "Pa"): "1",
     ("kPa", "Pa"): "1e3",
     ("MPa", "Pa"): "1e6",

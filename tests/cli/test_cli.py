@@ -667,20 +667,6 @@ def test_time_left_follows_what_jobs_take(watch):
     assert watch.seconds_left() == pytest.approx(before - 5 / 2)
 
 
-def test_what_is_expected_counts_the_imports_of_the_first_jobs_and_the_cores_of_each():
-    clock = Clock()
-    watch = Watch({f"results/tiny/runs/{k}.nc": 10.0 for k in range(4)}, clock, environment=3.0)
-    clock.now = 2.0
-    watch.take({"event": "resources_info", "cores": 2})
-    watch.take({"event": "run_info", "stats": {"run": 4, "all": 1, "total": 5}})
-    assert watch.seconds_left() == pytest.approx(3 + 4 * 10 / 2)
-    watch.take(started(0) | {"threads": 2})
-    clock.now += 8.0
-    # Of two cores for 3 s of imports and 5 s of its own work.
-    watch.take({"event": "job_finished", "job_id": 0})
-    assert watch.seconds_left() == pytest.approx(3 * 10 / 2)
-
-
 def test_the_live_view_shows_jobs_and_what_they_say(watch, tmp_path):
     from rich.console import Console
 

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
 
-from icha.configuration.cases import (
-    loop_cases,
-    loop_settings,
-    solution_cases,
-    solution_settings,
-)
+from icha.configuration.cases import loop_cases, loop_settings, solution_cases, solution_settings
 from icha.configuration.errors import ConfigurationError
 
 BAD = {

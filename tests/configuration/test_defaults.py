@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from icha.configuration.cases import (
-    run_cases,
-)
+from icha.configuration.cases import run_cases
 from icha.configuration.errors import ConfigurationError
 
 BAD = {

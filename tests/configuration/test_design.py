@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
 
-from icha.configuration.cases import (
-    run_cases,
-    run_settings,
-    solution_cases,
-    surface_cases,
-    surface_settings,
-)
+from icha.configuration.cases import run_cases, run_settings, solution_cases, surface_cases, surface_settings
 from icha.configuration.design import value_label
 
 BAD = {

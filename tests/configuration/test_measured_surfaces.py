@@ -3,10 +3,7 @@
 import pytest
 from demo_configuration import measured_surface
 
-from icha.configuration.cases import (
-    run_cases,
-    surface_settings,
-)
+from icha.configuration.cases import run_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.surfaces import MeasuredSurface
 from icha.surfaces.measured.settings import Preparation

@@ -3,11 +3,7 @@
 import numpy as np
 from demo_configuration import file_surface
 
-from icha.configuration.cases import (
-    campaign_sha256,
-    run_cases,
-    run_sha256,
-)
+from icha.configuration.cases import campaign_sha256, run_cases, run_sha256
 
 
 def test_settings_depend_on_values_not_on_how_they_are_written(load):

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from demo_configuration import REPOSITORY
 
-from icha.configuration.cases import (
-    run_cases,
-    run_settings,
-    solution_cases,
-    surface_cases,
-)
+from icha.configuration.cases import run_cases, run_settings, solution_cases, surface_cases
 from icha.configuration.load import load_configuration
 from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.planning.needs import further_software

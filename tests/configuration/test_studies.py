@@ -4,11 +4,7 @@ import pytest
 from demo_configuration import LONG_RANGE, TRUTH
 
 import icha
-from icha.configuration.cases import (
-    campaign_sha256,
-    run_cases,
-    run_settings,
-)
+from icha.configuration.cases import campaign_sha256, run_cases, run_settings
 
 BAD = {
     # key, value, what the message must say of it

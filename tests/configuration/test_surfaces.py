@@ -2,15 +2,9 @@
 
 import numpy as np
 import pytest
-from demo_configuration import (
-    file_surface,
-)
+from demo_configuration import file_surface
 
-from icha.configuration.cases import (
-    run_cases,
-    surface_cases,
-    surface_settings,
-)
+from icha.configuration.cases import run_cases, surface_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
 from icha.datasets.labels import number_label
 

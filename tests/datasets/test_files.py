@@ -67,7 +67,7 @@ def as_xarray_would(dataset):
     return encodings
 
 
-@pytest.mark.parametrize("what", ["run", "cycle", "campaign"])
+@pytest.mark.parametrize("what", ["run", "campaign"])
 def test_files_are_those_that_xarray_writes(tmp_path, what):
     if what == "campaign":
         tree = cyclic.tree()
@@ -76,7 +76,7 @@ def test_files_are_those_that_xarray_writes(tmp_path, what):
         encoding = {node.path: as_xarray_would(node.to_dataset()) for node in tree.subtree}
         xr.DataTree.from_dict(plain).to_netcdf(tmp_path / "xarrays.nc", engine="netcdf4", encoding=encoding)
     else:
-        run = small.run() if what == "run" else cyclic.run()
+        run = cyclic.run()
         write_dataset(run, tmp_path / "ours.nc")
         run.to_netcdf(tmp_path / "xarrays.nc", engine="netcdf4", encoding=as_xarray_would(run))
     with netCDF4.Dataset(tmp_path / "ours.nc") as ours, netCDF4.Dataset(tmp_path / "xarrays.nc") as theirs:
@@ -271,28 +271,6 @@ def test_a_campaign_that_cannot_be_written_leaves_nothing(tmp_path):
     assert list((tmp_path / "a").iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["gap_bin_edges", "pressure_bin_edges"])
-def test_bins_that_differ_between_runs_that_share_them_are_refused(name):
-    # The materials share the gaps' bins, the seeds the pressures'.
-    (one, first), (two, second) = (
-        [pair for pair in small.runs() if pair[0].study == "single"]
-        if name == "pressure_bin_edges"
-        else [pair for pair in small.runs() if pair[0].study == "slopes"][:2]
-    )
-    with pytest.raises(ValueError, match=f"{name} differs between runs that share"):
-        campaign_tree([(one, first), (two, second.assign({name: second[name] * 1.001}))])
-
-
-def test_what_does_not_fit_the_design_is_refused():
-    (labels, run), *_ = small.runs()
-    with pytest.raises(ValueError, match=r"slopes/.*/soft: this run is not in the design"):
-        campaign_tree([(labels, run)], design=[labels._replace(material="hertz")])
-    with pytest.raises(ValueError, match="study single: there is no run of it"):
-        campaign_tree([(labels, run)], design=[labels, labels._replace(study="single")])
-    with pytest.raises(ValueError, match=r"slopes/.*/soft: this run is not in the design"):
-        campaign_tree([(labels, run)], design=[labels._replace(study="single")])
-
-
 def test_a_run_that_ends_early_keeps_its_spots_where_others_meet_their_snapshots_in_another_order(tmp_path):
     *others, (labels, run) = [(each, run) for each, run in small.runs() if each.study == "slopes"]
     assert not np.array_equal(run["snapshot_kind"].values, others[0][1]["snapshot_kind"].values)
@@ -302,16 +280,6 @@ def test_a_run_that_ends_early_keeps_its_spots_where_others_meet_their_snapshots
     assert taken.attrs["incomplete"] == "1 of 2 snapshots" and taken.sizes["step"] == 3
     for name in ("snapshot", "snapshot_kind", "spot_snapshot", "spot_radius", "nominal_pressure"):
         np.testing.assert_array_equal(taken[name].values, short[name].values)
-
-
-def test_a_hole_in_a_complete_run_is_refused_even_if_another_run_is_missing():
-    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"][:-1]
-    holed = runs[0][1].copy(deep=True)
-    holed["contact_area_fraction"][1] = np.nan
-    with pytest.raises(
-        ValueError, match=r"slopes/rough/seed1/slope1/soft: .*'contact_area_fraction' holds 1 of .*step=1"
-    ):
-        campaign_tree([(runs[0][0], holed), *runs[1:]])
 
 
 def same(taken, run, labels):
@@ -424,14 +392,35 @@ def test_a_run_that_broke_off_on_its_way_back_has_no_pull_off(tmp_path):
         campaign_tree(odd.items())
 
 
-def test_labels_that_contradict_the_dataset_are_refused():
-    labels, run = small.runs()[0]
-    with pytest.raises(ValueError, match="rms_slope is 1"):
-        campaign_tree([(labels._replace(rms_slope=0.7), run)])
-    with pytest.raises(ValueError, match="seed is 1"):
-        campaign_tree([(labels._replace(seed=4), run)])
-    with pytest.raises(ValueError, match="given twice"):
-        campaign_tree([(labels, run), (labels, run)])
+def holed(run):
+    changed = run.copy(deep=True)
+    changed["contact_area_fraction"][1] = np.nan
+    return changed
+
+
+def other(pair, name):
+    """A run whose values of one variable are others."""
+    return pair[0], pair[1].assign({name: pair[1][name] * 1.001})
+
+
+def test_runs_that_do_not_fit_are_refused_by_name():
+    slopes, single = ([pair for pair in small.runs() if pair[0].study == study] for study in ("slopes", "single"))
+    (labels, run), *_ = slopes
+    asked = [labels._replace(study="single")]
+    for runs, design, message in (
+        ([(labels, run)], [labels, *asked], "study single: there is no run of it"),
+        ([(labels, run)], asked, r"slopes/.*/soft: this run is not in the design"),
+        ([(labels, run)], [labels._replace(material="hertz")], r"slopes/.*/soft: this run is not in the design"),
+        ([(labels._replace(rms_slope=0.7), run)], None, "rms_slope is 1"),
+        ([(labels._replace(seed=4), run)], None, "seed is 1"),
+        ([(labels, run), (labels, run)], None, "given twice"),
+        # The materials share the gaps' bins, the seeds the pressures'.
+        ([slopes[0], other(slopes[1], "gap_bin_edges")], None, "gap_bin_edges differs between runs that share"),
+        ([single[0], other(single[1], "pressure_bin_edges")], None, "pressure_bin_edges differs between runs"),
+        ([(labels, holed(run)), *slopes[1:-1]], None, r"/soft: .*'contact_area_fraction' holds 1 of .*step=1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            campaign_tree(runs, design=design)
 
 
 def test_a_run_of_other_settings_than_are_asked_for_is_refused_by_its_file(tmp_path):

@@ -1,19 +1,15 @@
 """The documented format: what the program writes keeps to it, and what is changed is found."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import small_campaign as small
 import xarray as xr
 
 from icha.datasets.files import write_dataset
-from icha.datasets.format import CAMPAIGN, RUN, RUN_NAMES, SURFACE, SURFACE_NAMES, UnknownFile, flaws, kind_of
+from icha.datasets.format import CAMPAIGN, PROMISED, RUN, SURFACE, UnknownFile, flaws, kind_of
 from icha.datasets.surface_file import write_surface
 from icha.datasets.variables import run as of_run
 from icha.datasets.variables import surface as of_surface
-
-PROMISED = Path(__file__).parent / "promised_variables.txt"
 
 
 @pytest.fixture(scope="module")
@@ -40,19 +36,12 @@ def test_a_campaign_lacks_only_what_the_workflow_adds(files):
 
 
 def test_the_vocabulary_keeps_what_is_promised():
-    """Names, dimensions and units that users rely on: a change of them is one of the format, and made here, too."""
-    promised = PROMISED.read_text().splitlines()
-    tables = (
-        (RUN_NAMES, of_run.RUN | of_run.PATCHES | of_run.CYCLE | of_run.LOOP),
-        (SURFACE_NAMES, of_surface.SURFACE),
-    )
-    kept = [
-        f"{name}({', '.join(table[name].dims)}) {table[name].units}; {condition}".removesuffix("; ")
-        for names, table in tables
-        for condition, of_condition in names.items()
-        for name in of_condition
-    ]
-    assert sorted(kept) == sorted(promised)
+    """Names, dimensions and units that users rely on: a change of them is one of the format."""
+    tables = {RUN: of_run.RUN | of_run.PATCHES | of_run.CYCLE | of_run.LOOP, SURFACE: of_surface.SURFACE}
+    for kind, promised in PROMISED.items():
+        for name, dims, units, _ in promised:
+            assert (tables[kind][name].dims, tables[kind][name].units) == (dims, units)
+    assert [len(PROMISED[kind]) for kind in (RUN, SURFACE)] == [68, 19]
 
 
 def changed(run, name, **attrs):

@@ -125,6 +125,7 @@ def test_cells_grow_with_the_number_of_surfaces(tmp_path):
     assert sizes[20] - sizes[10] == pytest.approx(2 * (sizes[10] - sizes[5]), rel=0.01)
 
 
+@pytest.mark.slow
 def test_figures_of_either_form_show_the_same():
     study, tree, other = crops.STUDY, crops.tree(), crops.square_tree()
     figures = {

@@ -4,7 +4,7 @@ import h5py
 import netCDF4
 import numpy as np
 import pytest
-from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, assert_read, preparation, scan
+from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, assert_read, preparation, refused, scan
 from scipy.io import savemat
 
 from icha.surfaces.measured.resolution import scan_resolution
@@ -27,12 +27,11 @@ def write_npz(path, **arrays):
 def test_of_several_arrays_one_must_be_named(tmp_path, name, write):
     path = tmp_path / name
     write(path, Intensity=np.abs(HEIGHTS), Z=HEIGHTS, pixel=np.ones((1, 1)))
-    with pytest.raises(UnfitTopography, match="the file has 2; allowed: Intensity, Z") as raised:
+    with refused("data", "the file has 2; allowed: Intensity, Z"):
         scan(path, **LINES)
-    assert raised.value.key == "data"
     read = scan(path, data="Z", **LINES)
     assert_read(read)
-    assert read.data == "Z" and "data Z of several" in read.description
+    assert read.data == "Z" and "data Z of several" in read.steps[0]
     # Of a single map among numbers nothing is asked.
     write(path, Z=HEIGHTS, a=np.ones((1, 1)))
     read = scan(path, **LINES)
@@ -86,9 +85,8 @@ def test_leading_dimensions_of_one_entry_are_passed_over(tmp_path, name):
 
 @pytest.mark.parametrize("unit", ["px", "pixels", "pica", "point", "hand", "pt", "au", "pc", "li"])
 def test_units_that_no_microscope_writes_are_no_lengths(tmp_path, unit):
-    with pytest.raises(UnfitTopography, match="is missing") as raised:
+    with refused("size", "is missing"):
         scan(write_netcdf(tmp_path / "scan.nc", unit))
-    assert raised.value.key == "size"
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3])

@@ -7,7 +7,7 @@ import netCDF4
 import numpy as np
 import pytest
 import SurfaceTopography
-from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, UM, assert_read, centred, preparation, scan, write_xyz
+from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, UM, assert_read, centred, preparation, refused, scan, write_xyz
 from SurfaceTopography.Exceptions import CorruptFile
 
 from icha.surfaces.measured import text_tables
@@ -29,7 +29,7 @@ def test_matrix_of_text(tmp_path, separator, first_axis, stored):
     assert_read(scan(tmp_path / "scan.txt", height_unit=NM, size=SIZE, first_axis=first_axis))
 
 
-@pytest.mark.parametrize("text", ["0,1;0,2;0,3", "0,1 0,2 0,3"])
+@pytest.mark.parametrize("text", ["0,1, 0,2, 0,3, 0,4", "0,1 0,2 0,3"])
 def test_decimal_commas_are_not_taken_for_columns(tmp_path, text):
     (tmp_path / "scan.txt").write_text("\n".join([text] * 9))
     with pytest.raises(UnfitTopography, match="decimal"):
@@ -119,9 +119,8 @@ def test_netcdf_says_its_axes_and_units(tmp_path, keys):
 def test_netcdf_with_axes_of_other_names(tmp_path):
     path = write_netcdf(tmp_path / "scan.nc", names=("row", "column"), turned=True)
     assert_read(scan(path, first_axis="x"))
-    with pytest.raises(UnfitTopography, match=r"phase, height|height, phase") as raised:
+    with refused("data", r"phase, height|height, phase"):
         scan(path, data="width")
-    assert raised.value.key == "data"
 
 
 def test_netcdf_fill_values_are_missing_points(tmp_path):
@@ -135,9 +134,8 @@ def test_unit_of_the_file_and_unit_that_is_given(tmp_path):
     path = write_netcdf(tmp_path / "scan.nc", unit="um")
     assert_read(scan(path), UM)
     assert_read(scan(path, height_unit=NM), NM)
-    with pytest.raises(UnfitTopography) as raised:
+    with refused("height_unit"):
         scan(write_netcdf(tmp_path / "volts.nc", unit="V"))
-    assert raised.value.key == "height_unit"
 
 
 @pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
@@ -150,9 +148,8 @@ def test_hdf5(tmp_path, first_axis, stored):
     assert_read(scan(path, size=SIZE, first_axis=first_axis))
     with h5py.File(path, "a") as file:
         file["scans/second"] = stored + 1
-    with pytest.raises(UnfitTopography, match="scans/first, scans/second") as raised:
+    with refused("data", "scans/first, scans/second"):
         scan(path, size=SIZE, first_axis=first_axis)
-    assert raised.value.key == "data"
     assert_read(scan(path, size=SIZE, first_axis=first_axis, data="scans/first"))
 
 
@@ -196,14 +193,12 @@ def test_fourier_lists_that_are_none(tmp_path):
     path = tmp_path / "list.dat"
     np.savetxt(path, np.column_stack([k, h.real, h.imag]))
     how = preparation(boundary="periodic", height_unit=1e-4)
-    with pytest.raises(UnfitTopography) as raised:
+    with refused("size"):
         prepared_topography(path, how)
-    assert raised.value.key == "size"
     how["size"] = (1e-4, 1e-4)
     assert prepared_topography(path, how).surface.grid == 32  # the next power of two with four cells per wave
-    with pytest.raises(UnfitTopography, match="at least 12") as raised:
+    with refused("grid", "at least 12"):
         prepared_topography(path, how | {"grid": 10})
-    assert raised.value.key == "grid"
     both = np.concatenate([k, -k]), np.concatenate([h, h])
     np.savetxt(path, np.column_stack([both[0], both[1].real, both[1].imag]))
     with pytest.raises(UnfitTopography, match="conjugate"):
@@ -313,17 +308,15 @@ def test_heading_of_points_that_gwyddion_exports(tmp_path, encoding):
 )
 def test_a_line_scan_is_refused_as_one(tmp_path, name, text):
     (tmp_path / name).write_text(text + "\n")
-    with pytest.raises(UnfitTopography, match="is a line scan, one profile of 50 points; allowed: a topo") as raised:
+    with refused("path", "is a line scan, one profile of 50 points; allowed: a topo"):
         scan(tmp_path / name, height_unit=NM, size=SIZE)
-    assert raised.value.key == "path"
 
 
 def test_what_is_missing_is_named(tmp_path):
     np.save(tmp_path / "scan.npy", HEIGHTS)
     for keys, key in (({"size": SIZE}, "height_unit"), ({"height_unit": NM}, "size")):
-        with pytest.raises(UnfitTopography, match="is missing") as raised:
+        with refused(key, "is missing"):
             scan(tmp_path / "scan.npy", **keys)
-        assert raised.value.key == key
     np.save(tmp_path / "scan.npy", HEIGHTS[None])
     with pytest.raises(UnfitTopography, match=r"shape \(1, 10, 16\)"):
         scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE)
@@ -337,14 +330,12 @@ def test_what_is_missing_is_named(tmp_path):
 @pytest.mark.parametrize("name", ["scan.txt", "scan.xyz", "scan.npy", "scan.nc", "scan.h5", "scan.dat"])
 def test_an_empty_file_is_refused(tmp_path, name):
     (tmp_path / name).touch()
-    with pytest.raises(UnfitTopography, match="is empty") as raised:
+    with refused("path", "is empty"):
         scan(tmp_path / name, height_unit=NM, size=SIZE)
-    assert raised.value.key == "path"
 
 
 @pytest.mark.parametrize("kind", ["auto", "matrix", "xyz", "fourier"])
 def test_a_heading_alone_is_refused(tmp_path, kind):
     (tmp_path / "scan.txt").write_text("# width 90 um\n\n  # heights\n")
-    with pytest.raises(UnfitTopography, match="holds no numbers") as raised:
+    with refused("path", "holds no numbers"):
         scan(tmp_path / "scan.txt", format=kind, height_unit=NM, size=SIZE)
-    assert raised.value.key == "path"

@@ -64,9 +64,8 @@ def exact_maxima(surface, highest=16, fine=512):
 
 
 @pytest.mark.parametrize(("grid", "height_error", "radius_error"), [(128, 2e-4, 1e-2), (256, 3e-6, 3e-4)])
-@pytest.mark.parametrize("seed", [1, 2])
-def test_all_maxima_of_a_rough_surface_are_found(grid, height_error, radius_error, seed):
-    surface = SPECTRUM.realise(grid, seed)
+def test_all_maxima_of_a_rough_surface_are_found(grid, height_error, radius_error):
+    surface = SPECTRUM.realise(grid, 1)
     position, height, radius = exact_maxima(surface)
     summits = find_summits(surface)
     assert len(summits) == len(height)

@@ -4,6 +4,7 @@ import gzip
 
 import numpy as np
 import pytest
+from scans import refused
 
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
@@ -47,16 +48,8 @@ def assert_heights(prepared, missing=0):
     np.testing.assert_allclose(prepared.surface.period, SIDE, rtol=1e-9)
 
 
-@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
-def test_an_empty_field_is_a_missing_point_and_keeps_its_place(tmp_path, delimiter):
-    fields = rows()
-    for row, column in enumerate(np.random.default_rng(1).integers(0, GRID, GRID)):
-        fields[row][column] = ""
-    assert_heights(read(written(tmp_path, text(fields, delimiter))), missing=GRID)
-
-
-@pytest.mark.parametrize("word", ["BAD", "None", "nan", "-", "*", "#N/A", "no data", "NULL", "***", '""'])
-@pytest.mark.parametrize("delimiter", [",", "\t", " "])
+@pytest.mark.parametrize("word", ["nan", "#N/A", "no data", "***", '""'])
+@pytest.mark.parametrize("delimiter", [",", " "])
 def test_words_for_missing_points(tmp_path, word, delimiter):
     fields = rows()
     fields[5][7] = word
@@ -123,12 +116,6 @@ def test_ways_to_write_numbers(tmp_path, write, delimiter, encoding):
     assert_heights(read(written(tmp_path, text(rows(write=write), delimiter), "scan.txt", encoding)))
 
 
-def test_a_compressed_text(tmp_path):
-    path = tmp_path / "scan.csv.gz"
-    path.write_bytes(gzip.compress(text(rows()).encode()))
-    assert_heights(read(path))
-
-
 def points(*further):
     y, x = np.mgrid[:GRID, :GRID] * SIDE / GRID / UM
     return [
@@ -140,9 +127,8 @@ def points(*further):
 def test_points_with_a_column_too_many(tmp_path, further):
     """Zeros or intensities: four columns are a Fourier series only if they look like one."""
     path = written(tmp_path, text(points(further), " "), "scan.txt")
-    with pytest.raises(UnfitTopography, match=r"a line has 4 numbers.*\[1, 2, 3\]") as raised:
+    with refused("columns", r"a line has 4 numbers.*\[1, 2, 3\]"):
         read(path)
-    assert raised.value.key == "columns"
     assert_heights(read(path, columns=(1, 2, 3), size=None, lateral_unit=UM))
 
 

@@ -1,5 +1,7 @@
 """A run that fails does not stop its campaign: its file says why, the verdict lists it, the rest is drawn."""
 
+from unittest.mock import Mock
+
 import cyclic_campaign as cyclic
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from icha.surfaces.surface import Surface
 
 ATTRIBUTES = {"campaign": "small", "study": "sticky", "config_sha256": "0", "license": "CC0-1.0"}
 PATH = {"reduced_pressures": [1e-3], "snapshots": [("reduced_pressure", 1e-3)]}
+BOTH_WAYS = PATH | {"unload": True}
 # The energy is ten times that which it takes to press the summits flat.
 STICKY = {"contact_modulus": 1e6, "surface_energy": 48.0, "interaction_range": 8e-6}
 BARE = {"contact_modulus": 25e6, "surface_energy": 0.0, "interaction_range": 2.071e-9}
@@ -89,20 +92,18 @@ def test_the_file_of_a_run_without_a_single_stop_says_why(sweep):
     file, said = sweep("sticky", STICKY)
     run = read_run(file)
     assert run.sizes["step"] == run.sizes["snapshot"] == run.sizes["spot"] == 0
-    assert "sticky" in run.attrs["incomplete"] and "after 0 of 1 stops" in run.attrs["incomplete"]
+    assert "after 0 of 1 stops" in run.attrs["incomplete"]
     assert said[-1] == f"Failed: {run.attrs['incomplete']}"
     assert float(run["surface_energy"]) == 48.0 and run.attrs["config_sha256"] == "0"
-    again, _ = sweep("again", STICKY)
-    assert again.read_bytes() == file.read_bytes()
+    assert sweep("again", STICKY)[0].read_bytes() == file.read_bytes()
 
 
-@pytest.mark.parametrize("path", [PATH, PATH | {"unload": True}], ids=["loading", "both ways"])
-def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset, tmp_path, path):
+def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset, tmp_path):
     from check_results import check_results
     from judge_results import judge_results
 
     # The failed one comes first: what a study has is known from the others.
-    files = {"glue": sweep("glue", STICKY, path)[0], "soft": sweep("soft", BARE, path)[0]}
+    files = {"glue": sweep("glue", STICKY, BOTH_WAYS)[0], "soft": sweep("soft", BARE, BOTH_WAYS)[0]}
     file, labels = dataset(files)
     broken = read_run(files["glue"])
     reason = broken.attrs["incomplete"]
@@ -145,12 +146,8 @@ def test_a_campaign_of_failed_runs_only_is_a_dataset_and_an_empty_page(sweep, da
     assert all(file.stat().st_size > 1000 for file in files)
 
 
-BOTH_WAYS = PATH | {"unload": True}
-
-
-@pytest.mark.parametrize("path", [PATH, BOTH_WAYS], ids=["loading", "both ways"])
-def test_a_surface_that_a_model_cannot_compute_costs_no_other_run(sweep, dataset, path):
-    model = "asperities"
+def test_a_surface_that_a_model_cannot_compute_costs_no_other_run(sweep, dataset):
+    path, model = BOTH_WAYS, "asperities"
     odd, said = sweep("ridges", BARE, path, ridges(), model)
     # A pit is the surface's own matter.
     pit, _ = sweep("pit", BARE, path, pitted(), model)
@@ -188,15 +185,9 @@ def test_a_state_that_there_is_not_on_this_surface_is_a_failed_run(sweep, path):
     assert run.sizes["step"] == 0 and run.attrs["incomplete"].startswith("nothing was computed: path: ")
 
 
-@pytest.mark.parametrize(
-    "error",
-    [ZeroDivisionError("division by zero"), IndexError("out of bounds"), np.linalg.LinAlgError("singular matrix")],
-)
+@pytest.mark.parametrize("error", [ZeroDivisionError("division by zero"), np.linalg.LinAlgError("singular matrix")])
 def test_whatever_the_data_raise_is_a_failed_run(sweep, monkeypatch, error):
-    def raising(*arguments):
-        raise error
-
-    monkeypatch.setattr("icha.simulation.follow", raising)
+    monkeypatch.setattr("icha.simulation.follow", Mock(side_effect=error))
     file, said = sweep("odd", BARE)
     run = read_run(file)
     assert str(error) in run.attrs["incomplete"] and run.sizes["step"] == 0
@@ -219,19 +210,10 @@ def test_values_that_are_not_finite_end_a_run_and_leave_what_came_before(sweep, 
 
 
 @pytest.mark.parametrize(
-    "error",
-    [
-        MemoryError("no room"),
-        OSError(28, "No space left on device"),
-        ImportError("none"),
-        RuntimeError("can't start new thread"),
-    ],
+    "error", [MemoryError("no room"), OSError(28, "No space left on device"), RuntimeError("can't start new thread")]
 )
 def test_what_the_machine_lacks_is_no_result(sweep, tmp_path, monkeypatch, error):
-    def raising(*arguments):
-        raise error
-
-    monkeypatch.setattr("icha.simulation.follow", raising)
+    monkeypatch.setattr("icha.simulation.follow", Mock(side_effect=error))
     with pytest.raises(type(error)):
         sweep("wrong", BARE)
     assert not (tmp_path / "wrong.nc").exists()

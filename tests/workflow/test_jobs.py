@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from base64 import urlsafe_b64encode
 from multiprocessing import spawn
 from pathlib import Path
@@ -13,13 +12,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, is_alive, wait_for
 
-from icha.datasets.surface_file import write_surface
-from icha.support.atomic_files import take_over, whole_file, why_not_writable
-from icha.support.checksums import asked_of, is_whole, lost, made_as, sha256_of, write_checksum
+from icha.support.atomic_files import take_over, whole_file
+from icha.support.checksums import asked_of, is_whole, made_as, sha256_of, with_sidecar, write_checksum
 from icha.support.program import beginning_of
-from icha.surfaces.spectrum import SelfAffineSpectrum
 
 RESULTS = "results/tiny"
 SCRIPT = f"""
@@ -63,50 +60,11 @@ def ended(process):
     return process.returncode, said
 
 
-def test_a_job_records_what_it_wrote(job):
-    assert ended(job(WORK)) == (0, "")
+def test_a_job_records_what_it_wrote_and_what_it_was_asked_for_whatever_it_does_with_it(job):
+    assert ended(job(f"{WORK}    snakemake.params[0].clear()\n")) == (0, "")
     assert json.loads((job.results / "checksums/runs/b.nc.json").read_text())["size"] == len("a result")
     assert (job.results / "logs/b.log").read_text() == "at work\n"
-
-
-def test_a_job_records_what_it_was_asked_for_whatever_it_does_with_it(job):
-    assert ended(job(f"{WORK}    snakemake.params[0].clear()\n")) == (0, "")
     assert made_as(job.results, "runs/b.nc") == asked_of([repr({"seed": 1}), repr("code")])
-
-
-def test_a_run_that_is_there_is_not_lost_because_what_was_kept_for_it_cannot_be_removed(tmp_path):
-    """As of file systems in networks, which leave names of files that are still open."""
-    results = tmp_path / RESULTS
-    for folder in ("surfaces", "logs"):
-        (results / folder).mkdir(parents=True)
-    surface = SelfAffineSpectrum(1e-6, 1e-6, 0.5e-6, 0.8).realise(16, 1).scaled_to_rms_slope(1.0)
-    write_surface(results / "surfaces/a.nc", surface, name="a", seed=1)
-    write_checksum(results, "surfaces/a.nc")
-    script = f"""
-import os, runpy, sys
-from types import SimpleNamespace
-sys.path.insert(0, {str(REPOSITORY / "workflow/scripts")!r})
-class Named(list):
-    def __init__(self, **named):
-        super().__init__(named.values())
-        self.__dict__.update(named)
-def refuse(*_, **__):
-    raise OSError(39, "Directory not empty")
-os.rmdir = refuse
-settings = dict(
-    material=dict(contact_modulus=1e6, surface_energy=1e-4, interaction_range=1e-9), rms_slope=0.3, seed=1,
-    path=dict(reduced_pressures=[0.01], snapshots=None), model="boundary_elements",
-)
-snakemake = SimpleNamespace(
-    input=Named(surface="{RESULTS}/surfaces/a.nc"), output=["{RESULTS}/runs/b.nc"], log=["{RESULTS}/logs/b.log"],
-    params=Named(settings=settings, attributes={{"campaign": "tiny"}}, keeps=True),
-)
-runpy.run_path({str(REPOSITORY / "workflow/scripts/run_sweep.py")!r}, dict(snakemake=snakemake))
-"""
-    environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
-    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment, check=False)
-    assert done.returncode == 0, (results / "logs/b.log").read_text()
-    assert (results / "runs/b.kept").is_dir() and made_as(results, "runs/b.nc")
 
 
 def test_a_job_that_fails_leaves_its_result_to_be_made_again(job):
@@ -115,7 +73,7 @@ def test_a_job_that_fails_leaves_its_result_to_be_made_again(job):
     (job.results / "runs/b.nc").unlink()
     assert ended(job("    raise ValueError('wrong input')\n"))[0] == 1
     assert (job.results / "logs/b.log").read_text() == "at work\nError: wrong input\n"
-    assert lost(job.results) == ["runs/b.nc"]
+    assert "runs/b.nc" in with_sidecar(job.results) and not (job.results / "runs/b.nc").exists()
 
 
 def test_a_job_refuses_what_the_disk_has_spoilt_and_the_next_call_knows(job):
@@ -150,13 +108,6 @@ def test_a_job_ends_with_the_snakemake_that_wants_it(job):
     assert ended(process) == (1, "")
 
 
-def test_a_job_runs_where_processes_may_not_be_watched(job):
-    """As in containers whose system calls are filtered."""
-    refused = "import os\ndef refuse(*_):\n    raise PermissionError(1, 'Operation not permitted')\n"
-    told = f"{os.getpid()} {beginning_of(os.getpid())}"
-    assert ended(job(WORK, before=f"{refused}os.pidfd_open = refuse\n", ICHA_SNAKEMAKE=told)) == (0, "")
-
-
 @pytest.mark.parametrize("reused", [False, True])
 def test_a_job_whose_snakemake_is_gone_before_it_begins_writes_nothing(job, reused):
     snakemake = subprocess.Popen(["true"])
@@ -165,7 +116,7 @@ def test_a_job_whose_snakemake_is_gone_before_it_begins_writes_nothing(job, reus
     if reused:
         told = f"{os.getpid()} 1"
     assert ended(job(WORK, ICHA_SNAKEMAKE=told)) == (1, "")
-    assert not (job.results / "runs/b.nc").exists() and lost(job.results) == []
+    assert not (job.results / "runs/b.nc").exists() and "runs/b.nc" not in with_sidecar(job.results)
 
 
 def test_a_job_is_killed_with_the_snakemake_that_started_it(job, tmp_path):
@@ -214,56 +165,30 @@ def test_a_job_of_an_earlier_call_completes_nothing_that_a_later_one_owns(job, t
     assert [file.name for file in (job.results / "runs").iterdir()] == ["b.nc"]
 
 
-def test_a_job_of_an_earlier_call_that_begins_late_touches_no_record_of_a_later_one(job, tmp_path, monkeypatch):
-    monkeypatch.setenv("ICHA_OWNER", "")
-    take_over(tmp_path / ".snakemake/tiny.owner")
-    earlier = os.environ["ICHA_OWNER"]
-    take_over(tmp_path / ".snakemake/tiny.owner")
-    assert ended(job(WORK)) == (0, "")
-    record = (job.results / "checksums/runs/b.nc.json").read_bytes()
-    assert ended(job(WORK.replace("a result", "another result"), ICHA_OWNER=earlier))[0] == 1
-    assert (job.results / "checksums/runs/b.nc.json").read_bytes() == record
-    assert (job.results / "runs/b.nc").read_text() == "a result"
+def campaign(before_jobs, *, dry_run=False):
+    return before_jobs.Campaign(RESULTS, "tiny", "tiny.yaml", "clone", dry_run=dry_run)
 
 
-def test_a_call_that_has_no_jobs_takes_nothing_from_those_that_run(job, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    import before_jobs
-
+def test_a_call_that_has_no_jobs_takes_nothing_from_those_that_run(job, tmp_path, monkeypatch, before_jobs):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)  # as where files cannot be locked
     monkeypatch.setenv("ICHA_OWNER", "")
     take_over(".snakemake/tiny.owner")
     earlier = os.environ["ICHA_OWNER"]
-    campaign = before_jobs.Campaign(RESULTS, dry_run=False)
+    own = campaign(before_jobs)
     assert ended(job(WORK, ICHA_OWNER=earlier)) == (0, "")
     # With jobs to start it owns the results, but not if they are not those any more that it has looked at.
     (job.results / "runs/b.nc").write_text("another result")
-    with pytest.raises(SystemExit, match=r"runs/b\.nc has changed since .* give the same command again"):
-        campaign.own()
+    with pytest.raises(SystemExit, match=r"runs/b\.nc has changed since"):
+        own.begin()
     (job.results / "runs/b.nc").unlink()
-    campaign.own()
-    assert ended(job(WORK, ICHA_OWNER=earlier))[0] == 1
-    assert not (job.results / "runs/b.nc").exists()
-
-
-def wait_for(what, seconds=120):
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
-        try:
-            if what():
-                return
-        except FileNotFoundError:
-            pass
-        time.sleep(0.02)
-    raise AssertionError("in vain")
-
-
-def is_alive(process):
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    own.begin()
+    # A job of the earlier call that begins late touches nothing, and no record.
+    assert ended(job(WORK)) == (0, "")
+    record = (job.results / "checksums/runs/b.nc.json").read_bytes()
+    assert ended(job(WORK.replace("a result", "another result"), ICHA_OWNER=earlier))[0] == 1
+    assert (job.results / "checksums/runs/b.nc.json").read_bytes() == record
+    assert (job.results / "runs/b.nc").read_text() == "a result"
 
 
 def test_a_file_that_has_changed_since_it_was_looked_at_is_neither_a_surface_nor_copied(tmp_path, monkeypatch):
@@ -293,14 +218,13 @@ def test_a_file_that_has_changed_since_it_was_looked_at_is_neither_a_surface_nor
     assert not surface.exists() and sha256_of(copy) == looked_at
 
 
-def test_a_shell_gets_pythons_path_in_quotes_and_nobody_else_does(monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    import before_jobs
-
+def test_a_shell_gets_pythons_path_in_quotes_and_nobody_else_does(monkeypatch, before_jobs):
     own = sys.executable
+    for name in ("ICHA_SNAKEMAKE", "PYTHONSAFEPATH"):
+        monkeypatch.setenv(name, "")
     try:
         monkeypatch.setattr(sys, "executable", "/it's a folder/python")
-        before_jobs.quote_python()
+        before_jobs.prepare_process()
         said = subprocess.run(f"printf %s {sys.executable}", shell=True, capture_output=True, text=True).stdout
         assert said == "/it's a folder/python" == os.fsdecode(spawn.get_executable())
     finally:
@@ -315,12 +239,12 @@ def test_only_files_that_lie_here_go_after_modules_of_their_names(tmp_path, monk
     monkeypatch.setenv("PYTHONPATH", f"{asked}{os.pathsep}")
     monkeypatch.setattr(sys, "path", [str(clone), "", str(folder), str(asked), own, installed])
     first = (REPOSITORY / "Snakefile").read_text(encoding="utf-8").partition("from snakemake")[0]
-    exec(first, {"workflow": SimpleNamespace(basedir=clone)})
+    exec(first, {"workflow": SimpleNamespace(current_basedir=clone)})
     assert sys.path == [str(asked), own, installed, str(clone), "", str(folder)]
     # What is asked for stays where it is, wherever it lies.
     monkeypatch.setenv("PYTHONPATH", str(clone))
     monkeypatch.setattr(sys, "path", [str(folder), str(clone), installed])
-    exec(first, {"workflow": SimpleNamespace(basedir=clone)})
+    exec(first, {"workflow": SimpleNamespace(current_basedir=clone)})
     assert sys.path == [str(clone), installed, str(folder)]
 
 
@@ -339,15 +263,6 @@ with whole_file({str(tmp_path / "folder/large.nc")!r}) as temporary:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPOSITORY)
     assert f"OSError: [Errno 27] File too large: '{tmp_path}/folder'" in done.stderr.splitlines()[-1]
     assert list((tmp_path / "folder").iterdir()) == []
-
-
-def test_two_programs_that_write_a_file_do_not_write_into_each_others(tmp_path):
-    with whole_file(tmp_path / "a.txt") as first:
-        first.write_text("the first's")
-        with whole_file(tmp_path / "a.txt") as second:
-            second.write_text("the second's")
-        assert first.read_text() == "the first's"
-    assert [file.read_text() for file in tmp_path.iterdir()] == ["the first's"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks /proc which file is meant")
@@ -371,23 +286,8 @@ def test_a_result_is_on_the_disk_before_it_has_its_name_and_its_name_before_its_
     assert done == [*result, ("sync", "record"), ("name", "record"), ("sync", "folder")]
 
 
-def test_what_cannot_be_removed_does_not_hide_the_reason(tmp_path, monkeypatch):
-    def refuse(*_, **__):
-        raise OSError(30, "Read-only file system")
-
-    for what in ("write_bytes", "unlink"):
-        monkeypatch.setattr(Path, what, refuse)
-    assert why_not_writable(tmp_path).errno == 30
-    with pytest.raises(OSError, match="Read-only file system") as raised, whole_file(tmp_path / "a.txt"):
-        raise RuntimeError("a library's own words")
-    assert raised.value.filename == str(tmp_path)
-
-
 @pytest.mark.parametrize("there", [True, False], ids=["with_its_result", "alone"])
-def test_a_damaged_record_of_snakemake_goes(there, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
-    import before_jobs
-
+def test_a_damaged_record_of_snakemake_goes(there, tmp_path, monkeypatch, before_jobs):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
     result = Path(RESULTS, "b.nc")
@@ -398,8 +298,8 @@ def test_a_damaged_record_of_snakemake_goes(there, tmp_path, monkeypatch):
         file.write_bytes(content)
     if not there:
         result.unlink()
-    before_jobs.Campaign(RESULTS, dry_run=True)
+    campaign(before_jobs, dry_run=True)
     assert record.exists() and result.exists() == there
-    before_jobs.Campaign(RESULTS, dry_run=False)
+    campaign(before_jobs)
     assert not record.exists() and not result.exists()
     assert (aside.read_bytes() == b"a result") if there else not aside.exists()

@@ -32,23 +32,16 @@ def test_their_summits_are_resolved_as_they_are_used(name):
     assert "cutoff" not in scan.advice
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    """The campaign's results."""
-    folder = tmp_path_factory.mktemp("published")
+@pytest.mark.slow
+def test_every_file_becomes_contact_by_both_models_and_figures(tmp_path):
+    """More contact at more load, and by both models the same to a factor of two."""
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(REPOSITORY / "Snakefile"), "--directory"]
-    command += [str(folder), "--cores", "2", "all", "--configfile", str(CAMPAIGN)]
+    command += [str(tmp_path), "--cores", "2", "all", "--configfile", str(CAMPAIGN)]
     environment = os.environ | {"PYTHONPATH": modules_of(REPOSITORY), "PYTHONDONTWRITEBYTECODE": "1"}
     run = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     assert run.returncode == 0, run.stdout
-    return folder / "results/published_topographies"
-
-
-@pytest.mark.slow
-def test_every_file_becomes_contact_by_both_models(results):
-    """More contact at more load, and by both models the same to a factor of two."""
+    results, pressed = tmp_path / "results/published_topographies", set()
     with xr.open_datatree(results / "dataset/published_topographies.nc") as campaign:
-        pressed = set()
         for study in campaign.children.values():
             runs = study.to_dataset()
             for own in runs.surface.values:
@@ -61,10 +54,6 @@ def test_every_file_becomes_contact_by_both_models(results):
                         assert np.all(np.abs(np.log2(known[0] / known[1])) < 1)
                     pressed.add(str(own))
     assert pressed == set(SURFACES)
-
-
-@pytest.mark.slow
-def test_their_figures_and_their_preparation_are_there(results):
     names = {"fig2_area_and_gap", "fig3_distributions", "fig4_contact_map", "fig5_multi_slope", "fig10_model_error"}
     assert names <= {file.stem for file in (results / "figures").glob("*.png")}
     report = (results / "report.html").read_text()

@@ -5,7 +5,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
-sys.path.insert(0, str(Path(workflow.basedir, "workflow")))
+sys.path.insert(0, str(Path(ROOT, "workflow")))
 
 import before_jobs
 from command_line import campaign_configuration
@@ -18,7 +18,7 @@ from icha.planning.results import campaign_files
 
 before_jobs.plan_without_collecting()
 
-CONFIGURATION = campaign_configuration(workflow)
+CONFIGURATION = campaign_configuration(workflow, ROOT)
 CAMPAIGN = CONFIGURATION.campaign
 PUBLICATION = CAMPAIGN.published()
 RESULTS = f"results/{CAMPAIGN.name}"
@@ -85,4 +85,4 @@ def as_it_is(value):
 @cache
 def code_of(script, *modules):
     """Fingerprint of a script of workflow/scripts and of what it imports, as a parameter of its rule."""
-    return code_fingerprint(Path(workflow.basedir, "workflow/scripts", script), *modules)
+    return code_fingerprint(Path(ROOT, "workflow/scripts", script), *modules)

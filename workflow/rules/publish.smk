@@ -3,7 +3,7 @@
 from publishable import publishable_source
 
 # Looked at once, when the deposit is asked for, and before anything is computed.
-SOURCE = cache(lambda: publishable_source(CONFIGURATION, workflow.basedir, RESULTS))
+SOURCE = cache(lambda: publishable_source(CONFIGURATION, ROOT, RESULTS))
 
 
 rule deposit:
@@ -24,7 +24,7 @@ rule deposit:
     params:
         results=as_it_is(RESULTS),
         named_files=as_it_is(NAMED_FILES),
-        project=as_it_is(workflow.basedir),
+        project=as_it_is(ROOT),
         # The source is part of the deposit, comments and all.
         revision=lambda wildcards: SOURCE().revision,
     message:

@@ -3,7 +3,7 @@
 from icha.configuration.cases import run_settings
 from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
 from icha.datasets.labels import model_folder
-from icha.planning.needs import run_memory, run_minutes, run_threads
+from icha.planning.needs import run_memory, run_minutes, surface_threads
 
 
 wildcard_constraints:
@@ -30,7 +30,7 @@ rule run:
     priority: by_case(lambda case: int(case.model == BOUNDARY_ELEMENTS))
     conda:
         "../envs/icha.yaml"
-    threads: by_case(lambda case: run_threads(CAMPAIGN, case))
+    threads: by_case(lambda case: surface_threads(CAMPAIGN, case.surface))
     resources:
         mem_mb=by_case(lambda case: run_memory(CAMPAIGN, case)),
         runtime=by_case(lambda case: run_minutes(CAMPAIGN, case)),
@@ -43,7 +43,7 @@ rule run:
         },
         code=by_case(lambda case: CODE_OF_RUN[case.model]),
         # What takes hours can be gone on with.
-        keeps=by_case(lambda case: case.model == BOUNDARY_ELEMENTS and run_threads(CAMPAIGN, case) > 1),
+        keeps=by_case(lambda case: case.model == BOUNDARY_ELEMENTS and surface_threads(CAMPAIGN, case.surface) > 1),
     message:
         "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
         "{wildcards.model_folder}{wildcards.material}"

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from icha.support import checksums
-from icha.support.atomic_files import move_only_within, while_owned
 from icha.support.in_words import printable_lines
 from icha.support.program import beginning_of, end_with_parent
 
@@ -38,7 +37,6 @@ def guarded(snakemake):
     all in their message. The traceback of any other one is for the developers and is kept beside the log.
     """
     _end_with_snakemake()
-    move_only_within(while_owned)
     log, results = snakemake.log[0], _results(snakemake)
     outputs = [_result(results, path) for path in snakemake.output]
     terminal = os.dup(2)

@@ -154,10 +154,12 @@ def _unpacked(dataset):
     return np.where(missing, np.nan, stored * scale + offset)
 
 
-def format_of_hdf5(path: Path) -> str:
-    """The format of an HDF5 file whose name does not tell it; netCDF-4 and Zygo's files are HDF5, too."""
+def format_of_hdf5(path: Path) -> str | None:
+    """The format of an HDF5 file whose name does not tell it, None of others; netCDF-4 and Zygo's files are HDF5."""
     import h5py
 
+    if not h5py.is_hdf5(path):
+        return None
     with h5py.File(path) as file:
         if "_NCProperties" in file.attrs:
             return "netcdf"

@@ -8,7 +8,7 @@ import numpy as np
 
 from icha.support import in_words
 from icha.support.in_words import printable
-from icha.support.input_files import RefusedFile, bounded_memory, is_hdf5, refuse_traps
+from icha.support.input_files import RefusedFile, bounded_memory, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
@@ -160,6 +160,6 @@ def _format_of(path: Path) -> str:
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:
         return known[suffix]
-    if is_hdf5(path):
-        return format_of_hdf5(path)
+    if (known := format_of_hdf5(path)) is not None:
+        return known
     return "xyz" if path.name.lower().endswith(".xyz.gz") else "text"

@@ -80,7 +80,7 @@ def _as_instrument_file(file, how):
 def read_xyz(file: SourceFile, how: Preparation) -> Found:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
     layout = file.layout
-    titles = _titles(layout, how)
+    titles = _titles(layout, how.columns)
     points = _columns_of_points(file.values, how, titles)
     heading = read_heading(layout.heading, points.shape, layout.decimal_comma)
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
@@ -116,8 +116,8 @@ _TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE
 _NAMES_OF_Z = ("z", "h", "height")
 
 
-def _titles(layout, how):
-    """The titles of the columns x, y and z, by these names; none if there are not just these three."""
+def _titles(layout, columns=None):
+    """The titles of the columns x, y and z, by these names; none if a name is not there, or if others are asked for."""
     if not layout.heading:
         return {}
     fields = re.split(r"[,;\t]" if layout.delimiter else r"\s+(?![\[(])", layout.heading[-1].strip(' \t\r\n#%"'))
@@ -126,10 +126,8 @@ def _titles(layout, how):
     names = ["z" if name in _NAMES_OF_Z else name for name in names]
     if len(names) != layout.columns or any(names.count(axis) != 1 for axis in "xyz"):
         return {}
-    titles = {
-        axis: _Title(names.index(axis) + 1, metres_of(found[names.index(axis)][2] or "")) for axis in "xyz"
-    }
-    meant = how.columns is None or list(how.columns) == [titles[axis].column for axis in "xyz"]
+    titles = {axis: _Title(names.index(axis) + 1, metres_of(found[names.index(axis)][2] or "")) for axis in "xyz"}
+    meant = columns is None or list(columns) == [titles[axis].column for axis in "xyz"]
     return titles if meant else {}
 
 
@@ -172,11 +170,13 @@ def _without_missing(heights, heading):
 def format_of_text(file: SourceFile) -> str | None:
     """Format of a text file, by its columns; None if it is no table of numbers, or a format of an instrument."""
     layout = file.layout
+    if layout is not None and _titles(layout):
+        return "xyz"
     if layout is None or (layout.words and is_instrument_text(file)):
         return None
     if any(map(WIDTH.match, layout.heading)):
         return "matrix"
-    if layout.columns == 4 and not _titles(layout, Preparation("auto", "")) and looks_like_fourier(file.values):
+    if layout.columns == 4 and looks_like_fourier(file.values):
         return "fourier"
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS else "matrix"
 

@@ -237,7 +237,7 @@ def _decimal_comma(lines, delimiter, count, decimal):
         raise UnfitTopography(
             "path",
             f"has commas that stand between numbers and seem to be decimal, too, as in {','.join(rows[0][:4])}; "
-            "allowed: semicolons between numbers with decimal commas, quotes around these, or decimal points. Export it so",
+            "allowed: semicolons between numbers with decimal commas, quotes around these, or decimal points.",
         )
     return decimal
 
@@ -245,20 +245,23 @@ def _decimal_comma(lines, delimiter, count, decimal):
 def _are_halves(rows):
     """Whether columns are in turn the digits before and behind decimal commas.
 
-    Those behind are without a sign and of one number. That tells them from integers if some of them begin with a zero,
-    or if the others have another number of digits.
+    Those behind have no sign, and in each column one number of digits. That tells them from integers if some of them
+    begin with a zero, or if those before have another number of digits.
     """
     if len(rows[0]) < 6 or len(rows[0]) % 2:
         return False
-    behind = [field for row in rows for field in row[1::2]]
-    # The first column may number the rows.
-    before = [field for row in rows for field in row[2::2]]
-    digits = len(behind[0])
-    if not all(field.isdecimal() and len(field) == digits for field in behind):
-        return False
-    if not all(re.fullmatch(r"[-+]?\d+", field) for field in before):
-        return False
-    return (digits > 1 and any(field[0] == "0" for field in behind)) or any(len(field) != digits for field in before)
+    columns = list(zip(*rows, strict=True))
+    evidence = False
+    for k, (before, behind) in enumerate(zip(columns[::2], columns[1::2], strict=True)):
+        digits = len(behind[0])
+        if not all(field.isdecimal() and len(field) == digits for field in behind):
+            return False
+        if not all(re.fullmatch(r"[-+]?\d+", field) for field in before):
+            return False
+        evidence |= digits > 1 and any(field[0] == "0" for field in behind)
+        # The first column may number the rows.
+        evidence |= k > 0 and any(len(field) != digits for field in before)
+    return evidence
 
 
 def _layout_of_image(path, layout, data):
@@ -341,7 +344,7 @@ def _delimiter(text: str) -> tuple[str | None, bool]:
     """Delimiter of the numbers in a line, and whether these have decimal commas."""
     separators = _QUOTED.sub("q", text).strip()
     delimiter = next((each for each in "\t;," if each in separators), None)
-    by_blanks = text.split()
+    by_blanks = re.split(r",?\s+", text.strip())
     if delimiter == "," and len(by_blanks) > 1 and all(map(_DECIMAL_COMMA.match, by_blanks)):
         raise UnfitTopography(
             "path",
@@ -468,7 +471,8 @@ def without_scales(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] 
     for table, name in ((heights[::-1], "row"), (heights.T[::-1], "column")):
         if _scale(table) is not None:
             raise UnfitTopography(
-                "path", f"has numbers in equal steps in its last {name}, no heights; allowed: heights. Remove the {name}"
+                "path",
+                f"has numbers in equal steps in its last {name}, no heights; allowed: heights. Remove the {name}",
             )
     left_out = [name for name, step in (("row", across), ("column", down)) if step is not None]
     remark = f"first {' and '.join(left_out)} left out: numbers in equal steps, not heights"
@@ -508,7 +512,7 @@ def _resembles(line, others):
     if np.count_nonzero(known) < 3:
         return False
     line, others = line[known], others[:, known]
-    same = np.mean(np.diff(line) * np.diff(others[0]) >= 0)
+    same = np.mean(np.sign(np.diff(line)) == np.sign(np.diff(others[0])))
     return same >= _SAME_SIGN and np.std(line - others[0]) <= _DIFFERENCE * np.std(others[0] - others[1])
 
 

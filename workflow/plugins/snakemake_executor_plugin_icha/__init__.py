@@ -8,19 +8,15 @@ that process cannot be started, run by themselves, as with Snakemake's executor 
 However one of these processes ends, those that it started end with it: Snakemake, the fork server, its forks.
 """
 
-import contextlib
 import json
 import multiprocessing
-import multiprocessing.util
 import os
 import resource
 import runpy
 import signal
 import sys
-import tempfile
 import threading
 import time
-from collections.abc import Iterator
 from importlib.util import find_spec
 from multiprocessing import forkserver
 from multiprocessing.connection import wait
@@ -35,11 +31,6 @@ from snakemake.script import Snakemake
 from icha.support.program import end_with_parent
 
 __all__ = ["Executor", "common_settings"]
-
-# Bytes of the path of a folder that still has room for the path of a socket, of which there are 107.
-_LONGEST = 70
-# What `multiprocessing` takes for the status of a process of which only the fork server knew how it ended.
-_SERVER_LOST = 255
 
 
 class Executor(LocalExecutor):
@@ -65,7 +56,7 @@ class Executor(LocalExecutor):
         if not script or job.threads != 1 or deployed or not self._server_runs():
             return super().run_single_job(job)
         rule, input_, output, params, wildcards, threads, resources, log, benchmark, *_ = self.job_args_and_prepare(job)
-        file = Path(self.workflow.main_snakefile).parent / "workflow/scripts" / PurePath(script).name
+        file = Path(os.path.normpath(Path(str(job.rule.basedir)) / script))
         told = Snakemake(
             input_, output, params, wildcards, threads, resources, log, {}, rule.name, None, str(file.parent)
         )
@@ -75,26 +66,14 @@ class Executor(LocalExecutor):
         """Start the fork server if it does not run; False where that cannot be."""
         if not self._without_server:
             try:
-                with _short_temporary_folder():
-                    # From the thread that lasts as long as the process: the fork server ends with it.
-                    forkserver.ensure_running()
-            except OSError as error:
+                # From the thread that lasts as long as the process: the fork server ends with it.
+                forkserver.ensure_running()
+            except OSError as error:  # for one, the path of temporary files is too long for a socket
                 self._without_server = True
                 self.logger.warning(f"Every job takes some seconds more, for no process can be prepared: {error}.")
         return not self._without_server
 
     def _run_forked(self, *job):
-        status = self._status(*job)
-        if status == _SERVER_LOST:  # and the job with it
-            time.sleep(0.5)  # until the system knows of it, too, and another one is started
-            status = self._status(*job)
-        if status:
-            how = f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
-            self.logger.error(f"{PurePath(job[0]).name} {how}.")
-            raise SpawnedJobError
-
-    def _status(self, *job) -> int:
-        """Exit status of a job that is run in a fork."""
         process = self._processes.Process(target=run_script, args=job, daemon=True)
         try:
             # One at a time, for each of these looks at the ends of all processes.
@@ -103,22 +82,13 @@ class Executor(LocalExecutor):
             wait([process.sentinel])
             with self._turn:
                 process.join()
+            status = process.exitcode
         except (EOFError, ConnectionError):
-            return _SERVER_LOST
-        return process.exitcode
-
-
-@contextlib.contextmanager
-def _short_temporary_folder() -> Iterator[None]:
-    """Have `multiprocessing` put its socket where the path is short, whatever the folder for temporary files."""
-    folders = [tempfile.gettempdir(), os.environ.get("XDG_RUNTIME_DIR", ""), "/tmp", "/dev/shm"]
-    short = [each for each in folders if len(os.fsencode(each)) <= _LONGEST and os.access(each, os.W_OK | os.X_OK)]
-    former, tempfile.tempdir = tempfile.tempdir, short[0] if short else folders[0]
-    try:
-        multiprocessing.util.get_temp_dir()  # which keeps to its first answer
-        yield
-    finally:
-        tempfile.tempdir = former
+            status = 255  # the fork server was killed, and its jobs with it
+        if status:
+            how = f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
+            self.logger.error(f"{PurePath(job[0]).name} {how}.")
+            raise SpawnedJobError
 
 
 def run_script(script: str, told: Snakemake, benchmark: str | None) -> None:
