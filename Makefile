@@ -23,8 +23,8 @@ help:
 	@echo "make validation  run campaign validation (two hours) and write the tables and figures of docs/validation.md"
 	@echo "make hysteresis  run campaign hysteresis (forty minutes) and write the tables and figures of docs/hysteresis.md"
 	@echo "make tamaas  install Tamaas as well, for boundary elements at finite ranges (campaign validation, tests)"
-	@echo "make test    run the tests that one waits for (four minutes): physics, every rule, wrong input"
-	@echo "make test-all  run them and all others: thousands of random cases, kills, resumption, Slurm, browser, deposits"
+	@echo "make test    run the quick tests (three minutes): physics, every rule, wrong input"
+	@echo "make test-all  run them with more random cases, and all others: kills, resumption, Slurm, browser, deposits"
 	@echo "make random-cases  two thousand random runs, of which make test-all has a hundred (another one: SERIES=7)"
 	@echo "make audit   ask whether vulnerabilities of the locked packages are known (part of test-all; needs network)"
 	@echo "make wheel   build the sdist, and from it the wheel, in dist/"
@@ -33,8 +33,7 @@ help:
 	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
 	@echo "make docs    build the documentation as a site in docs/_build/html; broken links within it are errors"
 	@echo "make linkcheck  check the documentation's links to other sites"
-	@echo "make benchmarks  measure ICHA and boundary-element codes (about four hours, and as many for campaign cmc_truth; OPTIONS='--parts start'); docs/benchmarks.md"
-	@echo "make benchmarks-page  write docs/benchmarks.md from what was measured"
+	@echo "make benchmarks  measure ICHA and boundary-element codes (four hours; OPTIONS='--only icha'); docs/benchmarks.md"
 	@echo "make short-range  hold boundary elements in the limit of short range against what is known (ten minutes); docs/short_range.md"
 	@echo "make error-sources  solve variants between the model and boundary elements (half an hour); docs/error_sources.md"
 	@echo "make faults  kill, damage and starve a small campaign (an hour or two, as root); docs/faults.md"
@@ -90,11 +89,13 @@ short-range error-sources: tamaas
 	python -m validation.$(subst -,_,$@) $(OPTIONS)
 
 test: tamaas
-	pytest -n $(CORES) --dist worksteal -m "not slow"
+	pytest -n $(CORES) --dist worksteal -m "not slow" $(THOROUGH)
 
-# Tests of random cases are run again, with more of them. One process more than there are cores, for many tests wait.
+# The quick tests with more random cases, and with what they cover of the physics (pyproject.toml, tool.coverage); then
+# the slow ones, in one process more than there are cores, since many of them wait.
+test-all: THOROUGH = --hypothesis-profile thorough --cov --cov-report=term
 test-all: test audit
-	pytest -n $$(($(CORES) + 1)) --dist loadfile -m "slow or hypothesis" --hypothesis-profile thorough --series $(SERIES)
+	pytest -n $$(($(CORES) + 1)) --dist loadfile -m slow --series $(SERIES)
 
 random-cases: SERIES = 1-20
 random-cases: environment
@@ -141,14 +142,10 @@ linkcheck: environment
 
 benchmarks: tamaas .venv-benchmarks/.installed
 	python benchmarks/run.py $(OPTIONS)
-	python benchmarks/page.py
-
-benchmarks-page: environment
-	python benchmarks/page.py
+	python -m benchmarks.tables
 
 faults: tamaas
-	python -m benchmarks.faults $(OPTIONS)
-	python -m benchmarks.faults.page
+	python -m validation.faults $(OPTIONS)
 
 # The validators have an environment of their own, for some of them need an old jsonschema.
 .venv-validators/.installed: .venv-tools/bin/uv tests/validators/requirements.txt

@@ -24,8 +24,8 @@ def scan(path, **keys):
 
 
 @contextmanager
-def refused(key, words=""):
-    """Within, a file is refused because of a setting, with a message that has these words (a pattern)."""
+def refused(key, words=None):
+    """Within, a file is refused because of a setting, with a message that matches the words, if any are given."""
     with pytest.raises(UnfitTopography, match=words) as raised:
         yield
     assert raised.value.key == key

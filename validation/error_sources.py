@@ -14,7 +14,6 @@ leads from the model to the truth, every link changing one thing:
 What the last link changes is the shape of the summits beyond their paraboloids. Beside the chain stand
 
     independent               Hertz's summits that do not interact;
-    point_forces              without unions, spots acting on each other by their forces alone, F/(pi E* r);
     icha_fine_grid            the model on a grid twice as fine;
     boundary_elements_coarse  boundary elements on a grid half as fine.
 
@@ -150,12 +149,8 @@ def _without_unions(contact, surface, reduced_pressures):
     law, summits = contact.law, contact.asperities
     loads = [p * contact.contact_modulus * surface.rms_slope for p in reduced_pressures]
     yield "independent", (independent_discs(summits, law, p) for p in loads)
-    for name, switch in (
-        ("point_forces", {"point_forces": True}),
-        ("without_unions", {}),
-        ("field_shape", {"field_shape": True}),
-    ):
-        yield name, [discs_apart(summits, law, p, surface.rms_height, **switch) for p in loads]
+    for name, shaped in (("without_unions", False), ("field_shape", True)):
+        yield name, [discs_apart(summits, law, p, surface.rms_height, field_shape=shaped) for p in loads]
 
 
 def _state_at_nodes(state: NodalState) -> State:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
-from icha.figures.legends import legend_below, named_handles
+from icha.figures.looks import legend_below, named_handles
 from icha.figures.style import (
     BLACK,
     BLUE,
@@ -39,7 +39,6 @@ NAMES = {
     "circular_paraboloids": "boundary elements, circular paraboloids",
     "elliptic_paraboloids": "boundary elements, elliptic paraboloids",
     "independent": "Hertz's summits without interaction",
-    "point_forces": "ICHA without unions, interaction by point forces",
     "icha_fine_grid": "ICHA, grid twice as fine (over ICHA)",
     "boundary_elements_coarse": "boundary elements, grid half as fine",
 }
@@ -180,25 +179,23 @@ def _draw_single_spots(ax, error_sources):
     )
     ax.axhline(1, color=GREY, lw=0.8)
     ax.plot(x, ratio, ls="none", marker=".", ms=2.5, color=SKY, zorder=2)
-    if len(x) >= 3 * _BINS:
-        at, median = medians(x, ratio)
-        ax.plot(at, median, color=BLUE, marker="o", label="boundary elements", zorder=4)
-        at, median = medians(x, expected)
-        ax.plot(at, median, color=PURPLE, ls="--", label="fourth-order term", zorder=3)
-        ax.legend(loc="lower right")
-    if len(x):
-        ax.set_ylim(min(0.8, ratio.min()), min(_HIGHEST_RATIO, 1.2 * ratio.max()))
+    for values, look in (
+        (ratio, {"color": BLUE, "marker": "o", "label": "boundary elements", "zorder": 4}),
+        (expected, {"color": PURPLE, "ls": "--", "label": "fourth-order term", "zorder": 3}),
+    ):
+        ax.plot(*medians(x, values), **look)
+    ax.legend(loc="lower right")
+    ax.set_ylim(min(0.8, ratio.min()), min(_HIGHEST_RATIO, 1.2 * ratio.max()))
     ax.set_xlim(left=0)
     ax.set_xlabel(r"radius of the patch  $aq$")
     ax.set_ylabel(r"$A/A_{\mathrm{Hertz}}(F)$")
 
 
-def medians(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def medians(x: np.ndarray, y: np.ndarray) -> tuple[list, list]:
     """Medians of x and y in bins of x with equally many points; a y that is NaN counts as beyond all others."""
     bins = np.array_split(np.argsort(x, kind="stable"), _BINS)
     high = np.where(np.isnan(y), np.inf, y)
-    middle = np.array([np.median(high[part]) for part in bins])
-    return np.array([np.median(x[part]) for part in bins]), np.where(np.isfinite(middle), middle, np.nan)
+    return [np.median(x[part]) for part in bins], [np.median(high[part]) for part in bins]
 
 
 def write(adhesionless: Sequence[xr.Dataset], adhesive: xr.Dataset) -> None:

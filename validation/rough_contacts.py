@@ -65,7 +65,6 @@ def by_cells_per_wave(
                     "reduced_pressure": contact.pressure(state) / (material.contact_modulus * coarse.rms_slope),
                     "area": contact.area_fraction(state),
                     "patches": contact.spot_count(state),
-                    "front_residual": float(state.front_residual),
                 }
             )
     return rows
@@ -132,13 +131,10 @@ def loop(surface: Surface, largest_pressure: float, step: float, material: Mater
     path = Path(reduced_pressures=[largest_pressure], unload=True, max_step=step, snapshots=[])
     unit = material.surface_energy or material.contact_modulus * surface.rms_height
     pressure_unit = material.contact_modulus * surface.rms_slope
-    balance, tension, most, steps = None, 0.0, 0.0, 0
+    most, steps = 0.0, 0
     for waypoint in follow(contact, path, pressure_unit):
         balance, steps = waypoint.balance, steps + 1
-        pressure = contact.pressure(waypoint.state)
         most = max(most, balance.work)
-        if not waypoint.loading:
-            tension = max(tension, -pressure)
     parts = ("jump_in", "jump_off", "coalescence", "load_jump", "unattributed")
     return {
         "grid": surface.grid,
@@ -146,7 +142,6 @@ def loop(surface: Surface, largest_pressure: float, step: float, material: Mater
         "steps": steps,
         "largest_work": most / unit,
         "work": balance.work / unit,
-        "pull_off": tension / pressure_unit,
         "not_closed": (balance.work - balance.lost - contact.stored_energy(waypoint.state)) / unit,
         **{part: getattr(balance, part) / unit for part in parts},
     }
@@ -169,12 +164,9 @@ def without_adhesion(surface: Surface, reduced_pressures: Sequence[float]) -> li
             {
                 "grid": surface.grid,
                 "reduced_pressure": p,
-                "separation": state.separation / surface.rms_height,
                 "separation_error": state.separation / theirs.mean_separation - 1,
                 "gap_error": float(np.sqrt(np.mean((gap - theirs.gap) ** 2))) / surface.rms_height,
-                "area": len(state.cells) / surface.grid**2,
                 "area_error": len(state.cells) / np.count_nonzero(theirs.contact) - 1,
-                "corrected_area_error": contact.area_fraction(state) / perimeter_correction(theirs.contact)[0] - 1,
             }
         )
     return rows

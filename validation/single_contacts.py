@@ -66,7 +66,6 @@ def sphere_there_and_back(
                 "cells": radius / surface.spacing,
                 "area_error": area / (math.pi * radius**2) - 1,
                 "force_error": (force - wanted) / max(abs(wanted), _PULL_OFF),
-                "front_residual": float(state.front_residual),
             }
         )
     return rows
@@ -161,9 +160,9 @@ def sphere_jump_in(grid: int, range_: float = MATERIAL.interaction_range) -> dic
     }
 
 
-def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.0), ratio: float = 2.0) -> list[dict]:
-    """An elliptic paraboloid of radii of curvature 1/sqrt(ratio) and sqrt(ratio), turned by an angle (degrees)."""
-    radii = (math.sqrt(ratio), 1 / math.sqrt(ratio))
+def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.0)) -> list[dict]:
+    """An elliptic paraboloid of radii of curvature sqrt(1/2) and sqrt(2), turned by an angle (degrees)."""
+    radii = (math.sqrt(2), math.sqrt(1 / 2))
     surface, top = bump(grid, _PERIOD, (0.3, 0.1), radii, math.radians(angle))
     contact = BoundaryElements.of(surface, MATERIAL)
     start = SphereInCell(MATERIAL, 1.0, _PERIOD).contact_radius(approaches[0])
@@ -224,9 +223,7 @@ def row_of_strips(grid: int, half_width: float) -> dict:
     }
 
 
-def sinusoid(
-    grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1, 1.3), back: bool = True
-) -> list[dict]:
+def sinusoid(grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1, 1.3)) -> list[dict]:
     """A wave in one dimension from a narrow to a wide contact and back, at the separations of given psi = pi a/L.
 
     alpha : Johnson's parameter. Errors: of the width, of the pressure over the full contact's or its own if larger, and
@@ -243,7 +240,7 @@ def sinusoid(
     state = contact.released(start, float(exact.separation(psi[0])))
     unit = exact.full_contact_pressure
     rows = []
-    for branch, one in (*(("on", one) for one in psi), *(("off", one) for one in psi[-2::-1] if back)):
+    for branch, one in (*(("on", one) for one in psi), *(("off", one) for one in psi[-2::-1])):
         state = contact.equilibrium(state, float(exact.separation(one)))
         wanted = float(exact.pressure(one))
         rows.append(
@@ -292,22 +289,18 @@ def crack(grid: int, radii: Sequence[float] = (0.2, 0.16, 0.12), amplitude: floa
     return rows
 
 
-def pair(
-    grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0.5, -0.5), offset=(0.0, 0.0)
-) -> list[dict]:
+def pair(grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0.5, -0.5)) -> list[dict]:
     """Two equal spheres beside each other, against the model of asperities, which is exact where they are far apart.
 
-    asymmetry: largest difference between the fractions of the two spots, mirrored (with no offset).
+    asymmetry: largest difference between the fractions of the two spots, mirrored.
     """
     period = 2 * _PERIOD
-    surface, top = two_bumps(grid, period, distance, offset)
+    surface, top = two_bumps(grid, period, distance)
     contact = BoundaryElements.of(surface, MATERIAL)
     asperities = InteractingAsperities(JKR(MATERIAL), find_summits(surface), surface.rms_height)
     radius = float(JKR(MATERIAL).contact_radius(approaches[0], 1.0))
     half = distance / 2 / surface.spacing
-    region = disc(grid, period, radius, (offset[0] - half, offset[1])) | disc(
-        grid, period, radius, (offset[0] + half, offset[1])
-    )
+    region = disc(grid, period, radius, (-half, 0.0)) | disc(grid, period, radius, (half, 0.0))
     state, spots = contact.released(region, top - approaches[0]), asperities.untouched()
     rows = []
     for approach in approaches:
@@ -321,7 +314,6 @@ def pair(
         rows.append(
             {
                 "grid": grid,
-                "distance": distance,
                 "approach": approach,
                 "spots": contact.spot_count(state),
                 "asymmetry": float(np.abs(mirrored - fraction).max()),

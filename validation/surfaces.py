@@ -39,12 +39,12 @@ def bump(
     return Surface(heights, period), float(-heights.mean())
 
 
-def two_bumps(grid: int, period: float, distance: float, offset=(0.0, 0.0)) -> tuple[Surface, float]:
+def two_bumps(grid: int, period: float, distance: float) -> tuple[Surface, float]:
     """The upper envelope of two paraboloids of radius 1 m side by side along x, and the height of their summits, m."""
     half = distance / (2 * period / grid)
     heights = []
     for side in (-half, half):
-        y, x = _from_centre(grid, period / grid, (grid // 2 + offset[0] + side, grid // 2 + offset[1]))
+        y, x = _from_centre(grid, period / grid, (grid // 2 + side, grid // 2))
         heights.append(-(x**2 + y**2) / 2)
     envelope = np.maximum(*heights)
     return Surface(envelope, period), float(-envelope.mean())

@@ -68,7 +68,6 @@ def discs_apart(
     pressure: float,
     rms_height: float,
     *,
-    point_forces: bool = False,
     field_shape: bool = False,
 ) -> Discs:
     """The model without unions, at a nominal pressure in Pa, without adhesion.
@@ -78,7 +77,6 @@ def discs_apart(
     Parameters
     ----------
     rms_height : m, the unit of the equilibrium error.
-    point_forces : spots act on each other by their forces alone.
     field_shape : the slope of the others' displacement across a spot raises its summit, the curvature sharpens it.
 
     Raises
@@ -96,7 +94,7 @@ def discs_apart(
         if half_space is None:
             half_space = HalfSpace.at(position, summits.period, law.material.contact_modulus)
         height = (summits.height + lift)[part]
-        problem = _Apart.around(law, half_space, height, R[part], pressure, rms_height, separation, point_forces)
+        problem = _Apart.around(law, half_space, height, R[part], pressure, rms_height, separation)
         approach, separation, error = problem.solve(approach, separation)
         a = law.contact_radius(approach, R[part])
         touching = np.flatnonzero(a > 0)
@@ -140,16 +138,14 @@ class _Apart:
     R: np.ndarray
     pressure: float
     rms_height: float
-    interaction: Interaction | None
+    interaction: Interaction
 
     @classmethod
-    def around(cls, law, half_space, height, R, pressure, rms_height, separation, point_forces):
+    def around(cls, law, half_space, height, R, pressure, rms_height, separation):
         """The equations for separations not much below the given one."""
-        interaction = None
-        if not point_forces:
-            # Windows that stay, or the equations would jump: as wide as the radii can be.
-            largest = law.contact_radius(height - separation + _FALL * rms_height, R)
-            interaction = Interaction.between(law, half_space, R, largest)
+        # Windows that stay, or the equations would jump: as wide as the radii can be.
+        largest = law.contact_radius(height - separation + _FALL * rms_height, R)
+        interaction = Interaction.between(law, half_space, R, largest)
         return cls(law, half_space, height, R, pressure, rms_height, interaction)
 
     def solve(self, approach, separation):
@@ -178,10 +174,7 @@ class _Apart:
         """Errors of the approaches in h_rms, and the load's relative error."""
         a = self.law.contact_radius(approach, self.R)
         force = self.law.force(a, self.R)
-        if self.interaction is None:
-            w = _by_forces(self.half_space, force)
-        else:
-            w = self.interaction.displacement(a)
+        w = self.interaction.displacement(a)
         nominal = self.half_space.ewald.period**2 * self.pressure
         return (approach + w + separation - self.height) / self.rms_height, np.sum(force) / nominal - 1
 
@@ -190,31 +183,17 @@ class _Apart:
         growth = np.divide(self.R, 2 * a, out=np.zeros(n), where=a > 0)
         stiffness = self.law.force_derivative(a, self.R) * growth
         nominal = self.half_space.ewald.period**2 * self.pressure
-        if self.interaction is None:
-
-            def spread(x):
-                return _by_forces(self.half_space, stiffness * x)
-
-        else:
-            tangent = self.interaction.tangent(a)
-
-            def spread(x):
-                return tangent(growth * x)
+        tangent = self.interaction.tangent(a)
 
         def apply(y):  # lengths in h_rms
-            return np.append(y[:n] + spread(y[:n]) + y[n], np.sum(stiffness * y[:n]) * self.rms_height / nominal)
+            return np.append(
+                y[:n] + tangent(growth * y[:n]) + y[n], np.sum(stiffness * y[:n]) * self.rms_height / nominal
+            )
 
         operator = LinearOperator((n + 1, n + 1), matvec=apply, dtype=float)
         size = min(n + 1, _KRYLOV)
         x, _ = gmres(operator, -np.append(*point), rtol=_LINEAR_TOLERANCE, atol=0.0, restart=size, maxiter=4)
         return x * self.rms_height
-
-
-def _by_forces(half_space, force):
-    """Displacement (n,) in m at the half-space's points by point forces (n,) in N at the same points."""
-    ewald, points = half_space.ewald, half_space.points
-    w = ewald.smooth(points, points, force) + half_space.near[0] @ force + half_space.near_transposed[0] @ force
-    return w - ewald.own_smooth[0] * force - ewald.mean * np.sum(force)
 
 
 def _shape_of_field(law, period, discs):

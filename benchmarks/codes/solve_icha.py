@@ -1,19 +1,33 @@
 """icha: the whole sweep, from the heights to area and separation at every stop; bare numbers, as from the others.
 
 `icha.simulate` does the same and makes a labelled dataset of it, whose libraries take a second and a half to import.
+`icha-boundary-elements` are ICHA's own boundary elements in the limit of short range.
 """
+
+import sys
 
 from task import Task
 from threadpoolctl import threadpool_limits
 
 import icha
-from icha.asperity.jkr import JKR
-from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
-from icha.surfaces.summits import find_summits
+
+
+def contact_of(code, surface, material):
+    """The contact by one of the two models."""
+    if code == "icha-boundary-elements":
+        from icha.boundary_elements.contact import BoundaryElements
+
+        return BoundaryElements.of(surface, material)
+    from icha.asperity.jkr import JKR
+    from icha.equilibrium.interacting_asperities import InteractingAsperities
+    from icha.surfaces.summits import find_summits
+
+    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
 
 
 def main():
+    code = sys.argv.pop(1)
     task = Task.from_command_line()
     unit = task.contact_modulus * task.rms_slope
     if "mean_gaps" in task.settings:
@@ -24,15 +38,14 @@ def main():
     surface = icha.Surface(task.heights, task.period)
     material = icha.Material(task.contact_modulus, task.surface_energy, task.interaction_range)
     with threadpool_limits(1):
-        contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+        contact = contact_of(code, surface, material)
         for waypoint in follow(contact, path, unit):
             state = waypoint.state
             task.answer_stop(
                 pressure=contact.pressure(state),
                 area_fraction=contact.area_fraction(state),
                 mean_gap=state.separation,
-                residual=state.residual,
-                spots=len(state.spots),
+                spots=contact.spot_count(state),
             )
 
 

@@ -34,14 +34,7 @@ _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
 
 # What a run and a solution must share for their difference to be the model's error, and to which relative accuracy.
-SHARED = (
-    "period",
-    "rms_height",
-    "rms_slope",
-    "contact_modulus",
-    "surface_energy",
-    "interaction_range",
-)
+SHARED = ("period", "rms_height", "rms_slope", "contact_modulus", "surface_energy", "interaction_range")
 _ROUNDING = 1e-6
 # From this part on a cell of a contact map is in contact.
 _HALF = 0.5
@@ -92,9 +85,27 @@ def model_error(
         Naming entry, run and pressure: if a run is not there, has no snapshot at that pressure, or is another contact
         than the solution's; if a contact lacks a state that others of its entry have, or has one twice.
     """
-    select = cache(lambda labels: select_run(campaign, labels))
-    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     origins: dict[str, list[dict[str, str]]] = {}
+    select = cache(lambda labels: select_run(campaign, labels))
+    entries = _short_range_entries(select, runs, origins)
+    short_range = set(entries)
+    for entry, states in _finite_range_entries(select, solutions, origins).items():
+        entries[entry] = entries.get(entry, {}) | states
+    if not entries:
+        raise ValueError("a model error needs at least one run or solution by boundary elements")
+    groups = {}
+    for entry, states in entries.items():
+        truth = SHORT_RANGE if entry in short_range else FINITE_RANGE
+        title = f"{_TITLE}, {'study' if entry in short_range else 'entry'} {entry}"
+        described = collected(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
+        groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(described)
+    root = collected(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
+
+
+def _short_range_entries(select, runs, origins):
+    """States of every study, beside runs in the limit of a short range; adds to `origins` attributes of the runs."""
+    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
         run = select(labels._replace(model=ASPERITIES))
@@ -104,8 +115,12 @@ def model_error(
         except ValueError as error:
             raise ValueError(f"{labels}: {error}") from None
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
-    entries = {study: _with_all_loads(states) for study, states in entries.items() if states}
-    short_range = set(entries)
+    return {study: _with_all_loads(states) for study, states in entries.items() if states}
+
+
+def _finite_range_entries(select, solutions, origins):
+    """States of every entry, beside solutions at finite ranges; adds to `origins` attributes of the runs."""
+    entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)
         states = entries.setdefault(labels.entry, {})
@@ -117,23 +132,14 @@ def model_error(
                 states[labels] = None
                 continue
             at = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
-            if not np.isclose(float(solution["target_reduced_pressure"]), labels.reduced_pressure, rtol=1e-9):
-                asked = float(solution["target_reduced_pressure"])
+            asked = float(solution["target_reduced_pressure"])
+            if not np.isclose(asked, labels.reduced_pressure, rtol=1e-9):
                 raise ValueError(f"the solution is one of reduced pressure {asked:g}")
             states[labels] = compare_state(run, at, solution)
         except ValueError as error:
             raise ValueError(f"{_name(labels)}: {error}") from None
         origins.setdefault(labels.entry, []).extend((run.attrs, solution.attrs))
-    if not entries:
-        raise ValueError("a model error needs at least one run or solution by boundary elements")
-    groups = {}
-    for entry, states in entries.items():
-        truth = SHORT_RANGE if entry in short_range else FINITE_RANGE
-        title = f"{_TITLE}, {'study' if entry in short_range else 'entry'} {entry}"
-        described = collected(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
-        groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(described)
-    root = collected(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
-    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
+    return entries
 
 
 def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
@@ -237,15 +243,14 @@ def _shapes(run, snapshot, state, solution):
     """How far distributions and contact map of a snapshot and a solution are apart, and what the solution has."""
     spots = contact_of_spots(run, snapshot, solution.sizes["x"])
     contact = solution["contact"].transpose("y", "x").values == 1
-    height = float(solution["rms_height"])
+    height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     gaps = solution["gap_density"].values * height
     # The last bin of a deep surface reaches farther than that of the others.
     gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
-        "gap_distribution_distance": gap_distribution_distance(state, solution) / height,
-        "pressure_distribution_distance": pressure_distribution_distance(state, solution)
-        / float(state["nominal_pressure"]),
+        "gap_distribution_distance": distribution_distance("gap", state, solution) / height,
+        "pressure_distribution_distance": distribution_distance("pressure", state, solution) / nominal,
         "jaccard": jaccard(spots, contact),
         "shared_of_icha": shared(spots, contact),
         "shared_of_boundary_elements": shared(contact, spots),
@@ -309,41 +314,29 @@ def shared(one: np.ndarray, other: np.ndarray) -> float:
     return np.count_nonzero(one & other) / own if own else 1.0
 
 
-def gap_distribution_distance(one: xr.Dataset, other: xr.Dataset) -> float:
-    """First Wasserstein distance between two P(u) over the nominal area, m.
+def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> float:
+    """First Wasserstein distance between two P(u) in m, or P(p) in Pa, over the nominal area.
 
-    It is the area between the cumulative distributions. Contact, and what overlaps outside it, has gap zero; a bin
-    stands at the geometric mean of its edges.
+    It is the area between the cumulative distributions. Contact, and what overlaps outside it, has gap zero; a bin of
+    gaps stands at the geometric mean of its edges. The area out of contact has pressure zero, whatever attracts there;
+    a bin of pressures stands at its mean pressure.
+
+    Parameters
+    ----------
+    quantity : "gap" or "pressure".
+    one, other : states with the densities and their bins.
     """
-    (u, weights), (v, other_weights) = _gaps(one), _gaps(other)
+    (u, weights), (v, other_weights) = (_values_and_parts(quantity, state) for state in (one, other))
     return float(wasserstein_distance(u, v, weights, other_weights))
 
 
-def pressure_distribution_distance(one: xr.Dataset, other: xr.Dataset) -> float:
-    """First Wasserstein distance between two P(p) over the nominal area, Pa.
-
-    The area out of contact has pressure zero, whatever attracts there; a bin stands at its mean pressure.
-    """
-    (p, weights), (q, other_weights) = _pressures(one), _pressures(other)
-    return float(wasserstein_distance(p, q, weights, other_weights))
-
-
-def _gaps(state):
-    """Gaps, m, and the parts of the nominal area that have them: contact and overlap first, then the bins."""
-    edges = state["gap_bin_edges"].values
-    content = state["gap_density"].values * np.diff(edges)
-    return np.concatenate([[0.0], np.sqrt(edges[1:] * edges[:-1])]), _whole(content)
-
-
-def _pressures(state):
-    """Pressures, Pa, and the parts of the nominal area that have them: what is out of contact first, then the bins."""
-    content = state["pressure_density"].values * np.diff(state["pressure_bin_edges"].values)
-    return np.concatenate([[0.0], state["pressure_bin_mean"].values]), _whole(content)
-
-
-def _whole(content):
-    """The bins' content with the rest of the nominal area before it."""
-    return np.concatenate([[max(1.0 - float(content.sum()), 0.0)], content])
+def _values_and_parts(quantity, state):
+    """Values, and the parts of the nominal area that have them; zero, for the rest of the area, comes first."""
+    edges = state[f"{quantity}_bin_edges"].values
+    content = state[f"{quantity}_density"].values * np.diff(edges)
+    values = np.sqrt(edges[1:] * edges[:-1]) if quantity == "gap" else state["pressure_bin_mean"].values
+    rest = max(1.0 - float(content.sum()), 0.0)
+    return np.concatenate([[0.0], values]), np.concatenate([[rest], content])
 
 
 def _name(labels):

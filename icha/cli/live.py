@@ -23,6 +23,22 @@ _TARGETS = ("all", "surfaces", "runs", "references", "dataset", "figures", "repo
 _PRIOR = 5.0
 # Expected of a job of which nothing is known, in core-seconds: it writes a few lines.
 DEFAULT_SECONDS = 0.1
+# By what their files begin with, below the folder of results; the first that fits.
+_RULES = {
+    "surfaces/": "surface",
+    "runs/": "run",
+    "references/boundary_elements/": "boundary_elements",
+    "references/loops/": "boundary_element_loop",
+    "references/": "reference",
+    "dataset/": "campaign_dataset",
+    MODEL_ERROR: "model_error",
+    "aggregated/": "comparison",
+    CHECKS: "checks",
+    "figures/": "figure",
+    REPORT: "report_page",
+}
+# Running jobs that are shown.
+_MOST_JOBS = 8
 
 
 @dataclass(frozen=True)
@@ -152,22 +168,6 @@ class Watch:
         return work
 
 
-# By what their files begin with, below the folder of results; the first that fits.
-_RULES = {
-    "surfaces/": "surface",
-    "runs/": "run",
-    "references/boundary_elements/": "boundary_elements",
-    "references/loops/": "boundary_element_loop",
-    "references/": "reference",
-    "dataset/": "campaign_dataset",
-    MODEL_ERROR: "model_error",
-    "aggregated/": "comparison",
-    CHECKS: "checks",
-    "figures/": "figure",
-    REPORT: "report_page",
-}
-
-
 def rule_of(output: str) -> str:
     """The rule whose job makes a file under `results/<campaign>/`."""
     inside = "/".join(Path(output).parts[2:])
@@ -210,10 +210,6 @@ def last_line(job: Job, folder: Path) -> str:
         said = [line for line in lines[:-1] if line.strip()]
         return printable(said[-1].strip()) if said else ""
     return ""
-
-
-# Running jobs that are shown.
-_MOST_JOBS = 8
 
 
 class LiveView:

@@ -14,6 +14,24 @@ from icha.support.in_words import printable_lines
 from icha.support.input_files import flaw_of_path
 from icha.support.program import own_workflow
 
+Config = Annotated[
+    str | None,
+    typer.Argument(help="Configuration file, or name of a campaign. Left out: config/config.yaml.", show_default=False),
+]
+Anyway = Annotated[
+    bool, typer.Option("--anyway", help="Run even if more memory or disk is expected to be needed than there is.")
+]
+Large = Annotated[
+    bool,
+    typer.Option(
+        "--large", help="Accept a deposit with more files, or a zip that unpacks to more, than is good from a stranger."
+    ),
+]
+CAMPAIGNS = Path("config/campaigns")
+DEFAULT = Path("config/config.yaml")
+# Exit statuses.
+FAILED, WRONG = 1, 2
+
 
 def say(text: object = "", *, err: bool = False, **style) -> None:
     """Print text, to the error output if `err`; `style` is that of `typer.style`: `fg="red"`, `bold=True`."""
@@ -56,10 +74,6 @@ def core_count(cores: str | None) -> int:
     return int(cores) if cores else 2
 
 
-Config = Annotated[
-    str | None,
-    typer.Argument(help="Configuration file, or name of a campaign. Left out: config/config.yaml.", show_default=False),
-]
 Cores = Annotated[
     str | None,
     typer.Option("--cores", "-c", help="Cores to use, or `all`. Left out: 2.", callback=_cores, show_default=False),
@@ -74,21 +88,6 @@ Folder = Annotated[
         show_default=False,
     ),
 ]
-Anyway = Annotated[
-    bool, typer.Option("--anyway", help="Run even if more memory or disk is expected to be needed than there is.")
-]
-Large = Annotated[
-    bool,
-    typer.Option(
-        "--large", help="Accept a deposit with more files, or a zip that unpacks to more, than is good from a stranger."
-    ),
-]
-
-
-CAMPAIGNS = Path("config/campaigns")
-DEFAULT = Path("config/config.yaml")
-# Exit statuses.
-FAILED, WRONG = 1, 2
 
 
 class Mistake(Exception):

@@ -16,6 +16,12 @@ from icha.support.input_files import flaw_of_path
 PICTURES = (".png", ".pdf", ".svg")
 # A few per cent of filled points do no harm; the documentation says "measure again" for more.
 MANY_FILLED = 0.05
+# What stands in the place of what is left to fill in while the rest is checked, in SI units and in a configuration.
+_GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
+_GUESSED = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
+_EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
+# Bytes that show whether anything is in a file.
+_BEGINNING = 2**16
 
 
 def check_picture(path: Path | None) -> None:
@@ -37,6 +43,7 @@ def about_scan(name: str, scan, *, to_scale: bool = True, by_patches: bool = Fal
     filled = f"{points} had no height and {'was' if scan.filled == 1 else 'were'} filled" if scan.filled else ""
     taken = f", `data: {printable(scan.data)}` of several" if scan.data else ""
     yield f"{name}: read as {scan.format}{taken}, {filled or 'no point is missing'}"
+    yield f"{name}: {scan.reading.partition(', ')[2]}"
     if scan.filled:
         yield f"{name}: {in_words.share(scan.filled, scan.points)} of the points are filled"
     if scan.filled > MANY_FILLED * scan.points:
@@ -161,14 +168,6 @@ def _short(length):
     from icha.figures.style import quantity
 
     return quantity(float(f"{length:.2g}"), "m")
-
-
-# What stands in the place of what is left to fill in while the rest is checked, in SI units and in a configuration.
-_GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
-_GUESSED = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
-_EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
-# Bytes that show whether anything is in a file.
-_BEGINNING = 2**16
 
 
 class MeasuredSection(NamedTuple):

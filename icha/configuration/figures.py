@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
+from pydantic import AfterValidator, Field, create_model, model_validator
 
 from icha.datasets.results import ResultFiles
 from icha.figures.declaration import Campaign, FigureOptions, Inputs
@@ -28,6 +28,14 @@ def _drawable(value: str) -> str:
         allowed = r"allowed: formulas between two $ as matplotlib reads them, or \$ for the sign"
         raise ValueError(f"holds a formula that cannot be drawn ({last}); {allowed}") from None
     return value
+
+
+def _factor(unit: str, si_unit: str) -> float | None:
+    """Factor from a unit to an SI unit; None if it is no such unit."""
+    try:
+        return float(conversion_factor(unit, si_unit))
+    except ValueError:
+        return None
 
 
 class Column(Section):
@@ -56,54 +64,29 @@ class Measurement(Section):
     material: Name | None = Field(default=None, description="Material that was measured; a load in Pa needs it.")
     rms_slope: Positive | None = Field(default=None, description="Rms slope that was measured; a load in Pa needs it.")
 
-    @field_validator("load")
-    @classmethod
-    def _load_is_ratio_or_pressure(cls, value):
-        for si_unit in ("1", "Pa"):
-            try:
-                conversion_factor(value.unit, si_unit)
-                return value
-            except ValueError:
-                pass
-        raise ValueError(f"unit {value.unit!r}; allowed: '1' or a unit of pressure, such as 'kPa'")
-
-    @field_validator("area")
-    @classmethod
-    def _area_is_ratio(cls, value):
-        try:
-            conversion_factor(value.unit, "1")
-        except ValueError as error:
-            raise ValueError(f"unit: {error}; allowed: '1' or 'percent'") from None
-        return value
-
     @property
     def load_is_pressure(self) -> bool:
         """Whether the load column holds nominal pressures."""
-        try:
-            conversion_factor(self.load.unit, "1")
-        except ValueError:
-            return True
-        return False
+        return _factor(self.load.unit, "1") is None
 
     @property
     def columns(self) -> dict[str, float]:
         """Headings of the columns of load and area, and the factors that turn them into SI units."""
-        load = conversion_factor(self.load.unit, "Pa" if self.load_is_pressure else "1")
-        area = conversion_factor(self.area.unit, "1")
-        return {self.load.column: float(load), self.area.column: float(area)}
-
-    @field_validator("area")
-    @classmethod
-    def _columns_differ(cls, value, info):
-        if "load" in info.data and info.data["load"].column == value.column:
-            raise ValueError(f"column {value.column!r} is that of the load; allowed: another one")
-        return value
+        load = _factor(self.load.unit, "Pa" if self.load_is_pressure else "1")
+        return {self.load.column: load, self.area.column: _factor(self.area.unit, "1")}
 
     @model_validator(mode="after")
-    def _pressure_can_be_reduced(self):
+    def _columns_can_be_reduced(self):
+        load, area = self.load.unit, self.area.unit
+        if self.load_is_pressure and _factor(load, "Pa") is None:
+            raise ValueError(f"load: unit {load!r}; allowed: '1' or a unit of pressure, such as 'kPa'")
+        if _factor(area, "1") is None:
+            raise ValueError(f"area: unit {area!r}; allowed: '1' or 'percent'")
+        if self.load.column == self.area.column:
+            raise ValueError(f"area: column {self.area.column!r} is that of the load; allowed: another one")
         if self.load_is_pressure and (self.material is None or self.rms_slope is None):
             raise ValueError(
-                f"load in {self.load.unit!r} without material and rms_slope; allowed: both given, or loads of unit '1'"
+                f"load in {load!r} without material and rms_slope; allowed: both given, or loads of unit '1'"
             )
         return self
 

@@ -171,17 +171,22 @@ def merged(content: Mapping, overrides: Mapping) -> dict:
     return result
 
 
+def _sections_with_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, dict]]:
+    """Sections with their defaults and entries, where both are mappings; the model words what is not."""
+    defaults = content.get("defaults")
+    for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
+        given, entries = defaults.get(section), content.get(section)
+        if isinstance(given, Mapping) and isinstance(entries, Mapping):
+            yield section, given, entries
+
+
 def with_defaults(content: Mapping) -> dict:
     """`content` with the values of its section `defaults` in the entries that do not give their own.
 
     Of the defaults of surfaces an entry takes those that its kind has.
     """
     result = deepcopy(dict(content))
-    defaults = result.get("defaults")
-    for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
-        given, entries = defaults.get(section), result.get(section)
-        if not isinstance(given, Mapping) or not isinstance(entries, Mapping):
-            continue  # an error, which the model words
+    for section, given, entries in _sections_with_defaults(result):
         for name, entry in entries.items():
             if not isinstance(entry, Mapping | None):
                 continue
@@ -194,10 +199,8 @@ def with_defaults(content: Mapping) -> dict:
 
 def excessive_defaults(written: Mapping) -> Iterator[Problem]:
     """Sections of defaults that would be more than half a million values, written out in all entries."""
-    defaults = written.get("defaults")
-    for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
-        entries = written.get(section)
-        count = _values_in(defaults.get(section)) * (len(entries) if isinstance(entries, Mapping) else 0)
+    for section, given, entries in _sections_with_defaults(written):
+        count = _values_in(given) * len(entries)
         if count > _MOST_DEFAULTS:
             reason = f"would be {count} values, written out in all {section}; allowed: {_MOST_DEFAULTS} at most"
             yield ("defaults", section), NOTHING, reason
@@ -218,13 +221,10 @@ def _of_other_kinds(kind: str) -> set[str]:
 
 def place_in_defaults(location: tuple, written: Mapping) -> tuple:
     """Where the value at `location` was written: in its entry, or in the defaults of its section."""
-    if len(location) < 3 or location[0] not in Defaults.model_fields:
-        return location
-    section, name, key = location[:3]
-    given = written.get("defaults")
-    given = given.get(section) if isinstance(given, Mapping) else None
-    entries = written.get(section)
-    own = (entries.get(name) or {}) if isinstance(entries, Mapping) else {}
-    if isinstance(given, Mapping) and key in given and isinstance(own, Mapping) and key not in own:
-        return ("defaults", section, *location[2:])
+    for section, given, entries in _sections_with_defaults(written):
+        if len(location) > 2 and location[0] == section:
+            _, name, key = location[:3]
+            own = entries.get(name) or {}
+            if key in given and isinstance(own, Mapping) and key not in own:
+                return ("defaults", section, *location[2:])
     return location

@@ -15,6 +15,9 @@ from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOM
 from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN
 
+# What the dataset of a campaign says of a run.
+_OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
+
 
 def campaign_tree(
     runs: Iterable[tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]],
@@ -127,10 +130,6 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     if "applicability" in study.variables:  # which campaigns of earlier versions lack
         attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
     return variables, attrs
-
-
-# What the dataset of a campaign says of a run.
-_OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
 
 
 def _own(study, dim, place):

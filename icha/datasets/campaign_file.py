@@ -47,6 +47,9 @@ _LAYOUT = (
     "along that dimension each belongs, from 0; those that agree in all of them are of one snapshot of one run."
 )
 _OWN_SLOPES = {"comment": "each surface has slopes of its own, along the dimension rms_slope in ascending order"}
+# Of what runs share, values at so many places are kept at most.
+_LATEST = 256
+_STUDIES = "The runs of every study, a group for each."
 
 
 class Column(NamedTuple):
@@ -231,11 +234,6 @@ def _define_of_campaign(group, study, storage, described):
                 options |= {"fill_value": FLOAT_FILL}
                 numbers = np.nan_to_num(numbers, nan=FLOAT_FILL)
         yield define_numbers(group, name, dims, numbers.dtype, attributes, **options), numbers
-
-
-# Of what runs share, values at so many places are kept at most.
-_LATEST = 256
-_STUDIES = "The runs of every study, a group for each."
 
 
 def write_campaign(

@@ -23,6 +23,12 @@ from icha.datasets.variables.run import CELLS
 from icha.datasets.variables.terms import INFINITE
 from icha.support.atomic_files import whole_file
 
+FLOAT_FILL = 9.969209968386869e36
+INTEGER_FILL = -(2**31) + 1
+# How xarray marks text that is kept as characters. Every netCDF tool reads those, and they compress, unlike strings of
+# variable length.
+TEXT = {"_Encoding": "utf-8"}
+
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
     """Write a dataset or a tree of datasets to the netCDF-4 file `path`.
@@ -167,13 +173,6 @@ def check_is_run(variables: Container[Hashable], path: str | os.PathLike) -> Non
     for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
         if name not in variables:
             raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")
-
-
-FLOAT_FILL = 9.969209968386869e36
-INTEGER_FILL = -(2**31) + 1
-# How xarray marks text that is kept as characters. Every netCDF tool reads those, and they compress, unlike strings of
-# variable length.
-TEXT = {"_Encoding": "utf-8"}
 
 
 def is_text(dtype: np.dtype) -> bool:

@@ -31,6 +31,24 @@ _OTHERS = {
 
 # A number of the identities of the format may be off by rounding.
 _ROUNDING = 1e-9
+# Dimensions of every variable of a run in a study of a campaign dataset: those of the run are added.
+DESIGN = LABELS
+# Values asked for have the unit of what is asked for, where that is the same of all.
+_UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))
+# Global attributes. Those of a campaign are written by the workflow, not by `icha.simulate`.
+_EVERYWHERE = ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level")
+ATTRIBUTES = {
+    RUN: (*_EVERYWHERE, "references", "contact_model"),
+    SURFACE: _EVERYWHERE,
+    CAMPAIGN: (*_EVERYWHERE, "references", "campaign", "config_sha256", "license"),
+}
+IN_CAMPAIGN = ("campaign", "study", "config_sha256", "license")
+_REFUSED_ATTRIBUTES = ("date_created", "date_modified", "date_issued", "creator_email", "user", "host", "hostname")
+# A campaign dataset may name its makers, as a publication does.
+_MAKERS = ("creator_name", "creator_type", "creator_url", "creator_institution")
+_TIME = re.compile(r"\d{4}-\d\d|\d:\d\d")
+_BRANCHES = ("loading", "unloading")
+_WORDS = ("branch", "step_kind")
 
 
 class UnknownFile(ValueError):
@@ -59,29 +77,9 @@ def _promised() -> dict[str, list[Promise]]:
 
 
 PROMISED = _promised()
-# Dimensions of every variable of a run in a study of a campaign dataset: those of the run are added.
-DESIGN = LABELS
 _OF_STUDY = [Promise(name, DESIGN, "1", "") for name in ("status", "step_count", "failure")] + [
     each._replace(dims=(*DESIGN, "step")) for each in PROMISED[RUN] if each.dims == ("step",) and not each.condition
 ]
-
-# Values asked for have the unit of what is asked for, where that is the same of all.
-_UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))
-
-# Global attributes. Those of a campaign are written by the workflow, not by `icha.simulate`.
-_EVERYWHERE = ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level")
-ATTRIBUTES = {
-    RUN: (*_EVERYWHERE, "references", "contact_model"),
-    SURFACE: _EVERYWHERE,
-    CAMPAIGN: (*_EVERYWHERE, "references", "campaign", "config_sha256", "license"),
-}
-IN_CAMPAIGN = ("campaign", "study", "config_sha256", "license")
-_REFUSED_ATTRIBUTES = ("date_created", "date_modified", "date_issued", "creator_email", "user", "host", "hostname")
-# A campaign dataset may name its makers, as a publication does.
-_MAKERS = ("creator_name", "creator_type", "creator_url", "creator_institution")
-_TIME = re.compile(r"\d{4}-\d\d|\d:\d\d")
-_BRANCHES = ("loading", "unloading")
-_WORDS = ("branch", "step_kind")
 
 
 def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:

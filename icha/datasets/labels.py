@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 RUN = "{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}"
 CONTACT = "{entry}/{surface}/seed{seed}/slope{slope}/{material}"
 SOLUTION = CONTACT + "/p{pressure}"
+_NUMBERS = {"rms_slope": "slope", "reduced_pressure": "pressure"}
+# Slopes that differ by less than this part are the same.
+_SAME_SLOPE = 1e-9
 
 
 def model_folder(model: str) -> str:
@@ -94,9 +97,6 @@ class SolutionLabels(NamedTuple):
         return self.path
 
 
-_NUMBERS = {"rms_slope": "slope", "reduced_pressure": "pressure"}
-
-
 def parts(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
     """What stands in the braces of a path."""
     found = {
@@ -109,10 +109,6 @@ def parts(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
 def number_label(value: float) -> str:
     """The shortest text that reads back as `value`: 0.2 is `0.2`, 1.0 is `1`."""
     return repr(float(value)).removesuffix(".0")
-
-
-# Slopes that differ by less than this part are the same.
-_SAME_SLOPE = 1e-9
 
 
 def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:

@@ -23,6 +23,14 @@ EXPLORER = "explore.html"
 RUN_TIMES = "run_times.tsv"
 CONFIGURATION = "config.used.yaml"
 DEPOSIT = "publish/{campaign}-{version}"
+# As measured (docs/reference/dataset.md, "How files are kept"): smaller arrays lose by being cut into chunks what
+# compression gains.
+LEAST_COMPRESSED = 1024
+# Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
+COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
+COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
+# Bytes of an array of a campaign dataset beyond which it is not read as a whole.
+LEFT_IN_FILE = 2**26
 
 
 @dataclass(frozen=True)
@@ -50,14 +58,3 @@ def job_file(path: str, kind: str, ending: str) -> str:
     # Kinds of references have their own folders; the theories of the surfaces have none.
     job = rest if folder == "references" and "/" in rest else path
     return f"{kind}/{job.rpartition('.')[0]}{ending}"
-
-
-# As measured by benchmarks/storage.py (docs/reference/dataset.md): smaller arrays lose by being cut into chunks what
-# compression gains.
-LEAST_COMPRESSED = 1024
-# Larger arrays are heights: a fifth less space would take 13 s for 8192 nodes a side.
-COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
-COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
-
-# Bytes of an array of a campaign dataset beyond which it is not read as a whole.
-LEFT_IN_FILE = 2**26

@@ -1,9 +1,12 @@
-"""What captions say of the runs that a figure lacks or draws apart, counted in the campaign dataset."""
+"""Captions of the figures: their text, and the runs that a figure lacks or draws apart, counted in the dataset."""
 
 from __future__ import annotations
 
+import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +18,19 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+@cache
+def _texts() -> dict[str, str]:
+    file = Path(__file__).with_name("captions.toml")
+    return {name: " ".join(text.split()) for name, text in tomllib.loads(file.read_text(encoding="utf-8")).items()}
+
+
+def caption_of(name: str) -> str:
+    """Return what a figure shows, for those who look at it."""
+    return _texts()[name].format_map(_texts())
+
+
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
-    """Count the runs of some studies that a figure of their means lacks, and those that it draws pale.
+    """Count the runs of some studies that a figure of their means lacks, and those that it marks as not applicable.
 
     Returns
     -------
@@ -60,4 +74,4 @@ def _runs_not_applicable(study: xr.Dataset, several: str) -> Iterator[str]:
     for reason, count in Counter(map(str, reasons)).items():
         if reason:
             runs = "run is" if count == 1 else "runs are"
-            yield f"{count} {runs} drawn pale{several}: {reason}."
+            yield f"{count} {runs} marked{several}: {reason}."

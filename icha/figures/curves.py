@@ -11,19 +11,17 @@ from icha.contact.models import ASPERITIES
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
-from icha.figures.legends import legend_below, named_handles, words_handle
-from icha.figures.palette import (
+from icha.figures.looks import (
     ASPERITIES_NAME,
+    BESIDE_LINE,
+    FEW_LINES,
     MODEL_MARKERS,
-    PLACE_MARKERS,
-    closed_look,
-    material_colours,
-    material_layers,
+    Looks,
+    legend_below,
     model_handle,
-    pale_look,
-    place_markers,
+    named_handles,
+    words_handle,
 )
-from icha.figures.scale import MOST_COLOURS, Scale, materials_scale, places_scale
 from icha.figures.select import (
     Snapshots,
     asked_seeds,
@@ -36,14 +34,7 @@ from icha.figures.select import (
     study_runs,
     ways_back,
 )
-from icha.figures.style import (
-    BLACK,
-    GREY,
-    legend_handle,
-    line_artist,
-    material_label,
-    panel_label,
-)
+from icha.figures.style import line_artist, logarithmic_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,16 +79,19 @@ class Line(NamedTuple):
 
 
 class Curves(NamedTuple):
-    """The lines of a study, the colours of its materials, the scale of colours where there are many lines, and legend.
+    """The lines of a study.
 
-    `beside` are the lines of the same contacts by boundary elements, crosses, if lines are asperities. `handles` name
-    materials, surfaces and slopes as far as the study has several of them, and the models.
+    Parameters
+    ----------
+    lines : the lines of the study's first model.
+    beside : if those are asperities, the lines of the same contacts by boundary elements, crosses.
+    looks : colours and markers of the lines.
+    handles : what the legend names of them: materials, surfaces and slopes as far as there are several, and models.
     """
 
     lines: list[Line]
     beside: list[Line]
-    colours: dict[str, str]
-    scale: Scale | None
+    looks: Looks
     handles: dict[str, Line2D]
 
     @property
@@ -106,56 +100,31 @@ class Curves(NamedTuple):
         return any(way for line in self.lines for way in line.back)
 
 
-# More lines than this are drawn thin.
-_FEW_LINES = 6
-
-
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None) -> Curves:
-    """All runs of a study: a colour for every material, a marker for every surface and slope; open without adhesion.
-
-    Of many materials, or of many surfaces and slopes, those have colours of a scale instead. Beside asperities are the
-    study's runs by boundary elements, or those of the study of that name.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or no run in it.
-    """
+    """All runs of a study, and beside asperities its runs by boundary elements, or those of the study of that name."""
     members = _by_contact(study_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
-    materials = [name for name in dataset["material"].values.tolist() if name in {material for material, *_ in members}]
-    places = list(dict.fromkeys((surface, slope) for _, surface, slope, _ in members))
-    colours, of_place, scale = material_colours(campaign), {}, None
-    if len(places) > MOST_COLOURS:
-        scale = places_scale(places)
-        of_place, colours = dict(zip(places, scale.colours, strict=True)), dict.fromkeys(materials, BLACK)
-    elif len(materials) > MOST_COLOURS:
-        scale = materials_scale(dataset, materials)
-        colours = dict(zip(materials, scale.colours, strict=True))
-    layers = material_layers(dataset, materials)
-    markers = place_markers(places)
-    by_elements = shown_model(dataset) != ASPERITIES
-    lines = []
-    for (material, *place, applicable), own in members.items():
-        place = tuple(place)
+    looks = Looks(campaign, dataset, _in_order_of_materials(dataset, [contact for *contact, _ in members]))
+    name, lines = model_name(dataset), []
+    for (*contact, applicable), own in members.items():
         (first, *_), runs = zip(*own, strict=True)
-        colour = of_place.get(place, colours[material])
-        # Where surfaces and slopes have the colours of a scale, materials have the shapes.
-        marker = PLACE_MARKERS[materials.index(material) % len(PLACE_MARKERS)] if of_place else markers[place]
-        look = closed_look(colour, layers[material]) | {"ls": "none", "marker": marker}
-        if by_elements:
-            look |= {"marker": MODEL_MARKERS[SHORT_RANGE], "ms": look["ms"] + 2}
-        if len(members) > _FEW_LINES:
-            look |= {"lw": 0.6, "ms": 0.8 * look["ms"]}
-        if scale:
-            look |= {"ls": "-", "lw": 0.6, "ms": 0.6 * look["ms"], "mew": 0.6}
-        look = look if applicable else pale_look(look)
+        look = looks.look(tuple(contact), applicable=applicable) | {"ls": "-" if looks.scale else "none"}
+        if name != ASPERITIES_NAME:
+            look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
         stops, back = [path_steps(run) for run in runs], [ways_back(run) for run in runs]
         lines.append(Line(first, stops, back, look, asked_seeds(dataset, first), applicable))
-    others = boundary_elements or (None if by_elements else study)
-    beside = _crosses(campaign, others, lines, colours) if others else []
-    handles = _curve_handles(dataset, lines, scale, bool(of_place))
-    return Curves(lines, beside, colours, scale, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if beside else {}))
+    others = boundary_elements or (study if name == ASPERITIES_NAME else None)
+    beside = _crosses(campaign, others, looks) if others else []
+    changed = {"ls": "-" if looks.scale or any(len(line.runs) > 1 for line in lines) else "none"}
+    changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
+    handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
+    return Curves(lines, beside, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if beside else {}))
+
+
+def _in_order_of_materials(dataset, contacts):
+    """Contacts in the order in which a study names their materials."""
+    names = dataset["material"].values.tolist()
+    return sorted(map(tuple, contacts), key=lambda contact: names.index(contact[0]))
 
 
 def _by_contact(runs):
@@ -167,17 +136,15 @@ def _by_contact(runs):
     return members
 
 
-def _crosses(campaign, study, lines, colours):
+def _crosses(campaign, study, looks):
     """The lines of a study by boundary elements, in the colours of others of the same contacts, or of the material."""
-    of_contact = {contact_of(line): line.look["color"] for line in lines if line.applicable}
     dataset, found = campaign[study].to_dataset(), []
     energy = dataset["surface_energy"]
     for (*contact, applicable), own in _by_contact(runs_by_boundary_elements(campaign, study)).items():
         (first, *_), runs = zip(*own, strict=True)
-        adhesive = float(energy.sel(material=first.material)) > 0
-        colour = of_contact.get(tuple(contact), colours.get(first.material, GREY))
+        adhesive, colour = float(energy.sel(material=first.material)) > 0, looks.colour(tuple(contact))
         # The larger ones show behind the others where the results agree, as the markers of asperities do.
-        size = (8 if adhesive else 11) * (1 if len(lines) <= _FEW_LINES else 0.7)
+        size = (8 if adhesive else 11) * (1 if len(looks.contacts) <= FEW_LINES else 0.7)
         look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
         stops = [path_steps(run) for run in runs]
         found.append(Line(first, stops, [], look | _CROSS, asked_seeds(dataset, first), applicable))
@@ -197,59 +164,34 @@ def model_name(dataset: xr.Dataset) -> str:
     return ASPERITIES_NAME if shown_model(dataset) == ASPERITIES else SHORT_RANGE
 
 
-def _curve_handles(dataset, lines, scale, many_places):
-    """What the legend names of the lines of a study, but for what the scale tells."""
-    name = model_name(dataset)
-    lines = sorted(lines, key=lambda line: line.applicable)  # of two lines of one contact the last one is named
-    several = any(len(line.runs) > 1 for line in lines)
-    shape = {"ls": "-" if several or scale else "none"} | ({} if many_places else {"marker": MODEL_MARKERS[name]})
-    materials = {line.labels.material: line.look for line in lines}
-    places = {(line.labels.surface, line.labels.rms_slope): line.look for line in lines}
-    handles = {}
-    if not scale or (many_places and len(materials) > 1):
-        for material, look in materials.items():
-            grey = {"color": GREY, "mec": GREY} if many_places else {}
-            handles[material_label(dataset, material)] = legend_handle(**look | shape | grey)
-    if len(places) > 1 and not many_places:
-        grey = {"ls": "none", "color": GREY, "mec": GREY, "mfc": "white", "ms": 5}
-        for surface, slope in place_markers(places):
-            handles[name_of_place(dataset, surface, slope)] = legend_handle(**places[surface, slope] | grey)
-    return handles | {name: model_handle(name, mfc="white")}
+def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]) -> tuple[list[dict], Looks]:
+    """Looks of the lines of a figure of one line for every material."""
+    dataset = campaign[study].to_dataset()
+    contacts = [(line.labels.material, line.labels.surface, line.labels.rms_slope) for line in lines]
+    looks = Looks(campaign, dataset, contacts)
+    shape = {"ls": "-", "marker": MODEL_MARKERS[model_name(dataset)]}
+    return [
+        looks.look(contact, applicable=line.applicable) | shape for contact, line in zip(contacts, lines, strict=True)
+    ], looks
 
 
-def material_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]) -> tuple[list[dict], Scale | None]:
-    """Looks of the lines of a figure of one line for every material, and their scale where there are many."""
-    dataset, scale = campaign[study].to_dataset(), None
-    marker = MODEL_MARKERS[model_name(dataset)]
-    materials = list(dict.fromkeys(line.labels.material for line in lines))
-    if len(materials) > MOST_COLOURS:
-        scale = materials_scale(dataset, materials)
-        of_material = {
-            name: {"color": colour, "ls": "-", "lw": 0.9, "marker": marker, "ms": 2}
-            for name, colour in zip(materials, scale.colours, strict=True)
-        }
-    else:
-        colours, layers = material_colours(campaign), material_layers(dataset, materials)
-        shape = {"ls": "-", "marker": marker}
-        of_material = {
-            name: closed_look(colours[name], layers[name]) | shape | {"label": material_label(dataset, name)}
-            for name in materials
-        }
-    looks = [of_material[line.labels.material] for line in lines]
-    return [look if line.applicable else pale_look(look) for line, look in zip(lines, looks, strict=True)], scale
-
-
-def say_which_snapshots(
-    figure: Figure, panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[Snapshots], scale: Scale | None
+def add_snapshot_legend(
+    figure: Figure,
+    panels: Sequence[Axes],
+    dataset: xr.Dataset,
+    lines: Sequence[Snapshots],
+    looks: Looks,
+    beside: Iterable[str],
 ) -> None:
-    """Letters and titles of the two panels of a figure of one snapshot, and its scale."""
-    if scale:
-        scale.draw(figure, list(panels))
-    shown = lines[0].labels
+    """Add titles and legend of a figure of one snapshot of a study; `beside` names the boundary elements in it."""
+    shown, own = lines[0].labels, model_name(dataset)
     titles = (snapshot_label(*lines[-1].members[0]), name_of_place(dataset, shown.surface, shown.rms_slope))
-    for axes, letter, title in zip(panels, "ab", titles, strict=True):
+    for axes, title in zip(panels, titles, strict=True):
         axes.set_title(title, loc="right")
-        panel_label(axes, letter)
+    handles = looks.handles(ls="-", marker=MODEL_MARKERS[own]) | {own: model_handle(own, ls="-", lw=0.8, mfc="white")}
+    handles |= {name: model_handle(name, **BESIDE_LINE) for name in beside}
+    handles |= lines_handles(len(line.members) for line in lines) | named_handles(panels[1:])
+    legend_below(figure, handles, scale=looks.scale, panels=panels)
 
 
 def whose_theories(dataset: xr.Dataset) -> dict[str, Line2D]:
@@ -258,64 +200,72 @@ def whose_theories(dataset: xr.Dataset) -> dict[str, Line2D]:
     return words_handle(f"theories: {names[0]}") if len(names) > 1 else {}
 
 
-def draw_line(
-    axes: Axes,
-    line: Line,
-    points: Callable[[xr.Dataset], tuple[np.ndarray, np.ndarray]],
-    *,
-    logarithmic: bool,
-    lines: int,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the points of a run by markers; of several seeds their mean at common loads by a line, and their scatter.
+# Load and value of the steps of a run.
+Points = Callable[["xr.Dataset"], tuple[np.ndarray, np.ndarray]]
+
+
+def draw_curves(
+    curves: Curves, panels: Mapping[Axes, Points], *, back: Mapping[Axes, Callable] = {}
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Draw the lines of a study, and boundary elements beside them, on double logarithmic axes.
 
     Parameters
     ----------
-    points : load and value of the steps of a run.
-    lines : number of lines in the panel.
-    logarithmic : whether values are positive on a logarithmic axis.
+    curves : the lines.
+    panels : the points that a panel shows.
+    back : load and value of a way back in a panel, as `_draw_ways_back` has them.
 
     Returns
     -------
-    What was drawn: loads and values.
+    Loads and values that were drawn in each of the panels.
     """
+    drawn = {axes: [] for axes in panels}
+    for line in curves.lines:
+        for axes, points in panels.items():
+            drawn[axes].append(_draw_line(axes, line, points, lines=len(curves.lines)))
+        _draw_ways_back(back, line)
+    for line in curves.beside:
+        for axes, points in panels.items():
+            drawn[axes].append(_draw_crosses(axes, line, points))
+    for axes in panels:
+        logarithmic_axes(axes)
+    return [tuple(map(np.concatenate, zip(*own, strict=True))) for own in drawn.values()]
+
+
+def _draw_line(axes, line, points, *, lines):
+    """Draw a run by markers; of several seeds their mean at common loads by a line, and their scatter."""
     from icha.analysis.common_loads import at_common_loads
 
     members = [points(run) for run in line.runs]
     if len(members) > 1:
-        load, values = at_common_loads(members, logarithmic=logarithmic)
+        load, values = at_common_loads(members, logarithmic=True)
         if len(load):
-            draw_members(axes, load, values, line.look, positive=logarithmic, lines=lines, asked=line.asked)
+            draw_members(axes, load, values, line.look, positive=True, lines=lines, asked=line.asked)
             return np.tile(load, len(values)), values.ravel()
     # Runs without a common load have no mean.
     for load, values in members:
         axes.plot(load, values, **line.look)
         if len(members) < line.asked:
             mark_fewer(axes, load, values, np.isfinite(values)[None], line.look, line.asked)
-    load, values = map(np.concatenate, zip(*members, strict=True))
-    return load, values
+    return tuple(map(np.concatenate, zip(*members, strict=True)))
 
 
-def draw_crosses(
-    axes: Axes, line: Line, points: Callable[[xr.Dataset], tuple[np.ndarray, np.ndarray]], *, logarithmic: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the points of a line by boundary elements, of several seeds their means at common loads; returns these.
-
-    `points` and `logarithmic` as for `draw_line`.
-    """
+def _draw_crosses(axes, line, points):
+    """Draw a line by boundary elements; of several seeds their means at common loads."""
     from icha.analysis.common_loads import at_common_loads
 
-    load, values = at_common_loads([points(run) for run in line.runs], logarithmic=logarithmic)
+    load, values = at_common_loads([points(run) for run in line.runs], logarithmic=True)
     mean = values.mean(axis=0)
     axes.plot(load, mean, **line.look)
     mark_fewer(axes, load, mean, np.isfinite(values), line.look, line.asked)
     return load, mean
 
 
-def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
+def _draw_ways_back(panels, line):
     """Draw the ways back of a line's runs, or of several seeds their means at common separations.
 
-    `panels` are axes, and load and value of a way as functions of its reduced pressure, contact area and reduced
-    separation.
+    `panels` give of axes load and value of a way, functions of its reduced pressure, contact area and reduced
+    separation, and of the rms slope. Loads are shown where they are compressive; the axes keep their range.
     """
     from icha.analysis.common_loads import at_common_displacements
 
@@ -329,23 +279,20 @@ def draw_ways_back(panels: Iterable[tuple[Axes, Callable]], line: Line) -> None:
             separation, found = at_common_displacements(legs)
             pressure, area = (found[name].mean(axis=0) for name in ("reduced_pressure", "contact_area_fraction"))
             ways.append((pressure, area, separation))
-    for axes, points in panels:
+    slope = float(line.runs[0]["rms_slope"])
+    for axes, points in panels.items():
         for way in ways:
-            draw_unloading(axes, *points(*way), line.look["mec"])
+            load, values = points(*way, slope)
+            # Just before separation loads are as small as can be.
+            pressed = np.where(load > 0, load, np.nan)
+            axes.add_artist(line_artist(pressed, values, color=line.look["mec"], **UNLOADING))
 
 
-def draw_unloading(axes: Axes, load: np.ndarray, values: np.ndarray, colour: str) -> None:
-    """Draw one way back of a run on logarithmic axes of load, where it is compressive; the axes keep their range."""
-    # Just before separation loads are as small as can be.
-    axes.add_artist(line_artist(np.where(load > 0, load, np.nan), values, color=colour, **UNLOADING))
-
-
-def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, Line2D] = {}) -> None:
+def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, object] = {}) -> None:
     """Add the legend of the curves and of what else is named in the panels, and their scale of colours, if any."""
-    if curves.scale:
-        curves.scale.draw(figure, list(panels))
     seeds = lines_handles(len(line.runs) for line in curves.lines)
-    legend_below(figure, curves.handles | seeds | named_handles(panels) | dict(further))
+    handles = curves.handles | dict(further) | seeds | named_handles(panels)
+    legend_below(figure, handles, scale=curves.looks.scale, panels=panels)
 
 
 def plausible(values: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.legends import FEWER_SEEDS
+from icha.figures.looks import FEWER_SEEDS, NUMBER_PLACES
 from icha.figures.style import GREY, legend_handle
 from icha.support.statistics import ENOUGH, ensemble
 
@@ -15,18 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.container import ErrorbarContainer
     from matplotlib.lines import Line2D
-
-# What captions say of them.
-LINES_OF_SEEDS = (
-    "Where there are several seeds, lines are means over them at common loads. With five seeds or more they have the "
-    "95 % confidence band of the mean (Student's t, of the logarithm on a logarithmic axis). With fewer, such a band "
-    "would be wider than the scatter, and pale thin lines show the single seeds instead."
-)
-POINTS_OF_SEEDS = (
-    "Points are means over the seeds. With five seeds or more, bars are 95 % confidence intervals of the mean "
-    "(Student's t; of the logarithm, and therefore not symmetric, where a quantity is positive). With fewer, such bars "
-    "would be longer than the scatter, and pale dots show the single seeds instead."
-)
 
 # A mean has about so many markers.
 _MEAN_MARKERS = 8
@@ -38,7 +26,6 @@ _CROSS = {"ls": "none", "marker": "x", "mew": 0.7}
 _NUMBER = {"fontsize": 6.5, "textcoords": "offset points", "annotation_clip": True}
 # Points with bars are this far in front of what their look says.
 _BEFORE_POINTS = 0.101
-_BESIDE_MARK = ((5, -8), (-5, 5), (5, 5), (-5, -8))
 _SHADE = 0.22
 _FEW_BANDS = 3
 
@@ -105,6 +92,8 @@ def mark_fewer(
     -----
     Points in a row that are means over the same members have one n, beside the last or the first of them.
     """
+    from matplotlib.patheffects import withStroke
+
     counts = known.sum(axis=0)
     fewer = (counts > 0) & (counts < asked) & np.isfinite(y)
     if not fewer.any():
@@ -118,19 +107,13 @@ def mark_fewer(
         axes.plot(x[marks], y[marks], **look | {"ls": "none", "mfc": "white", "zorder": order})
     cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.001, "label": FEWER_SEEDS}
     axes.plot(x[marks], y[marks], **cross | _CROSS)
+    halo = [withStroke(linewidth=1.5, foreground="white")]
     for own in stretches:
-        place = sum(text.get_text().startswith("n=") for text in axes.texts) % len(_BESIDE_MARK)
-        right, above = _BESIDE_MARK[place]
-        at = own[-1] if right > 0 else own[0]
-        axes.annotate(
-            f"n={counts[at]}",
-            (x[at], y[at]),
-            (right, above),
-            ha="left" if right > 0 else "right",
-            color=colour,
-            zorder=order + 1,
-            **_NUMBER,
-        )
+        # Beside the last mark of one stretch and the first of the next; the legend moves those that lie on each other.
+        place = NUMBER_PLACES[sum(text.get_text().startswith("n=") for text in axes.texts) % 2]
+        at = own[-1] if place.right > 0 else own[0]
+        beside = {"ha": place.align, "color": colour, "zorder": order + 1, "path_effects": halo} | _NUMBER
+        axes.annotate(f"n={counts[at]}", (x[at], y[at]), (place.right, place.up), **beside)
 
 
 def draw_scatter(

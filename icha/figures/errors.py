@@ -1,4 +1,4 @@
-"""Differences between the model and boundary elements against load: one look for all figures that show them."""
+"""Differences between the model and boundary elements against load: what figures 10 and 11 draw."""
 
 from __future__ import annotations
 
@@ -11,30 +11,9 @@ from icha.datasets.labels import place_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
-from icha.figures.legends import legend_below, words_handle
-from icha.figures.palette import (
-    PLACE_MARKERS,
-    closed_look,
-    material_colours,
-    material_layers,
-    pale_look,
-    place_markers,
-)
-from icha.figures.scale import MOST_COLOURS, Scale, places_scale
+from icha.figures.looks import Looks, interfaces_of, legend_below, words_handle
 from icha.figures.select import NothingToDraw, asked_of_entry, study_errors
-from icha.figures.style import (
-    DASHES,
-    GREY,
-    TWO_COLUMNS,
-    legend_handle,
-    logarithmic_axes,
-    material_label,
-    new_figure,
-    number,
-    panel_label,
-    slope_label,
-    styled,
-)
+from icha.figures.style import DASHES, GREY, legend_handle, logarithmic_axes, material_label, new_panels, number, styled
 from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
@@ -49,13 +28,21 @@ _APART = 1.025
 _ONE_LOAD = 1.3
 # Errors against another quantity of the boundary elements.
 _OTHER = {"ls": ":", "lw": 0.9, "marker": ".", "ms": 3}
+_OTHER_NAME = "relative to the energetic area (energy of adhesion / that of full contact)"
 
 
 class Quantity(NamedTuple):
-    """A variable of the model error, the label of its axis, and its factor and limits on it (None: as they come).
+    """A variable of the model error, as a panel shows it.
 
-    The variable `other`, if there is one, is a dotted line without markers where boundary elements with adhesion have a
-    finite range. `positive` says whether it cannot be negative, and `words` explain it in the legend.
+    Parameters
+    ----------
+    name : name of the variable.
+    label : label of the axis.
+    factor : unit of the axis, by which values are multiplied.
+    limits : of the axis; None: as they come.
+    other : variable that is a dotted line where boundary elements with adhesion have a finite range, if any.
+    positive : whether it cannot be negative.
+    words : explanation in the legend.
     """
 
     name: str
@@ -67,45 +54,21 @@ class Quantity(NamedTuple):
     words: str = ""
 
 
-class _Curves(NamedTuple):
-    """Curves (entry, surface, slope and material of each, and whether the asperity model is applicable to its runs),
-    and what tells them apart.
+class _Curve(NamedTuple):
+    """The errors of an entry for one contact, of the runs to which the asperity model is applicable or of the others.
 
-    Of more surfaces and slopes than a few every material has a row of panels of its own, and they have colours of a
-    scale, for those of the palette are the materials'.
+    Parameters
+    ----------
+    name : name of the entry.
+    errors : the errors along seeds and loads.
+    contact : material, surface and rms slope.
+    applicable : whether the asperity model is applicable.
     """
 
-    entries: dict[str, xr.Dataset]
-    keys: list[tuple]
-    places: list[tuple]
-    materials: list[str]
-    interfaces: xr.Dataset
-    own_rows: bool
-    scale: Scale | None
-    palette: dict[str, str]
-
-    def look(self, key: tuple) -> tuple[str, dict]:
-        """Name of a curve in the legend, and arguments of `Axes.errorbar`."""
-        entry, surface, slope, material, applicable = key
-        # Solutions of the same state at a finite range, or on another grid.
-        same = [each[0] for each in self.keys if each[1:] == key[1:]]
-        again, truths = same.index(entry), [self.entries[each].attrs["truth"] for each in same]
-        colour = self.palette[material]
-        if self.own_rows:
-            colour = places_scale(self.places).colours[self.places.index((surface, slope))]
-        markers = place_markers(self.places) if not self.scale else {}
-        name = [] if self.own_rows else [material_label(self.interfaces, material)]
-        if not self.scale:
-            name += [surface] if len({each for each, _ in self.places}) > 1 else []
-            name += [slope_label(slope)] if len({each for _, each in self.places}) > 1 else []
-        name += ["at finite range"] if len(set(truths)) > 1 and truths[again] == FINITE_RANGE else []
-        name += [entry] if truths.index(truths[again]) < again else []
-        layers = material_layers(self.interfaces, [material] if self.own_rows else self.materials)
-        look = closed_look(colour, layers[material]) | {
-            "marker": markers.get((surface, slope), PLACE_MARKERS[0]),
-            "ls": DASHES[again % len(DASHES)],
-        }
-        return ", ".join(name), look if applicable else pale_look(look)
+    name: str
+    errors: xr.Dataset
+    contact: tuple[str, str, float]
+    applicable: bool
 
 
 @styled
@@ -128,86 +91,69 @@ def draw_errors(
     ValueError
         If the study has no boundary elements beside it.
     """
-    curves = _curves(model_error, study, quantities, material_colours(campaign))
-    rows = [[material] for material in curves.materials] if curves.own_rows else [curves.materials]
-    fig = new_figure(TWO_COLUMNS, 0.55 + 2.35 * len(rows))
-    panels = fig.subplots(len(rows), len(quantities), sharex=True, sharey="col", squeeze=False)
-    letters = iter("abcdefghijklmnopqrstuvwxyz")
+    curves = _curves(model_error, study, quantities)
+    contacts = [curve.contact for curve in curves]
+    own_rows = len({tuple(place) for _, *place in contacts}) > _MOST_LINES
+    interfaces = interfaces_of(study_errors(model_error, study).values())
+    looks = Looks(campaign, interfaces, contacts, by_place=own_rows)
+    rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
+    fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(quantities), sharex=True, sharey="col")
     named: dict[str, object] = {}
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
-        own = [key for key in curves.keys if key[3] in shown]
-        for k, (entry, surface, slope, material, applicable) in enumerate(own):
-            errors = of_applicability(curves.entries[entry], applicable)
-            errors = errors.isel(place_of(errors, {"surface": surface, "rms_slope": slope, "material": material}))
-            name, look = curves.look(own[k])
-            handle = _draw_curve(row, errors, quantities, look, _APART ** (k - (len(own) - 1) / 2), counts)
-            if applicable:
+        own = [curve for curve in curves if curve.contact[0] in shown]
+        for k, curve in enumerate(own):
+            same = [each for each in own if each[2:] == curve[2:]]
+            name, dashes = _words(curve, same, looks, own_rows=own_rows)
+            look = looks.look(curve.contact, applicable=curve.applicable) | {"ls": dashes}
+            handle = _draw_curve(row, curve.errors, quantities, look, _APART ** (k - (len(own) - 1) / 2), counts)
+            if curve.applicable:
                 named.setdefault(name, handle)
-        if curves.own_rows:
-            row[-1].set_title(material_label(curves.interfaces, shown[0]), loc="right")
-        for ax, quantity in zip(row, quantities, strict=True):
-            logarithmic_axes(ax, "x")
-            ax.axhline(0, color="0.6", lw=0.7, zorder=0)
-            ax.set_ylabel(quantity.label)
-            panel_label(ax, next(letters))
-    low, high = panels[0, 0].dataLim.intervalx
-    if high < _ONE_LOAD * low:
-        load = float(f"{np.sqrt(low * high):.3g}")
-        panels[0, 0].set_xlim(load / _ONE_LOAD, load * _ONE_LOAD)
-        panels[0, 0].set_xticks([load], [number(load)])
-        for ax in panels.ravel():
-            ax.minorticks_off()
-    for ax, quantity in zip(panels[-1], quantities, strict=True):
-        ax.set_xlabel(PRESSURE_LABEL)
-        ax.set_ylim(*quantity.limits)
-    if any(each.other for each in quantities) and any(map(has_cohesive_zone, curves.entries.values())):
-        named["relative to the energetic area (energy of adhesion / that of full contact)"] = legend_handle(
-            color=GREY, **_OTHER
-        )
+        if own_rows:
+            row[-1].set_title(material_label(interfaces, shown[0]), loc="right")
+    _finish(panels, quantities)
+    if len(named) == 1 or looks.scale:
+        named.pop("", None)
+    if any(each.other for each in quantities) and any(has_cohesive_zone(curve.errors) for curve in curves):
+        named[_OTHER_NAME] = legend_handle(color=GREY, **_OTHER)
     named |= points_handles(counts)
-    if curves.scale:
-        curves.scale.draw(fig, panels.ravel().tolist())
-        named.pop("", None)
-    if len(named) == 1:
-        named.pop("", None)
     for quantity in quantities:
         named |= words_handle(quantity.words) if quantity.words else {}
-    legend_below(fig, named)
+    legend_below(fig, named, scale=looks.scale, panels=panels.ravel())
     return fig
 
 
-def _curves(model_error, study, quantities, palette):
+def _curves(model_error, study, quantities):
     """What there is to be drawn of a study; raises what `draw_errors` does."""
     entries = study_errors(model_error, study)
     if not entries:
         there = sorted({str(node.attrs["study"]) for node in model_error.children.values()})
         raise ValueError(f"no boundary elements beside study {study!r}; there are some for {', '.join(there)}")
-    if not any(_compared(errors, quantities) for errors in entries.values()):
+    found = []
+    for (name, errors), applicable in itertools.product(entries.items(), (True, False)):
+        values = of_applicability(errors, applicable)
+        for material, place in itertools.product(errors["material"].values.tolist(), surfaces_and_slopes(errors)):
+            labels = dict(zip(("surface", "rms_slope"), place, strict=True)) | {"material": material}
+            own = values.isel(place_of(errors, labels))
+            # Not all combinations of an entry are asked for.
+            if any(np.isfinite(own[each.name].values).any() for each in quantities):
+                found.append(_Curve(name, own, (material, *place), applicable))
+    if not found:
         raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
-    keys = [
-        (entry, surface, slope, material, applicable)
-        for entry, errors in entries.items()
-        for applicable in (True, False)
-        for material, (surface, slope) in itertools.product(
-            errors["material"].values.tolist(), surfaces_and_slopes(errors)
-        )
-        # Not all combinations of an entry are asked for.
-        if _compared(
-            of_applicability(errors, applicable), quantities, material=material, surface=surface, rms_slope=slope
-        )
-    ]
-    places = list(dict.fromkeys((surface, slope) for _, surface, slope, _, _ in keys))
-    materials = list(dict.fromkeys(material for *_, material, _ in keys))
-    scale = places_scale(places) if len(places) > MOST_COLOURS else None
-    interfaces = interfaces_of(entries, materials)
-    return _Curves(entries, keys, places, materials, interfaces, len(places) > _MOST_LINES, scale, palette)
+    return found
 
 
-def _compared(errors, quantities, **at):
-    """Whether there is a state of a quantity at given labels."""
-    own = errors.isel(place_of(errors, at)) if at else errors
-    return any(np.isfinite(own[each.name].values).any() for each in quantities)
+def _words(curve, same, looks, *, own_rows):
+    """Name of a curve in the legend, and dashes of its line, beside the other curves of the `same` contact.
+
+    Those are solutions of the same states at a finite range, or on another grid.
+    """
+    again, truths = same.index(curve), [each.errors.attrs["truth"] for each in same]
+    name = looks.place_name(curve.contact[1:]) if own_rows else looks.name(curve.contact)
+    words = [] if looks.scale else [name] if name else []
+    words += ["at finite range"] if len(set(truths)) > 1 and truths[again] == FINITE_RANGE else []
+    words += [curve.name] if truths.index(truths[again]) < again else []
+    return ", ".join(words), DASHES[again % len(DASHES)]
 
 
 def _draw_curve(row, errors, quantities, look, apart, counts):
@@ -223,6 +169,24 @@ def _draw_curve(row, errors, quantities, look, apart, counts):
     return handle
 
 
+def _finish(panels, quantities):
+    """Axes and labels of all panels."""
+    for ax, quantity in zip(panels.ravel(), itertools.cycle(quantities), strict=False):
+        logarithmic_axes(ax, "x")
+        ax.axhline(0, color="0.6", lw=0.7, zorder=0)
+        ax.set_ylabel(quantity.label)
+    low, high = panels[0, 0].dataLim.intervalx
+    if high < _ONE_LOAD * low:
+        load = float(f"{np.sqrt(low * high):.3g}")
+        panels[0, 0].set_xlim(load / _ONE_LOAD, load * _ONE_LOAD)
+        panels[0, 0].set_xticks([load], [number(load)])
+        for ax in panels.ravel():
+            ax.minorticks_off()
+    for ax, quantity in zip(panels[-1], quantities, strict=True):
+        ax.set_xlabel(PRESSURE_LABEL)
+        ax.set_ylim(*quantity.limits)
+
+
 def of_applicability(errors: xr.Dataset, applicable: bool) -> xr.Dataset:
     """An entry with the values of the runs to which the asperity model is applicable, or of the others, alone."""
     if "applicability" not in errors:
@@ -234,18 +198,6 @@ def of_applicability(errors: xr.Dataset, applicable: bool) -> xr.Dataset:
     return errors.assign({name: errors[name].where(keep) for name in along_seeds})
 
 
-def has_cohesive_zone(errors):
+def has_cohesive_zone(errors: xr.Dataset) -> bool:
     """Whether boundary elements attract out of contact, so that they have a second area."""
     return errors.attrs["truth"] == FINITE_RANGE and bool((errors["surface_energy"] > 0).any())
-
-
-def interfaces_of(entries, materials):
-    """Modulus, energy and range of the materials of all entries."""
-    import xarray as xr
-
-    names = ("contact_modulus", "surface_energy", "interaction_range")
-    found = {}
-    for errors in entries.values():
-        for material in errors["material"].values.tolist():
-            found.setdefault(material, errors[list(names)].sel(material=material))
-    return xr.concat([found[material] for material in materials], "material", coords="minimal", compat="override")

@@ -13,20 +13,12 @@ from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure, not_unloaded
 from icha.figures.ensembles import draw_scatter, lines_handles, mark_fewer
-from icha.figures.hysteresis import (
-    BRANCH_DASHES,
-    ROUNDING,
-    Lines,
-    pull_off_step,
-    unloaded_runs,
-)
-from icha.figures.legends import legend_below, words_handle
-from icha.figures.options import TruthFigure, not_unloaded
-from icha.figures.palette import MODEL_MARKERS, WAY_BACK_MARKERS
+from icha.figures.hysteresis import BRANCH_DASHES, ROUNDING, looks_of, pull_off_step, unloaded_runs
+from icha.figures.looks import MODEL_MARKERS, WAY_BACK_MARKERS, legend_below, words_handle
 from icha.figures.select import asked_seeds, branches, is_applicable, pick, runs_by_boundary_elements, ways_back
-from icha.figures.style import GREY, TWO_COLUMNS, legend_handle, new_figure, panel_label, slope_label, styled
+from icha.figures.style import GREY, legend_handle, new_panels, slope_label, styled
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -59,23 +51,6 @@ def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles)
 
 DECLARATION = Declaration(
     description="Pressure against mean separation and contact area against load, in loading and unloading.",
-    caption=(
-        "Reduced pressure F/(E* h'rms A0) against the mean separation over the rms height, and contact area over "
-        "nominal area against the reduced pressure, on the way in (solid) and on the way back (dashed), by "
-        "interacting asperities. Of a study with several surfaces one is drawn, which stands above panel (a). Tension "
-        "is negative. Symbols with a black edge mark pull-off, the largest tension on the last way back, if there is "
-        "any. Where slopes share a panel, symbols without an edge mark where the first "
-        "way in ends. Insets enlarge the region around zero load where the tension is small compared with the largest "
-        "load. The energy lost per nominal area is the area between the two ways in the plot of pressure against mean "
-        "separation. Where several seeds are drawn, the lines are means at common displacements from the turning "
-        "point, and the marks are means over the seeds. With five seeds or more, the lines have the 95 % confidence "
-        "band of the mean (Student's t). With fewer, pale thin lines show the single seeds. Steps are jumps of one "
-        "spot or of several. Crosses, upright on the way in and oblique on the way back, if there are any, are "
-        "boundary elements at some of their states, of the same topography and half-space. They are those in the "
-        "limit of a short range of attraction or, as crosses with three arms where the legend says so, those by an "
-        "independent code at the finite range of the material, with the area corrected by the perimeter of the "
-        "contact."
-    ),
     options=LoopsFigure,
     inputs=inputs,
 )
@@ -94,27 +69,37 @@ _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
 _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 
 
-class _Loop(NamedTuple):
-    """The runs of a loop, one for every seed, what is drawn of them, boundary elements, the look of markers, and how
-    many seeds were asked for.
-
-    `ways` are branch, reduced separation, reduced pressure and contact area of every leg, the last two also of the
-    single members where there are several seeds.
+class _Way(NamedTuple):
+    """A leg of a loop: branch, reduced separation, reduced pressure and contact area; the last two also of the single
+    members where there are several seeds.
     """
 
-    runs: list[xr.Dataset]
-    ways: list[_Way]
-    truths: list[xr.Dataset]
-    marker: dict
-    asked: int
-
-
-class _Way(NamedTuple):
     branch: str
     reduced_separation: np.ndarray
     reduced_pressure: np.ndarray
     contact_area_fraction: np.ndarray
     members: dict[str, np.ndarray]
+
+
+class _Loop(NamedTuple):
+    """The runs of a contact.
+
+    Parameters
+    ----------
+    labels : labels of the first run.
+    runs : a run for every seed.
+    ways : what is drawn of them.
+    truths : boundary elements of the same contact.
+    asked : number of seeds asked for.
+    applicable : whether the asperity model is applicable.
+    """
+
+    labels: RunLabels
+    runs: list[xr.Dataset]
+    ways: list[_Way]
+    truths: list[xr.Dataset]
+    asked: int
+    applicable: bool
 
 
 def _ways(runs):
@@ -151,74 +136,70 @@ def figure(
     campaign : the campaign dataset.
     loops : boundary elements both ways of runs of the study at finite ranges, if there are any; those of other surfaces
         or seeds than the one drawn are left out.
-    study : name of the study; its runs are unloaded, at least in part.
-    boundary_elements : name of a study whose runs by boundary elements are drawn beside; left out, the study itself.
-    surface : which surface; the study's first, if left out.
-    seed : which seed; if left out the first that has boundary elements, or else the mean over all.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study, surface or seed, no run was unloaded, or boundary elements belong to no run of the
-        study.
+    seed : left out, the first that has boundary elements, or else the mean over all.
     """
-    from matplotlib.ticker import MaxNLocator
-
-    runs = unloaded_runs(campaign, study)
-    surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
-    others = [run for _, run in runs_by_boundary_elements(campaign, boundary_elements or study) if ways_back(run)]
-    truths = _truths(study, runs, [*others, *(loops or ())])
-    seeds = list(dict.fromkeys(labels.seed for labels, _ in runs if labels.surface == surface))
-    if seed is None:
-        seed = next((labels.seed for labels, _ in runs if labels.surface == surface and labels in truths), None)
-    seeds = seeds if seed is None else [pick("seed", seed, seeds)]
-    # By the labels of their first run and whether the model is applicable.
-    own: dict[tuple[RunLabels, bool], list[xr.Dataset]] = {}
-    for labels, run in runs:
-        if labels.surface == surface and labels.seed in seeds:
-            key = labels, is_applicable(run)
-            same = (each for each in own if (each[0]._replace(seed=labels.seed), each[1]) == key)
-            own.setdefault(next(same, key), []).append(run)
-    slopes = sorted({labels.rms_slope for labels, _ in own}, reverse=True)
-    contacts = {labels._replace(seed=seeds[0]) for labels, _ in own}
+    drawn, surface, seed = _loops(campaign, study, boundary_elements or study, loops or (), surface, seed)
+    slopes = sorted({loop.labels.rms_slope for loop in drawn}, reverse=True)
+    contacts = {loop.labels._replace(seed=None) for loop in drawn}
     own_rows = len(contacts) > _MOST_LOOPS and 1 < len(slopes) < len(contacts)
-    rows = [[slope] for slope in slopes] if own_rows else [slopes]
     # Where every slope has its panels, they need not tell them apart in another way.
-    keys = {each: (each[0].material, surface, None if own_rows else each[0].rms_slope) for each in own}
-    dataset = campaign[study].to_dataset()
-    lines = Lines(campaign, [study], list(keys.values()))
+    drawn = [(loop, (loop.labels.material, surface, None if own_rows else loop.labels.rms_slope)) for loop in drawn]
+    looks = looks_of(campaign, [study], [contact for _, contact in drawn])
 
-    fig = new_figure(TWO_COLUMNS, 2.7 * len(rows))
-    panels = fig.subplots(len(rows), 2, squeeze=False)
-    letters = iter("abcdefghijklmnopqrstuvwxyz")
-    for (left, right), shown in zip(panels, rows, strict=True):
-        drawn = [
-            _Loop(
-                members,
-                _ways(members),
-                truths.get(each[0], []),
-                lines.marker(keys[each], applicable=each[1]),
-                asked_seeds(dataset, each[0]) if seed is None else 1,
-            )
-            for each, members in own.items()
-            if each[0].rms_slope in shown
+    rows = [[slope] for slope in slopes] if own_rows else [slopes]
+    fig, panels = new_panels(2.7 * len(rows), len(rows))
+    for row, shown in zip(panels, rows, strict=True):
+        own = [
+            (loop, looks.look(contact, applicable=loop.applicable))
+            for loop, contact in drawn
+            if loop.labels.rms_slope in shown
         ]
-        for ax, axis in ((left, _LOADS), (right, _AREAS)):
-            for loop in drawn:
-                _draw(ax, loop, axis, turn=len(shown) > 1, lines=len(drawn))
-            ax.set_ylabel(axis.y_label)
-            ax.xaxis.set_major_locator(MaxNLocator(5))
-            panel_label(ax, next(letters))
+        _draw_row(row, own, turn=len(shown) > 1)
         if own_rows:
-            right.set_title(slope_label(shown[0]), loc="right")
-        _enlarge(left, right, drawn)
+            row[-1].set_title(slope_label(shown[0]), loc="right")
     for ax, axis in zip(panels[-1], (_LOADS, _AREAS), strict=True):
         ax.set_xlabel(axis.x_label)
-    if lines.scale:
-        lines.scale.draw(fig, panels.ravel().tolist())
     _say_which(panels[0, 0], surface, seed)
-    legend_below(fig, _handles(lines, rows, own, truths) | _others(dataset, seed))
+    handles = _handles(looks, [loop for loop, _ in drawn], marked=len(rows[0]) > 1)
+    handles |= _others(campaign[study].to_dataset(), seed)
+    legend_below(fig, handles, scale=looks.scale, panels=panels.ravel())
     return fig
+
+
+def _loops(campaign, study, beside, loops, surface, seed):
+    """The loops of a surface and seed, those to which the asperity model is not applicable apart; surface and seed."""
+    runs = unloaded_runs(campaign, study)
+    surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
+    others = [run for _, run in runs_by_boundary_elements(campaign, beside) if ways_back(run)]
+    truths = _truths(study, runs, [*others, *loops])
+    runs = [(labels, run) for labels, run in runs if labels.surface == surface]
+    if seed is None:
+        seed = next((labels.seed for labels, _ in runs if labels in truths), None)
+    else:
+        pick("seed", seed, list(dict.fromkeys(labels.seed for labels, _ in runs)))
+    dataset = campaign[study].to_dataset()
+    members: dict[tuple, dict[RunLabels, xr.Dataset]] = {}
+    for labels, run in runs:
+        if seed in (None, labels.seed):
+            members.setdefault((labels._replace(seed=None), is_applicable(run)), {})[labels] = run
+    found = []
+    for (_, applicable), own in members.items():
+        first, of_seeds = next(iter(own)), list(own.values())
+        asked = asked_seeds(dataset, first) if seed is None else 1
+        found.append(_Loop(first, of_seeds, _ways(of_seeds), truths.get(first, []), asked, applicable))
+    return found, surface, seed
+
+
+def _draw_row(row, loops, *, turn):
+    """Draw loops and their looks in a panel of loads and one of areas."""
+    from matplotlib.ticker import MaxNLocator
+
+    for ax, axis in zip(row, (_LOADS, _AREAS), strict=True):
+        for loop, look in loops:
+            _draw(ax, loop, look, axis, turn=turn, lines=len(loops))
+        ax.set_ylabel(axis.y_label)
+        ax.xaxis.set_major_locator(MaxNLocator(5))
+    _enlarge(*row, loops)
 
 
 def _say_which(ax, surface, seed):
@@ -248,29 +229,27 @@ _LOADS = _Axis("reduced_separation", "reduced_pressure", SEPARATION_LABEL, PRESS
 _AREAS = _Axis("reduced_pressure", "contact_area_fraction", PRESSURE_LABEL, AREA_LABEL)
 
 
-def _draw(ax, loop, axis, *, turn, lines):
+def _draw(ax, loop, look, axis, *, turn, lines):
     """Draw a loop, a mark at its pull-off, and one where it turns first if that is wanted or the loop lacks seeds."""
-    colour = loop.marker["mec"]
+    colour = look["color"]
     for way in loop.ways:
         x, y = (getattr(way, name) for name in (axis.x, axis.y))
         dashes = BRANCH_DASHES[way.branch]
         ax.plot(x, y, ls=dashes, color=colour, **_LOOP)
         if way.members:
-            draw_scatter(
-                ax, way.members.get(axis.x, x), way.members[axis.y], colour, positive=False, lines=lines, ls=dashes
-            )
+            members = way.members.get(axis.x, x), way.members[axis.y]
+            draw_scatter(ax, *members, colour, positive=False, lines=lines, ls=dashes)
     marked = []
     if turn or len(loop.runs) < loop.asked:
         ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in loop.runs]
-        marked.append((ends, loop.marker | {"ls": "none", "zorder": 5}))
+        marked.append((ends, look | {"ls": "none", "zorder": 5}))
     pulls = [run.isel(step=at) for run in loop.runs if (at := pull_off_step(run)) is not None]
     if pulls:
-        marked.append((pulls, loop.marker | _PULL_OFF))
-    for states, look in marked:
+        marked.append((pulls, look | _PULL_OFF))
+    for states, mark in marked:
         x, y = _mean_point(states, axis)
-        ax.plot(x, y, **look)
-        known = np.ones((len(states), 1), bool)
-        mark_fewer(ax, np.array([x]), np.array([y]), known, look | {"color": colour}, loop.asked)
+        ax.plot(x, y, **mark)
+        mark_fewer(ax, np.array([x]), np.array([y]), np.ones((len(states), 1), bool), mark, loop.asked)
     for truth in loop.truths:
         for branch, markers in _CROSSES.items():
             way = truth.isel(step=truth["branch"].values == branch)
@@ -287,7 +266,7 @@ def _enlarge(left, right, loops):
     """Insets around zero load, if the tension is there but small."""
     from matplotlib.ticker import MaxNLocator
 
-    ways = [way for loop in loops for way in loop.ways]
+    ways = [way for loop, _ in loops for way in loop.ways]
     pressures = np.concatenate([way.reduced_pressure for way in ways])
     tension = -pressures.min()
     if not ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
@@ -305,8 +284,8 @@ def _enlarge(left, right, loops):
         (right, _AREAS, (0.1, 0.58), (reach, (0, 1.1 * areas.max()))),
     ):
         inset = ax.inset_axes((*corner, 0.46, 0.33 if ax is right else 0.48))
-        for loop in loops:
-            _draw(inset, loop, axis, turn=False, lines=len(loops))
+        for loop, look in loops:
+            _draw(inset, loop, look, axis, turn=False, lines=len(loops))
         inset.set_xlim(limits[0])
         inset.set_ylim(limits[1])
         inset.axhline(0, color=GREY, lw=0.5, zorder=1)
@@ -317,20 +296,15 @@ def _enlarge(left, right, loops):
             each.set_major_locator(MaxNLocator(4))
 
 
-def _handles(lines, rows, runs, truths):
-    """What the legend shows, by name."""
-    handles = lines.handles(**_LOOP)
-    if len(rows[0]) == 1:
-        handles = {name: legend_handle(color=handle.get_color(), **_LOOP) for name, handle in handles.items()}
+def _handles(looks, loops, *, marked):
+    """What the legend shows, by name; loops are `marked` where slopes share a panel."""
+    handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
-    counts = [len(members) for members in runs.values()]
-    if max(counts) > 1:
-        handles |= lines_handles(counts)
-    if any(pull_off_step(run) is not None for members in runs.values() for run in members):
+    handles |= lines_handles(len(loop.runs) for loop in loops)
+    if any(pull_off_step(run) is not None for loop in loops for run in loop.runs):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
-    shown = [truth for labels, _ in runs for truth in truths.get(labels, [])]
-    for name in dict.fromkeys(map(_truth_name, shown)):
+    for name in dict.fromkeys(_truth_name(truth) for loop in loops for truth in loop.truths):
         for branch, markers in _CROSSES.items():
             handles[f"{name}, {branch}"] = legend_handle(color=GREY, marker=markers[name], **_TRUTH)
     return handles

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -9,30 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from icha.figures.curves import plausible
-from icha.figures.declaration import Campaign, Declaration
-from icha.figures.ensembles import POINTS_OF_SEEDS, points_handles
-from icha.figures.hysteresis import (
-    Lines,
-    averages,
-    detached_runs_of,
-    draw_averages,
-    say_which_model,
-    several,
-)
-from icha.figures.legends import legend_below
-from icha.figures.options import StudyFigure, not_unloaded, studies_problems
-from icha.figures.select import asked_seeds, is_applicable, pick
-from icha.figures.style import (
-    GREY,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    new_figure,
-    number,
-    panel_label,
-    slope_label,
-    styled,
-    unit_for,
-)
+from icha.figures.declaration import Campaign, Declaration, StudyFigure, not_unloaded, studies_problems
+from icha.figures.ensembles import points_handles
+from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model, several
+from icha.figures.looks import legend_below
+from icha.figures.select import pick
+from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_panels, number, slope_label, styled, unit_for
 from icha.support.values import Problem, list_of_names
 
 if TYPE_CHECKING:
@@ -64,18 +47,7 @@ class PullOffFigure(StudyFigure):
 
 
 DECLARATION = Declaration(
-    description="Pull-off against rms slope, and against the largest load.",
-    caption=(
-        "Pull-off, the largest tension on the way back to complete separation, against the rms slope (a) and, where "
-        "studies with several loads are given, against the largest reduced pressure F/(E* h'rms A0) that was reached "
-        "before (b). It is drawn as nominal pressure, or divided by the strength of the interface (the largest "
-        "attraction of the Lennard-Jones traction), or divided by the tension of all summits that pull their most, "
-        "3/2 pi Δγ R, at once; the axis says which. All runs are by the model that is named above the panel: of a "
-        f"study with both models those by interacting asperities alone. {POINTS_OF_SEEDS} Without adhesion (open "
-        "markers) there is no pull-off. Where the values span decades, the axis is logarithmic down to the decade of "
-        "the smallest value, and linear from there to zero. Runs that were not separated completely are left out."
-    ),
-    options=PullOffFigure,
+    description="Pull-off against rms slope, and against the largest load.", options=PullOffFigure
 )
 
 _QUANTITIES = {
@@ -90,93 +62,61 @@ _LINE = {"lw": 0.9}
 
 @styled
 def figure(
-    campaign: xr.DataTree,
-    *,
-    study: str,
-    load_studies: Sequence[str] = (),
-    quantity: str = "pull_off_pressure",
+    campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (), quantity: str = "pull_off_pressure"
 ) -> Figure:
-    """Draw the pull-off of all runs of the studies, averaged over the seeds.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    study : name of the study of panel (a).
-    load_studies : names of the studies of panel (b), which differ in their largest load; without any there is no (b).
-    quantity : "pull_off_pressure", "pull_off_over_strength" or "pull_off_over_summits".
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or quantity, or no run of a study was unloaded to complete separation.
-    """
-    from matplotlib.ticker import LogLocator, NullFormatter
-
+    """Draw the pull-off of all runs of the studies, averaged over the seeds, against slope and largest load."""
     pick("quantity", quantity, list(_QUANTITIES))
-    # Of every line and whether the model is applicable to its runs, x and value by point and seed.
-    by_slope, by_load = {}, {}
-    for labels, run in detached_runs_of(campaign, [study]):
-        at, value = labels.rms_slope, float(run[quantity])
-        line = by_slope.setdefault(((labels.material, labels.surface, None), is_applicable(run)), {})
-        line.setdefault(labels._replace(seed=None), {})[labels.seed] = (at, value)
     load_studies = several("load_studies", load_studies) if load_studies else []
-    for labels, run in detached_runs_of(campaign, load_studies):
-        at, value = float(run["largest_reduced_pressure"]), float(run[quantity])
-        line = by_load.setdefault(((labels.material, labels.surface, labels.rms_slope), is_applicable(run)), {})
-        line.setdefault(labels._replace(seed=None), {})[labels.seed] = (at, value)
+    by_slope = detached_lines(campaign, [study], along_slopes=True)
+    by_load = detached_lines(campaign, load_studies)
     loaded_slopes = {slope for (*_, slope), _ in by_load}
     if len(loaded_slopes) == 1:
         # The panel's title names it, and the lines look like those of (a).
-        by_load = {((material, surface, None), own): line for ((material, surface, _), own), line in by_load.items()}
-    lines = Lines(campaign, [study, *load_studies], [key for key, _ in (*by_slope, *by_load)])
-    values = [
-        seeds[seed][1] for line in (*by_slope.values(), *by_load.values()) for seeds in line.values() for seed in seeds
-    ]
-    factor, unit = unit_for(max(values), "Pa") if quantity == "pull_off_pressure" else (1.0, "")
+        by_load = detached_lines(campaign, load_studies, along_slopes=True)
+    looks = looks_of(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
+    every = itertools.chain.from_iterable(line.values() for line in (*by_slope.values(), *by_load.values()))
+    largest = max(float(run[quantity]) for seeds in every for run in seeds.values())
+    factor, unit = unit_for(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
 
-    fig = new_figure(TWO_COLUMNS if by_load else ONE_COLUMN, 2.9)
-    panels = fig.subplots(1, 2 if by_load else 1, squeeze=False)[0]
-    means = []
-    for ax, letter, drawn in zip(panels, "ab", (by_slope, by_load), strict=False):
-        shown = {
-            key: averages(
-                list(line.values()),
-                factor,
-                [asked_seeds(campaign[labels.study].to_dataset(), labels) for labels in line],
-            )
-            for key, line in drawn.items()
-        }
-        for (key, applicable), line in shown.items():
-            look = {"color": lines.colour(key)} | lines.marker(key, applicable=applicable)
-            draw_averages(ax, line, **look, **_LINE)
-        means += shown.values()
-        _scale(ax, np.concatenate([line.y for line in shown.values()]))
-        panel_label(ax, letter)
-    label = _QUANTITIES[quantity] + (f" ({unit})" if unit else "")
-    panels[0].set_ylabel(label)
-    panels[0].set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
-    slopes = sorted({labels.rms_slope for line in by_slope.values() for labels in line})
-    panels[0].set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
-    panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
-    panels[0].minorticks_off()
+    fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
+    counts = []
+    for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
+        means = {key: averages_of(campaign, line, x, quantity, factor) for key, line in drawn.items()}
+        for (contact, applicable), line in means.items():
+            draw_averages(ax, line, **looks.look(contact, applicable=applicable) | _LINE)
+            counts += line.counts.tolist()
+        _scale(ax, np.concatenate([line.y for line in means.values()]))
+        ax.set_ylabel(_QUANTITIES[quantity] + (f" ({unit})" if unit else ""))
+    _label_slopes(panels[0], sorted({labels.rms_slope for line in by_slope.values() for labels in line}))
     if by_load:
-        loads = np.array([at for line in by_load.values() for seeds in line.values() for at, _ in seeds.values()])
-        if loads.min() > 0 and loads.max() > 2 * loads.min():
-            panels[1].set_xscale("log")
-            panels[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-            panels[1].xaxis.set_major_formatter(lambda value, _: number(value))
-            panels[1].xaxis.set_minor_formatter(NullFormatter())
-        elif np.ptp(loads) < 1e-3 * np.abs(loads).max():
-            panels[1].set_xlim(0, 2 * loads.max())
-        panels[1].set_ylabel(label)
-        panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
+        _label_loads(panels[1], np.concatenate([line.x for line in means.values()]))
         if len(loaded_slopes) == 1:
             panels[1].set_title(slope_label(*loaded_slopes), loc="right")
     say_which_model(panels[0], campaign, [study, *load_studies])
-    if lines.scale:
-        lines.scale.draw(fig, list(panels))
-    legend_below(fig, lines.handles(**_LINE) | points_handles(np.concatenate([line.counts for line in means])))
+    legend_below(fig, looks.handles(**_LINE) | points_handles(counts), scale=looks.scale, panels=panels)
     return fig
+
+
+def _label_slopes(ax, slopes):
+    """Label the axis of slopes by those that there are."""
+    ax.set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
+    ax.set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
+    ax.set_xticks(slopes, [f"{slope:g}" for slope in slopes])
+    ax.minorticks_off()
+
+
+def _label_loads(ax, loads):
+    """Label the axis of the largest loads."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    ax.set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
+    if loads.min() > 0 and loads.max() > 2 * loads.min():
+        ax.set_xscale("log")
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        ax.xaxis.set_major_formatter(lambda value, _: number(value))
+        ax.xaxis.set_minor_formatter(NullFormatter())
+    elif np.ptp(loads) < 1e-3 * np.abs(loads).max():
+        ax.set_xlim(0, 2 * loads.max())
 
 
 def _scale(ax, values):

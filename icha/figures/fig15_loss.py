@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from icha.figures.curves import plausible
-from icha.figures.declaration import Campaign, Declaration, FigureOptions
-from icha.figures.ensembles import POINTS_OF_SEEDS, points_handles
-from icha.figures.hysteresis import Lines, averages, detached_runs_of, draw_averages, say_which_model, several
-from icha.figures.legends import legend_below
-from icha.figures.options import studies_problems
-from icha.figures.select import NothingToDraw, asked_seeds, is_applicable
-from icha.figures.style import GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled, unit_for
+from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
+from icha.figures.ensembles import points_handles
+from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model, several
+from icha.figures.looks import legend_below
+from icha.figures.select import NothingToDraw
+from icha.figures.style import GREY, logarithmic_axes, new_panels, styled, unit_for
 from icha.support.values import Flag, Problem, list_of_names
 
 if TYPE_CHECKING:
@@ -41,25 +40,7 @@ class LossFigure(FigureOptions):
         yield from studies_problems(campaign, "studies", self.studies)
 
 
-DECLARATION = Declaration(
-    description="Energy lost in a loop against contact area, and its parts.",
-    caption=(
-        "Panel (a) shows the hysteresis loss, which is the energy per nominal area that is dissipated on a path from "
-        "first contact to the largest load and back to separation, against the largest contact area on the path over "
-        "the nominal area. All runs are by the model that is named above the panel: of a study with both models those "
-        f"by interacting asperities alone. {POINTS_OF_SEEDS} Lines are least-squares fits of a straight line to the "
-        "points that differ only in their largest load, if there are at least three. The legend gives its coefficient "
-        "of determination r² and the exponent of a power law through the same points, which is 1 where the loss is "
-        "proportional to the area (Violano and Afferrante, Lubricants 9 (2021) 7, found a linear growth). The axes "
-        "are logarithmic where both quantities span decades. Runs without adhesion have no value where the loss is "
-        "divided by the surface energy, and are left out there. Panel (b) shows what the loss consists of at the "
-        "largest load of every line, for runs with adhesion: jumps into contact, jumps off, unions of spots and their "
-        "undoing (a property of the model, of either sign), jumps at controlled load, and the rest, which no event "
-        "explains. The parts are divided by the sum of their magnitudes; those below zero are gains. Bars carry the "
-        "markers of (a). Runs that were not separated completely are left out."
-    ),
-    options=LossFigure,
-)
+DECLARATION = Declaration(description="Energy lost in a loop against contact area, and its parts.", options=LossFigure)
 
 # Parts of the loss, with the look of their bars: none has the colour of a material.
 PARTS = {
@@ -94,79 +75,52 @@ class LinearFit(NamedTuple):
 
 @styled
 def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy: bool = True) -> Figure:
-    """Draw the loss of all runs of the studies, averaged over the seeds.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    studies : names of the studies; those that differ in their largest load only make up the lines.
-    over_surface_energy : whether the loss is drawn over the surface energy (without runs that have none) or in J/m².
-
-    Raises
-    ------
-    ValueError
-        If there is no such study, no run of a study was unloaded to complete separation, or none has adhesion where
-        the loss is over the surface energy.
-    """
+    """Draw the loss of all runs of the studies, averaged over the seeds, and its parts where there is adhesion."""
     from matplotlib.patches import Patch
 
     studies = several("studies", studies)
-    # Of every line, and whether the model is applicable to its runs, those of every study by seed.
-    runs: dict[tuple[tuple, bool], dict[str, dict[int, xr.Dataset]]] = {}
-    asked: dict[tuple[tuple, bool], dict[str, int]] = {}
-    for labels, run in detached_runs_of(campaign, studies):
-        key = (labels.material, labels.surface, labels.rms_slope), is_applicable(run)
-        runs.setdefault(key, {}).setdefault(labels.study, {})[labels.seed] = run
-        asked.setdefault(key, {})[labels.study] = asked_seeds(campaign[labels.study].to_dataset(), labels)
-    lines = Lines(campaign, studies, [key for key, _ in runs])
-    sticky = {key: line for key, line in runs.items() if lines.adhesive(key[0][0])}
+    runs = detached_lines(campaign, studies)
+    looks = looks_of(campaign, studies, [contact for contact, _ in runs])
+    sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
     if over_surface_energy and not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
 
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    loss, parts = fig.subplots(1, 2, width_ratios=(1.25, 1)) if sticky else (fig.subplots(), None)
+    widths = (1.25, 1) if sticky else (1,)
+    fig, [(loss, *parts)] = new_panels(3.1, columns=len(widths), width_ratios=widths)
+    handles, counts = _draw_losses(loss, campaign, sticky if over_surface_energy else runs, looks, over_surface_energy)
+    say_which_model(loss, campaign, studies)
+    if sticky:
+        shown = _draw_parts(*parts, sticky, looks)
+        handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
+    legend_below(fig, handles | points_handles(counts), scale=looks.scale, panels=[loss])
+    return fig
+
+
+def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
+    """Draw the losses of all lines with their fits; returns what the legend shows, and numbers of seeds."""
     quantity = "hysteresis_loss_over_surface_energy" if over_surface_energy else "hysteresis_loss"
-    points = {
-        key: [{seed: _point(run, quantity) for seed, run in seeds.items()} for seeds in line.values()]
-        for key, line in (sticky if over_surface_energy else runs).items()
-    }
-    largest = max(np.abs(averages(line).y).max() for line in points.values())
+    area = "largest_contact_area_fraction"
+    largest = max(np.abs(averages_of(campaign, line, area, quantity).y).max() for line in runs.values())
     factor, unit = (1.0, "") if over_surface_energy else unit_for(largest, "J/m²")
-    drawn = {key: averages(line, factor, list(asked[key].values())) for key, line in points.items()}
-    handles = {}
-    for (key, applicable), line in drawn.items():
-        look = {"color": lines.colour(key), "ls": "none"} | lines.marker(key, applicable=applicable)
-        handle = draw_averages(loss, line, **look)
+    drawn = {key: averages_of(campaign, line, area, quantity, factor) for key, line in runs.items()}
+    handles = looks.handles(ls="none") if looks.scale else {}
+    for (contact, applicable), line in drawn.items():
+        handle = draw_averages(ax, line, **looks.look(contact, applicable=applicable) | {"ls": "none"})
         if not applicable:
             continue
         fit = linear_fit(line.x, line.y) if line.same_seeds else None
         if fit is not None:
             along = np.linspace(line.x.min(), line.x.max(), _FIT_POINTS)
-            loss.plot(along, fit.intercept + fit.slope * along, color=lines.colour(key), lw=0.9, zorder=2)
-        if not lines.scale:
-            handles[lines.name(key) + _words(fit)] = handle
+            ax.plot(along, fit.intercept + fit.slope * along, color=looks.colour(contact), lw=0.9, zorder=2)
+        if not looks.scale:
+            handles[looks.name(contact) + _words(fit)] = handle
     x, y = (np.concatenate([getattr(line, name) for line in drawn.values()]) for name in "xy")
     if all(len(plausible(values)) == len(values) and values.max() > _SPAN * values.min() for values in (x, y)):
-        logarithmic_axes(loss)
-    loss.axhline(0, color=GREY, lw=0.6, zorder=1)
-    loss.set_xlabel(r"contact area at the largest load  $A/A_0$")
-    loss.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")
-    panel_label(loss, "a")
-    say_which_model(loss, campaign, studies)
-    if sticky:
-        shown = _draw_parts(parts, sticky, lines)
-        panel_label(parts, "b")
-        handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
-    handles |= points_handles(np.concatenate([line.counts for line in drawn.values()]))
-    if lines.scale:
-        handles = lines.handles(ls="none") | handles
-        lines.scale.draw(fig, [loss])
-    legend_below(fig, handles)
-    return fig
-
-
-def _point(run, quantity):
-    return float(run["largest_contact_area_fraction"]), float(run[quantity])
+        logarithmic_axes(ax)
+    ax.axhline(0, color=GREY, lw=0.6, zorder=1)
+    ax.set_xlabel(r"contact area at the largest load  $A/A_0$")
+    ax.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")
+    return handles, np.concatenate([line.counts for line in drawn.values()])
 
 
 def linear_fit(x: np.ndarray, y: np.ndarray) -> LinearFit | None:
@@ -194,7 +148,7 @@ def _words(fit):
     return ": " + ", ".join(words) if words else ""
 
 
-def shares(line: dict[str, dict[int, xr.Dataset]]) -> dict[str, float]:
+def shares(line: Mapping[object, Mapping[int, xr.Dataset]]) -> dict[str, float]:
     """Parts of the loss at the largest load of a line, means over the seeds, over the sum of their magnitudes."""
     top = max(
         line.values(), key=lambda seeds: np.mean([float(run["largest_reduced_pressure"]) for run in seeds.values()])
@@ -204,11 +158,11 @@ def shares(line: dict[str, dict[int, xr.Dataset]]) -> dict[str, float]:
     return {name: value / total if total > 0 else 0.0 for name, value in found.items()}
 
 
-def _draw_parts(ax, runs, lines):
+def _draw_parts(ax, runs, looks):
     """Draw a bar for every line; the parts that are there."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
-    for place, ((key, applicable), bar) in enumerate(bars.items()):
+    for place, ((contact, applicable), bar) in enumerate(bars.items()):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
@@ -223,8 +177,8 @@ def _draw_parts(ax, runs, lines):
                 **PARTS[name][1],
             )
             above, below = above + max(share, 0), below + min(share, 0)
-        look = lines.marker(key, applicable=applicable)
-        ax.plot(place, -0.055, ls="none", transform=ax.get_xaxis_transform(), clip_on=False, **look)
+        look = looks.look(contact, applicable=applicable)
+        ax.plot(place, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
     ax.axhline(0, color="black", lw=0.6)
     ax.set_xlim(-0.7, len(bars) - 0.3)
     ax.set_xticks([])

@@ -9,21 +9,18 @@ import numpy as np
 
 from icha.datasets import results
 from icha.figures.curves import SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs
+from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, not_unloaded
 from icha.figures.hysteresis import BRANCH_DASHES
-from icha.figures.legends import legend_below
+from icha.figures.looks import NOT_APPLICABLE_ALONE, legend_below, words_handle
 from icha.figures.maps import block_means, draw_whole
-from icha.figures.options import RunFigure, not_unloaded
-from icha.figures.select import NothingToDraw, run_on_topography, ways_back
+from icha.figures.select import NothingToDraw, is_applicable, run_on_topography, ways_back
 from icha.figures.style import (
     BLACK,
     GREY,
-    TWO_COLUMNS,
     legend_handle,
     logarithmic_axes,
     material_label,
-    new_figure,
-    panel_label,
+    new_panels,
     slope_label,
     styled,
     unit_for,
@@ -51,16 +48,6 @@ def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFile
 
 DECLARATION = Declaration(
     description="Where and when spots of one run snap into and out of contact.",
-    caption=(
-        "Events of one run by interacting asperities. Panel (a) shows where spots formed on the first way in and "
-        "where they broke on the last way back, over the topography of one period (the highest parts are white). With "
-        "adhesion, a spot forms by a jump into contact and breaks by a jump off. Without adhesion, it forms and "
-        "breaks where the surfaces touch, without a jump. Unions of two spots, and united spots that fell back into "
-        "their asperities, are marked at the centre of the united spot. The numbers in the legend count the marks. "
-        "Panel (b) shows how many such events there have been on the way in (solid, from the right) and on the way "
-        "back (dashed, from the left), against the mean separation, for every kind that occurred there, in the "
-        "colours of the marks; the curves of unions and of their undoing are thin."
-    ),
     options=SnapMapFigure,
     inputs=inputs,
     holds_topography=True,
@@ -95,46 +82,19 @@ _LEAST_SIZE = 1.6
 
 
 @styled
-def figure(
-    campaign: xr.DataTree,
-    surface: xr.Dataset,
-    *,
-    study: str,
-    surface_name: str | None = None,
-    seed: int | None = None,
-    rms_slope: float | None = None,
-    material: str | None = None,
-) -> Figure:
-    """Draw the events of one run.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    surface : the surface file's dataset; it must be the topography of the run that is drawn.
-    study : name of the study; its runs are unloaded, at least in part.
-    surface_name, seed, rms_slope, material : which run; what is left out is the study's first. For the material that
-        is the first one with adhesion, if there is any.
-
-    Raises
-    ------
-    ValueError
-        If there is no such run, it was not unloaded, or the surface is another one's.
-    """
-    asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
-    labels, run = run_on_topography(campaign, study, surface, **asked)
+def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: object) -> Figure:
+    """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
+    labels, run = run_on_topography(campaign, study, surface, **which)
     if not ways_back(run):
         raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
     events = _events(run)
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    where, when = fig.subplots(1, 2, width_ratios=(1.3, 1))
+    fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
     handles = _draw_places(where, run, surface, events)
     _draw_counts(when, events)
     title = f"{material_label(campaign[study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
     when.set_title(title, loc="right", fontsize="small")
-    for ax, letter in ((where, "a"), (when, "b")):
-        panel_label(ax, letter)
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
-    legend_below(fig, handles)
+    legend_below(fig, handles if is_applicable(run) else handles | words_handle(NOT_APPLICABLE_ALONE))
     return fig
 
 

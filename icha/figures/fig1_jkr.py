@@ -9,7 +9,7 @@ from pydantic import Field
 
 from icha.datasets.results import ResultFiles
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs
-from icha.figures.style import BLUE, GREY, TWO_COLUMNS, VERMILLION, new_figure, panel_label, styled
+from icha.figures.style import BLUE, GREY, VERMILLION, new_panels, styled
 from icha.support.values import Positive
 
 if TYPE_CHECKING:
@@ -28,17 +28,7 @@ def no_inputs(campaign: Campaign, options: JKRFigure, files: ResultFiles) -> Inp
 
 
 DECLARATION = Declaration(
-    description="Force and radius of one asperity against approach.",
-    caption=(
-        "Force F (a) and contact radius a (b) of one asperity against its approach δ, by the theory of Johnson, "
-        "Kendall and Roberts. On loading (solid) the asperity snaps into contact at A, where the gap falls to Wu's "
-        "jump-in distance. This distance alone depends on the Tabor parameter μ, which is given above panel (b): it "
-        "is an example, 3 unless the configuration gives another, and not that of the campaign's materials. On "
-        "unloading (dashed) the asperity follows the stable branch to C, the jump-off point, and detaches. B is the "
-        "pull-off point under load control. The dotted line is the unstable branch. Negative forces are tensile."
-    ),
-    options=JKRFigure,
-    inputs=no_inputs,
+    description="Force and radius of one asperity against approach.", options=JKRFigure, inputs=no_inputs
 )
 
 
@@ -59,8 +49,7 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
     unstable = np.geomspace(1e-6, a_off, 200)
     a_pull = float(np.cbrt(9 * np.pi / 8))  # dF/da = 0
 
-    fig = new_figure(TWO_COLUMNS, 2.9)
-    axes = fig.subplots(1, 2)
+    fig, [axes] = new_panels(2.9)
     for ax, value in ((axes[0], lambda a: law.force(a, R)), (axes[1], lambda a: a)):
         ax.axhline(0, color="0.75", lw=0.6, zorder=0)
         ax.axvline(0, color="0.75", lw=0.6, zorder=0)
@@ -92,8 +81,6 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
     axes[1].set_title(rf"$\Delta_{{\mathrm{{IN}}}}$ for the example $\mu$ = {tabor_parameter:g}", loc="right")
     handles, names = axes[0].get_legend_handles_labels()
     axes[0].legend(handles[1:] + handles[:1], names[1:] + names[:1], loc="upper left")
-    for ax, letter in zip(axes, "ab", strict=True):
-        panel_label(ax, letter)
     return fig
 
 

@@ -15,18 +15,15 @@ from icha.figures.curves import (
     Line,
     add_legend,
     contact_of,
-    draw_crosses,
-    draw_line,
-    draw_ways_back,
+    draw_curves,
     gap_label,
     plausible,
     study_curves,
     whose_theories,
 )
-from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, mark_fewer
-from icha.figures.options import StudyFigure, finite_range_error
-from icha.figures.palette import FINITE_RANGE_MARKERS
+from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure, finite_range_error
+from icha.figures.ensembles import draw_members, mark_fewer
+from icha.figures.looks import FINITE_RANGE_MARKERS
 from icha.figures.select import asked_of_entry, finite_range_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
@@ -45,25 +42,6 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 
 DECLARATION = Declaration(
     description="Contact area and mean separation against load, with theories, and what the logarithmic axes hide.",
-    caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean "
-        "gap) against the reduced pressure F/(E* h'rms A0), on double logarithmic axes. Closed and open shapes are "
-        "interacting asperities, one for each stop of the loading path; open ones are without adhesion. "
-        f"{LINES_OF_SEEDS} Upright crosses, if there are any, are boundary elements in the limit of a short range of "
-        "attraction, on the same topographies (means over their seeds), in the colour of the material. Crosses with "
-        "three arms, if there are any, are boundary elements by an independent code at the finite interaction range "
-        "of the material; their area is corrected by the perimeter of the contact. At ranges that a grid resolves "
-        "they show practically no hysteresis; with adhesion they therefore bound the result in the limit of short "
-        "ranges (JKR), but do not determine it. The lower panels show in per cent by how much the asperities differ "
-        "from boundary elements at the same load, interpolated between the stops of these; where there are none, from "
-        "the adhesionless theories of Persson (area) and of Yang and Persson (separation), as the label of the axis "
-        "says. Thin dashed lines, if there are any, show unloading as long as the load is compressive. Lines without "
-        "markers are these theories, the linear law of Bush, Gibson and Thomas where few summits touch, and the "
-        "theories of separate summits of Greenwood and Williamson (no adhesion) and of Fuller and Tabor (with "
-        "adhesion, in the colour of the material). The theories use the spectral moments of the surface, or of the "
-        "first one if there are several. Oblique crosses, if there are any, are published results of adhesionless "
-        "Green's function molecular dynamics (GFMD) of surfaces with this spectrum."
-    ),
     options=StudyFigure,
     inputs=inputs,
 )
@@ -76,11 +54,7 @@ _SAME_LOAD = 1e-6
 
 @styled
 def figure(
-    campaign: xr.DataTree,
-    references: xr.Dataset | None = None,
-    model_error: xr.DataTree | None = None,
-    *,
-    study: str,
+    campaign: xr.DataTree, references: xr.Dataset | None = None, model_error: xr.DataTree | None = None, *, study: str
 ) -> Figure:
     """Draw all runs of a study.
 
@@ -88,14 +62,7 @@ def figure(
     ----------
     campaign : the campaign dataset.
     references : theories and points for the study's first surface (`icha.references.theories`), if any.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements at a finite range, if
-        any.
-    study : name of the study.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or no run in it.
+    model_error : boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any.
     """
     curves = study_curves(campaign, study)
     dataset, entries = campaign[study].to_dataset(), finite_range_errors(model_error, study)
@@ -104,35 +71,18 @@ def figure(
     rows = ["ab", "c" + ("d" if differences[1] else "b")]
     axes = fig.subplot_mosaic(";".join(rows), height_ratios=(1, _LOWER))
     left, right = axes["a"], axes["b"]
-    pressures, areas, gaps = [], [], []
-    for line in curves.lines:
-        p, area = draw_line(left, line, _areas, logarithmic=True, lines=len(curves.lines))
-        areas.append(area)
-        pressures.append(p)
-        p, gap = draw_line(right, line, _separations, logarithmic=True, lines=len(curves.lines))
-        gaps.append(gap)
-        draw_ways_back([(left, lambda p, area, _: (p, area)), (right, lambda p, _, gap: (p, gap))], line)
-    for line in curves.beside:
-        p, area = draw_crosses(left, line, _areas, logarithmic=True)
-        areas.append(area)
-        pressures.append(p)
-        p, gap = draw_crosses(right, line, _separations, logarithmic=True)
-        gaps.append(gap)
-    for ax in (left, right):
-        logarithmic_axes(ax)
+    back = {left: lambda p, area, gap, slope: (p, area), right: lambda p, area, gap, slope: (p, gap)}
+    (p, areas), (_, gaps) = draw_curves(curves, {left: _areas, right: _separations}, back=back)
     if curves.unloaded:
         left.plot([], [], color=GREY, label="unloading", **UNLOADING)
-    for p, area, gap in _draw_solutions(left, right, curves.colours, entries):
-        pressures.append(p)
-        areas.append(area)
-        gaps.append(gap)
-    pressures, areas, gaps = (plausible(np.concatenate(values)) for values in (pressures, areas, gaps))
+    states = [(p, areas, gaps), *_draw_solutions(left, right, curves.looks, entries)]
+    pressures, areas, gaps = (plausible(np.concatenate(values)) for values in zip(*states, strict=True))
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
         if "gfmd_reduced_pressure" in references:
             x = (x[0], max(x[1], 1.2 * float(references["gfmd_reduced_pressure"].max())))
         _draw_references(left, right, references, x)
-        _draw_separate_summits(left, right, references, dataset, curves.colours)
+        _draw_separate_summits(left, right, references, dataset, curves.looks.colours)
     left.set_ylim(min(areas.min(), 1.6 * x[0]) / 1.5, min(1, 3 * areas.max()))
     right.set_ylim(gaps.min() / 1.4, gaps.max() * 1.4)
     _label_separations(right, gaps)
@@ -274,7 +224,7 @@ def _separations(run):
     return run["reduced_pressure"].values, run["reduced_separation"].values
 
 
-def _draw_solutions(left, right, colours, entries):
+def _draw_solutions(left, right, looks, entries):
     """Mark the states of boundary elements at a finite range, means over their seeds; returns loads and values."""
     states, drawn, named = [], [], set()
     for entry, errors in entries.items():
@@ -282,7 +232,7 @@ def _draw_solutions(left, right, colours, entries):
         for material in errors["material"].values.tolist():
             again = drawn.count((name, material))
             drawn.append((name, material))
-            own = errors.sel(material=material)
+            own, adhesive = errors.sel(material=material), float(errors["surface_energy"].sel(material=material)) > 0
             members = [
                 own[f"{quantity}_boundary_elements"].transpose("seed", ..., "reduced_pressure").values
                 for quantity in ("contact_area_fraction", "reduced_separation")
@@ -292,58 +242,37 @@ def _draw_solutions(left, right, colours, entries):
             p = np.broadcast_to(own["reduced_pressure"].values, area.shape)
             # Of measured surfaces each has its own slope, and no states at those of others.
             there = np.isfinite(area)
-            look = {
-                "ls": "none",
-                "marker": FINITE_RANGE_MARKERS[again % 4],
-                "mec": colours.get(material, GREY),
-                "mew": 1.0,
-                # The larger ones show behind the others where the results agree, as the runs' markers do.
-                "ms": 8 if float(own["surface_energy"]) > 0 else 11,
-                "zorder": 6 + (float(own["surface_energy"]) > 0),
-            }
+            # The larger ones show behind the others where the results agree, as the runs' markers do.
+            look = {"ls": "none", "mew": 1.0, "ms": 8 if adhesive else 11, "zorder": 6 + adhesive}
+            look |= {"marker": FINITE_RANGE_MARKERS[again % 4], "mec": looks.colours.get(material, GREY)}
             states.append((p[there], area[there], gap[there]))
             known = np.isfinite(members[0])[:, there]
-            for ax, values in ((left, states[-1][1]), (right, states[-1][2])):
+            label = f"{name}, {entry}" if again else name
+            for ax, values in zip((left, right), states[-1][1:], strict=True):
                 ax.plot(states[-1][0], values, **look)
                 mark_fewer(ax, states[-1][0], values, known, look, asked[there])
-            label = f"{name}, {entry}" if again else name
-            if label not in named:
-                named.add(label)
-                for ax in (left, right):
+                if label not in named:
                     ax.plot([], [], **look | {"mec": GREY, "ms": 8}, label=label)
+            named.add(label)
     return states
 
 
 def _draw_references(left, right, references, limits):
+    """Draw theories of rough contact and published points within the limits of the loads."""
     p = references["reduced_pressure"].values
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
-    left.plot(
-        p[shown], references["persson_area_fraction"].values[shown], "-", color=BLACK, lw=1, label="Persson", zorder=2
-    )
+    look = {"color": BLACK, "lw": 1, "zorder": 2}
+    left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **look)
     linear = references["linear_pressure"].values
     own = linear >= limits[0] / 1.5
-    left.plot(
-        linear[own],
-        references["bush_gibson_thomas_area_fraction"].values[own],
-        "--",
-        color=GREY,
-        lw=1,
-        label="Bush, Gibson & Thomas",
-        zorder=2,
-    )
+    area = references["bush_gibson_thomas_area_fraction"].values
+    left.plot(linear[own], area[own], label="Bush, Gibson & Thomas", **look | {"ls": "--", "color": GREY})
     if "gfmd_reduced_pressure" in references:
         points = (references["gfmd_reduced_pressure"].values, references["gfmd_area_fraction"].values)
         left.plot(*points, "x", color=BLACK, ms=6, mew=1.2, label="GFMD, no adhesion", zorder=5)
     if "persson_reduced_separation" in references:
-        right.plot(
-            p[shown],
-            references["persson_reduced_separation"].values[shown],
-            "-",
-            color=BLACK,
-            lw=1,
-            label="Yang & Persson",
-            zorder=2,
-        )
+        separation = references["persson_reduced_separation"].values
+        right.plot(p[shown], separation[shown], label="Yang & Persson", **look)
 
 
 def _draw_separate_summits(left, right, references, dataset, colours):

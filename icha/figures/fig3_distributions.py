@@ -10,14 +10,12 @@ import numpy as np
 from icha.datasets import results
 from icha.datasets.labels import place_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.curves import material_looks, model_name, plausible, say_which_snapshots
-from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, lines_handles
-from icha.figures.legends import legend_below, named_handles
-from icha.figures.options import SnapshotFigure, finite_range_error
-from icha.figures.palette import BESIDE_LINE, MODEL_MARKERS, model_handle
+from icha.figures.curves import add_snapshot_legend, plausible, snapshot_looks
+from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigure, finite_range_error
+from icha.figures.ensembles import draw_members
+from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
 from icha.figures.select import finite_range_errors, first_line, same_snapshots_by_boundary_elements
-from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, styled
+from icha.figures.style import BLACK, logarithmic_axes, new_panels, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,21 +29,6 @@ def inputs(campaign: Campaign, options: SnapshotFigure, files: results.ResultFil
 
 DECLARATION = Declaration(
     description="Distributions of gap and pressure of every material, on the study's first surface.",
-    caption=(
-        "Probability densities over the nominal area of the gap u (a, double logarithmic) and of the contact pressure "
-        "p (b), at the load given in the figure. Solid lines with circles are interacting asperities; open circles "
-        f"are without adhesion. {LINES_OF_SEEDS} Gaps are in units of the rms height, pressures in units of E* h'rms. "
-        "Only contact carries pressure, so the integral of (b) is A/A0. That of (a) is 1 - A/A0 minus the overlap "
-        "fraction, which is the part of the nominal area outside the spots where the computed gap is negative. "
-        "Adhesion gives the tensile tail at negative pressures. Dashed lines with crosses, if there are any, are "
-        "boundary elements in the limit of a short range of attraction, on the same topographies (means over the "
-        "seeds that have them), in the colour of the material; their gaps are those out of contact, their pressures "
-        "those in contact. Next to an edge of contact, where the tension is singular, theirs is the mean of a cell, so "
-        "that their tensile tail ends there, in a peak. Where the legend says so, they are instead boundary elements "
-        "by an independent code at the finite interaction range of the material. At ranges that a grid resolves these "
-        "show practically no hysteresis; with adhesion they therefore bound the result in the limit of short ranges "
-        "(JKR), but do not determine it. The black line is Persson's theory of adhesionless contact."
-    ),
     options=SnapshotFigure,
     inputs=inputs,
 )
@@ -71,27 +54,18 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, for boundary elements at a finite range of
-        the states that those in the limit of a short range lack, if any.
-    study : name of the study.
-    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or snapshot.
+    model_error : boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any, of the states
+        that those in the limit of a short range lack.
     """
     from icha.analysis.model_error import state_of
-    from icha.references.persson import persson_pressure_density
 
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
-    looks, scale = material_looks(campaign, study, lines)
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    left, right = fig.subplots(1, 2)
-    lowest, highest, top, named, floor = -0.3, 0.3, 0.0, {}, []
+    each_look, looks = snapshot_looks(campaign, study, lines)
+    fig, [(left, right)] = new_panels(3.1)
+    lowest, highest, top, beside, floor = -0.3, 0.3, 0.0, [], []
     truths = same_snapshots_by_boundary_elements(campaign, lines)
-    for line, truth, look in zip(lines, truths, looks, strict=True):
+    for line, truth, look in zip(lines, truths, each_look, strict=True):
         u, densities = gap_densities(line.members)
         drawn = {"positive": True, "lines": len(lines), "asked": line.asked}
         draw_members(left, u, densities, look, **drawn, markevery=1 + len(u) // _MOST_MARKERS)
@@ -99,41 +73,47 @@ def figure(
         p, densities = pressure_densities(line.members)
         draw_members(right, p, densities, look, **drawn, markevery=3)
         density = densities.mean(axis=0)
-        if len(density):  # before first contact there is no pressure
-            shown = density > 1e-3 * density.max()
-            lowest, highest = min(lowest, p[shown].min()), max(highest, p[shown].max())
-            top = max(top, density.max())
+        shown = p[density > 1e-3 * density.max(initial=0)]  # before first contact there is no pressure
+        lowest, highest = shown.min(initial=lowest), shown.max(initial=highest)
+        top = density.max(initial=top)
         loads = [float(state_of(run, at)["reduced_pressure"]) for run, at in line.members]
         load = float(np.mean(loads))
         distributions = _of_boundary_elements(truth, _solutions(finite_range_errors(model_error, study), line, loads))
         if distributions:
-            name = distributions.name
-            for ax, (at, density) in ((left, distributions.gaps), (right, distributions.pressures)):
-                every = 1 + len(at) // _BESIDE_MARKERS
-                ax.plot(at, density, color=look["color"], marker=MODEL_MARKERS[name], markevery=every, **BESIDE_LINE)
+            _draw_beside(left, right, distributions, look["color"])
             top = max(top, distributions.pressures[1].max(initial=0.0))
-            named[name] = model_handle(name, **BESIDE_LINE)
+            beside.append(distributions.name)
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
-    say_which_snapshots(fig, [left, right], dataset, lines, scale)
-    if load > 0:
-        line = np.linspace(0.002, highest, 300)
-        right.semilogy(line, persson_pressure_density(line, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
+    _finish(left, right, (lowest, highest), top, load)
+    add_snapshot_legend(fig, [left, right], dataset, lines, looks, dict.fromkeys(beside))
+    return fig
 
+
+def _finish(left, right, pressures, highest, load):
+    """Labels of both panels, and of that of the pressure limits and Persson's theory at a reduced pressure."""
+    from icha.references.persson import persson_pressure_density
+
+    if load > 0:
+        p = np.linspace(0.002, pressures[1], 300)
+        right.semilogy(p, persson_pressure_density(p, load), "-", color=BLACK, lw=0.9, label="Persson", zorder=2)
+    right.set_xlim(1.05 * np.array(pressures))
+    if highest > 0:
+        right.set_ylim(highest * 5e-5, highest * 3)
+    right.axvline(0, color="0.75", lw=0.6, zorder=0)
     left.set_xlabel(r"gap  $u/h_{\mathrm{rms}}$")
     left.set_ylabel(r"$P(u)\; h_{\mathrm{rms}}$")
     right.set_xlabel(r"contact pressure  $p/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
     right.set_ylabel(r"$P(p)\; E^{\ast}h_{\mathrm{rms}}^{\prime}$")
-    right.set_xlim(lowest * 1.05, highest * 1.05)
-    if top > 0:
-        right.set_ylim(top * 5e-5, top * 3)
-    right.axvline(0, color="0.75", lw=0.6, zorder=0)
-    seeds = lines_handles(len(line.members) for line in lines)
-    own = model_name(dataset)
-    models = {own: model_handle(own, ls="-", lw=0.8, mfc="white")} | named
-    legend_below(fig, named_handles([left]) | models | seeds | named_handles([right]))
-    return fig
+
+
+def _draw_beside(left, right, distributions, colour):
+    """Draw the distributions of boundary elements."""
+    marker = MODEL_MARKERS[distributions.name]
+    for ax, (at, density) in ((left, distributions.gaps), (right, distributions.pressures)):
+        every = 1 + len(at) // _BESIDE_MARKERS
+        ax.plot(at, density, color=colour, marker=marker, markevery=every, **BESIDE_LINE)
 
 
 class _Beside(NamedTuple):

@@ -10,12 +10,11 @@ from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
 from icha.datasets import results
 from icha.datasets.labels import SolutionLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.maps import block_means, draw_whole
-from icha.figures.options import RunFigure, SnapshotFigure
-from icha.figures.select import run_on_topography
-from icha.figures.spots import circles_in_cell, draw_spots
-from icha.figures.style import TWO_COLUMNS, material_label, new_figure, number, panel_label, styled, unit_for
+from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, SnapshotFigure
+from icha.figures.looks import NOT_APPLICABLE_ALONE
+from icha.figures.maps import block_means, circles_in_cell, draw_spots, draw_whole
+from icha.figures.select import is_applicable, run_on_topography
+from icha.figures.style import material_label, new_panels, number, styled, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,23 +61,7 @@ def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | 
 
 
 DECLARATION = Declaration(
-    description="Contact spots over the topography.",
-    caption=(
-        "Contact spots by interacting asperities (red circles, in true size and position) over the topography, whose "
-        "highest parts are yellow. The map shows one period of a periodic surface, where circles that cross a border "
-        "continue at the opposite one, or the whole of a free square, where they may extend beyond its edges. The "
-        "load is given above the map. The framed part around the largest spot is enlarged. Where there are boundary "
-        "elements of the same topography and state, panel (b) shows their contact beside that of the asperities, "
-        "panel (c) its edge (black) with the enlarged circles, and panel (d) where both are in contact and where only "
-        "one of them is. The overlap is the area in contact in both divided by the area in contact in at least one. "
-        "The boundary elements are those in the limit of a short range of attraction or, where map (b) says so, those "
-        "by an independent code at the finite interaction range of the material. The area of the latter is corrected "
-        "by the perimeter of the contact. At ranges that a grid resolves they show practically no hysteresis; with "
-        "adhesion they therefore bound the result in the limit of short ranges (JKR), but do not determine it."
-    ),
-    options=MapFigure,
-    inputs=inputs,
-    holds_topography=True,
+    description="Contact spots over the topography.", options=MapFigure, inputs=inputs, holds_topography=True
 )
 
 # The enlarged view shows a quarter of the period, halved as often as it is wider than so many radii of the spots, and
@@ -107,12 +90,9 @@ def figure(
     truth: xr.Dataset | None = None,
     *,
     study: str,
-    surface_name: str | None = None,
-    seed: int | None = None,
-    rms_slope: float | None = None,
-    material: str | None = None,
     kind: str | None = None,
     target: float | None = None,
+    **which: object,
 ) -> Figure:
     """Draw the spots of one snapshot of one run.
 
@@ -122,41 +102,25 @@ def figure(
     surface : the surface file's dataset; it must be the topography of the run that is drawn.
     solution : boundary elements at a finite range (`icha.references.finite_range`) of the state that is drawn, if any.
     truth : the same run by boundary elements in the limit of a short range, with its maps, if there is one.
-    study : name of the study.
-    surface_name, seed, rms_slope, material : which run; what is left out is the study's first. For the material that
-        is the first one with adhesion, if there is any.
-    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such run or snapshot, or the surface or the solution is another one's.
+    which : which run of the study (`icha.figures.select.run_on_topography`).
     """
     from icha.datasets.campaign import find_snapshot
 
-    asked = {"surface": surface_name, "seed": seed, "rms_slope": rms_slope, "material": material}
-    labels, run = run_on_topography(campaign, study, surface, **asked)
+    labels, run = run_on_topography(campaign, study, surface, **which)
     at = find_snapshot(run, kind, target)
+    solved = None
     if solution is not None:
-        _check_solution(labels, run, at, solution)
-        solved = _Solved(solution["contact"], float(solution["contact_area_fraction"]), FINITE_RANGE)
+        solved = _of_solution(labels, run, at, solution)
     elif truth is not None:
         solved = _of_run(labels, run, at, truth)
-    else:
-        solved = None
     view = _view(run, at, surface)
 
-    fig = new_figure(TWO_COLUMNS, 3.35 if solved is None else 6.9)
-    panels = fig.subplots(1 if solved is None else 2, 2, squeeze=False)
+    fig, panels = new_panels(*(3.35, 1) if solved is None else (6.9, 2))
     whole, enlarged = panels[0, 0], panels[0, 1] if solved is None else panels[1, 0]
     image = _draw_spots_over_topography(whole, enlarged, view)
     enlarged.set_title(f"enlarged ×{view.zoom}", loc="right")
-    step = int(run["snapshot_step"].values[at])
-    load = number(float(run["reduced_pressure"].values[step]))
-    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
-    area = rf"$A/A_0$ = {float(run['contact_area_fraction'].values[step]):.3f}"
-    contact = f"{labels.surface}, {material_label(campaign[study].to_dataset(), labels.material)}"
-    fig.suptitle(f"{contact}, {load}", fontsize="medium")
+    area = rf"$A/A_0$ = {float(_state(run, at)['contact_area_fraction']):.3f}"
+    fig.suptitle(_title(campaign[study].to_dataset(), labels, run, at), fontsize="medium")
     if solved is None:
         whole.set_title(area, loc="right")
     else:
@@ -176,35 +140,51 @@ class _Solved(NamedTuple):
     name: str
 
 
+def _state(run, at):
+    from icha.analysis.model_error import state_of
+
+    return state_of(run, at)
+
+
+def _title(dataset, labels, run, at):
+    """Surface, material and load of a snapshot, and whether the model is not applicable."""
+    load = number(float(_state(run, at)["reduced_pressure"]))
+    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
+    warning = "" if is_applicable(run) else f"\n{NOT_APPLICABLE_ALONE}"
+    return f"{labels.surface}, {material_label(dataset, labels.material)}, {load}{warning}"
+
+
 def _of_run(labels, run, at, truth):
     """The state of a run by boundary elements that a run keeps as its snapshot `at`; None if it failed before."""
-    from icha.analysis.model_error import check_same_contact, state_of
     from icha.datasets.campaign import find_snapshot
 
-    try:
-        check_same_contact(run, truth)
-    except ValueError as error:
-        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
+    _check_contact(labels, run, truth)
     asked = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
     try:
-        state = state_of(truth, find_snapshot(truth, *asked))
+        state = _state(truth, find_snapshot(truth, *asked))
     except ValueError:
         return None
     contact = state["contact_map"].rename(row="y", column="x")
     return _Solved(contact, float(state["contact_area_fraction"]), SHORT_RANGE)
 
 
-def _check_solution(labels, run, at, solution):
-    """Raise ValueError unless boundary elements are of the state that is drawn."""
-    from icha.analysis.model_error import check_same_contact, state_of
-
-    try:
-        check_same_contact(run, solution)
-    except ValueError as error:
-        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
-    shown, solved = float(state_of(run, at)["reduced_pressure"]), float(solution["target_reduced_pressure"])
+def _of_solution(labels, run, at, solution):
+    """The state that a solution by boundary elements is of, which must be the one that is drawn."""
+    _check_contact(labels, run, solution)
+    shown, solved = float(_state(run, at)["reduced_pressure"]), float(solution["target_reduced_pressure"])
     if not np.isclose(shown, solved, rtol=1e-6):
         raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g} for a snapshot at {shown:g}")
+    return _Solved(solution["contact"], float(solution["contact_area_fraction"]), FINITE_RANGE)
+
+
+def _check_contact(labels, run, truth):
+    """Raise ValueError unless boundary elements are of the contact that is drawn."""
+    from icha.analysis.model_error import check_same_contact
+
+    try:
+        check_same_contact(run, truth)
+    except ValueError as error:
+        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
 
 
 class _View(NamedTuple):
@@ -303,11 +283,10 @@ def _draw_solution(panels, view, run, at, solved):
 
 
 def _frame(panels, enlarged, view):
-    """Letters, limits and labels of all panels, and where the enlarged part lies in the others."""
+    """Limits and labels of all panels, and where the enlarged part lies in the others."""
     from matplotlib.patches import Rectangle
 
-    for ax, letter in zip(panels.ravel(), "abcd", strict=False):
-        panel_label(ax, letter)
+    for ax in panels.ravel():
         ax.tick_params(direction="out", top=False, right=False)
         start, width = (view.corner, view.window) if ax is enlarged else (np.zeros(2), view.side)
         ax.set_xlim(start[0], start[0] + width)

@@ -7,21 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from icha.figures.declaration import Campaign, Declaration
-from icha.figures.legends import legend_below
-from icha.figures.options import StudyFigure
-from icha.figures.scale import Scale
-from icha.figures.select import pick, study_runs
-from icha.figures.spots import circles_in_cell, draw_spots
-from icha.figures.style import (
-    TWO_COLUMNS,
-    new_figure,
-    number,
-    panel_label,
-    slope_label,
-    styled,
-    unit_for,
-)
+from icha.figures.declaration import Campaign, Declaration, StudyFigure
+from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale, legend_below
+from icha.figures.maps import circles_in_cell, draw_spots
+from icha.figures.select import is_applicable, pick, study_runs
+from icha.figures.style import new_panels, number, slope_label, styled, unit_for
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -50,12 +40,6 @@ DECLARATION = Declaration(
         "Contact spots of all slopes at the same load and at the same area. The study needs snapshots of kinds "
         "relative_load and area_fraction."
     ),
-    caption=(
-        "Contact spots, by interacting asperities, of one topography that is scaled to several rms slopes, at the "
-        "same load F/(E* A0) (a) and at the same area A/A0 (b), in their true size. At a given load the steeper "
-        "surface has less contact, and its spots, drawn on top, lie within those of the flatter ones. At a given area "
-        "the spots nearly coincide, so that every slope fills a sector of its own there."
-    ),
     options=SlopesFigure,
 )
 
@@ -72,71 +56,61 @@ def figure(
     seed: int | None = None,
     material: str | None = None,
 ) -> Figure:
-    """Draw the spots of all slopes for one surface, seed and material.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    study : name of the study; its snapshots must include one of kind `relative_load` and one of `area_fraction`.
-    surface, seed, material : what is shown; the study's first, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study, run or snapshot.
-    """
-    from matplotlib.collections import PatchCollection
-    from matplotlib.patches import Patch, Wedge
-
-    from icha.datasets.campaign import find_snapshot, spots_of
+    """Draw the spots of all slopes for one surface, seed and material; those left out are the study's first."""
+    from matplotlib.patches import Patch
 
     runs = study_runs(campaign, study)
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
     seed = pick("seed", seed, [labels.seed for labels, _ in runs if labels.surface == surface])
     own = [(labels, run) for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)]
     material = pick("material", material, [labels.material for labels, _ in own])
-    own = sorted(
-        ((labels.rms_slope, run) for labels, run in own if labels.material == material),
-        key=lambda pair: -pair[0],
-    )
+    own = {labels.rms_slope: run for labels, run in own if labels.material == material}
+    slopes = sorted(own, reverse=True)
     # From dark to bright; the colours of the palette are those of materials.
-    colour = dict(zip((slope for slope, _ in own), Scale([f"{slope:g}" for slope, _ in own]).colours, strict=True))
+    colours = dict(zip(slopes, Scale([f"{slope:g}" for slope in slopes]).colours, strict=True))
 
-    fig = new_figure(TWO_COLUMNS, 3.8)
-    panels = fig.subplots(1, 2, sharey=True)
-    for ax, kind, letter in zip(panels, _KINDS, "ab", strict=True):
-        drawn = []
-        for slope, run in own:
-            at = find_snapshot(run, kind)
-            area = float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at])])
-            drawn.append((area, slope, run, at))
-        # What covers less lies on top.
-        for order, (_, slope, run, at) in enumerate(sorted(drawn, key=lambda each: -each[0])):
-            period = float(run["period"])
-            length, unit = unit_for(period, "m")
-            spots = spots_of(run, at)
-            circles = circles_in_cell(
-                spots["spot_x"].values * length,
-                spots["spot_y"].values * length,
-                spots["spot_radius"].values * length,
-                period * length,
-                str(run["boundary"].values),
-            )
-            if kind == "relative_load":
-                draw_spots(ax, circles, zorder=2 + order, facecolor=colour[slope], edgecolor="black", lw=0.25)
-            else:
-                # The spots nearly coincide: every slope fills its own sector of the disc, so that all can be seen.
-                share = 360 / len(own)
-                start = 90 + share * list(colour).index(slope)
-                sectors = [Wedge((x, y), r, start, start + share) for x, y, r in circles]
-                ax.add_collection(PatchCollection(sectors, facecolor=colour[slope], edgecolor="black", lw=0.25))
-        ax.set_xlim(0, period * length)
-        ax.set_ylim(0, period * length)
+    fig, [panels] = new_panels(3.8, sharey=True)
+    length, unit = unit_for(float(own[slopes[0]]["period"]), "m")
+    for ax, kind in zip(panels, _KINDS, strict=True):
+        value = _draw_slopes(ax, own, kind, colours, length)
         ax.set_aspect("equal")
         ax.set_xlabel(f"x ({unit})")
-        value = float(own[0][1]["snapshot_target"].values[find_snapshot(own[0][1], kind)])
-        panel_label(ax, letter)
         ax.set_title(f"{_TITLES[kind]} = {number(value)}", loc="right")
     panels[0].set_ylabel(f"y ({unit})")
-    legend_below(fig, {slope_label(slope): Patch(facecolor=colour[slope]) for slope, _ in own})
+    names = {
+        slope: slope_label(slope) + ("" if is_applicable(run) else f" ({NOT_APPLICABLE_ALONE})")
+        for slope, run in own.items()
+    }
+    legend_below(fig, {names[slope]: Patch(facecolor=colours[slope]) for slope in slopes})
     return fig
+
+
+def _draw_slopes(ax, runs, kind, colours, length):
+    """Draw the spots of the runs, by slope, at their first snapshot of a kind; returns the snapshot's load or area."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Wedge
+
+    from icha.datasets.campaign import find_snapshot, spots_of
+
+    at = {slope: find_snapshot(run, kind) for slope, run in runs.items()}
+
+    def area(slope):
+        run = runs[slope]
+        return float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at[slope]])])
+
+    # What covers less lies on top.
+    for order, slope in enumerate(sorted(colours, key=area, reverse=True)):
+        run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
+        side, spots = float(run["period"]) * length, spots_of(run, at[slope])
+        places = (spots[f"spot_{name}"].values * length for name in ("x", "y", "radius"))
+        circles = circles_in_cell(*places, side, str(run["boundary"].values))
+        if kind == "relative_load":
+            draw_spots(ax, circles, zorder=2 + order, **look)
+        else:
+            # The spots nearly coincide: every slope fills its own sector of the disc, so that all can be seen.
+            share = 360 / len(runs)
+            start = 90 + share * list(colours).index(slope)
+            ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))
+    ax.set_xlim(0, side)
+    ax.set_ylim(0, side)
+    return float(run["snapshot_target"].values[at[slope]])

@@ -7,20 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import (
-    PRESSURE_LABEL,
-    add_legend,
-    draw_crosses,
-    draw_line,
-    plausible,
-    study_curves,
-    whose_theories,
-)
-from icha.figures.declaration import Campaign, Declaration, Inputs
-from icha.figures.ensembles import LINES_OF_SEEDS
-from icha.figures.options import StudyFigure
+from icha.figures.curves import PRESSURE_LABEL, add_legend, draw_curves, plausible, study_curves, whose_theories
+from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure
 from icha.figures.select import NothingToDraw
-from icha.figures.style import BLACK, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
+from icha.figures.style import BLACK, new_panels, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,56 +24,17 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 
 
 DECLARATION = Declaration(
-    description="Contact stiffness against load, with theory.",
-    caption=(
-        "Contact stiffness K = -dp/du, the derivative of the nominal pressure p with respect to the mean separation "
-        "u, against the reduced pressure F/(E* h'rms A0). It is in units of E* h'rms/h_rms (a) and of p/h_rms (b), "
-        "where the law K = p/u0 is a constant. Closed and open shapes are interacting asperities, whose stiffness is "
-        "that of the tangent of the equilibrium with the present spots; open ones are without adhesion. "
-        f"{LINES_OF_SEEDS} Upright crosses, if there are any, are boundary elements in the limit of a short range of "
-        "attraction, on the same topographies (means over their seeds), in the colour of the material; their stiffness "
-        "is that of the tangent along which the edges of contact move. States under tension or with negative stiffness "
-        "cannot be shown on these axes. The line is the derivative of the adhesionless separation of Yang and Persson "
-        "for an infinite surface. On a finite surface, the stiffness at small loads lies above the proportional law, "
-        "since only its highest parts touch (Pastewka et al., Phys. Rev. E 87 (2013) 062809)."
-    ),
-    options=StudyFigure,
-    inputs=inputs,
+    description="Contact stiffness against load, with theory.", options=StudyFigure, inputs=inputs
 )
 
 
 @styled
 def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study: str) -> Figure:
-    """Draw all runs of a study.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    references : theory for the study's first surface (`icha.references.theories`), if any.
-    study : name of the study.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or no run in it, or nothing in it has a positive load and stiffness (`NothingToDraw`).
-    """
+    """Draw all runs of a study, and theory for its first surface (`icha.references.theories`), if any."""
     curves = study_curves(campaign, study)
-    fig = new_figure(TWO_COLUMNS, 3.3)
-    left, right = fig.subplots(1, 2)
-    pressures, stiffnesses = [], []
-    for line in curves.lines:
-        p, stiffness = draw_line(left, line, stiffness_points, logarithmic=True, lines=len(curves.lines))
-        draw_line(right, line, _over_pressure, logarithmic=True, lines=len(curves.lines))
-        pressures.append(p)
-        stiffnesses.append(stiffness)
-    for line in curves.beside:
-        p, stiffness = draw_crosses(left, line, stiffness_points, logarithmic=True)
-        draw_crosses(right, line, _over_pressure, logarithmic=True)
-        pressures.append(p)
-        stiffnesses.append(stiffness)
-    logarithmic_axes(left)
-    logarithmic_axes(right, "x")
-    pressures, stiffnesses = np.concatenate(pressures), np.concatenate(stiffnesses)
+    fig, [(left, right)] = new_panels(3.3)
+    (pressures, stiffnesses), _ = draw_curves(curves, {left: stiffness_points, right: _over_pressure})
+    right.set_yscale("linear")
     if not len(pressures):
         raise NothingToDraw(f"study {study}: no stop with a positive load and a positive stiffness to draw")
     x = (plausible(pressures).min() / 1.6, pressures.max() * 1.6)
@@ -96,10 +47,9 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         left.plot(p[shown], theory[shown], **look)
         right.plot(p[shown], theory[shown] / p[shown], **look)
         ratio = np.concatenate([ratio, theory[shown] / p[shown]])
-    for ax, letter in ((left, "a"), (right, "b")):
+    for ax in (left, right):
         ax.set_xlim(x)
         ax.set_xlabel(PRESSURE_LABEL)
-        panel_label(ax, letter)
     left.set_ylim(plausible(stiffnesses).min() / 2, stiffnesses.max() * 2)
     right.set_ylim(0, 1.15 * ratio.max())
     left.set_ylabel(r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")

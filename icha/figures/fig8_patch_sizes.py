@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.figures.curves import material_looks, model_name, say_which_snapshots
-from icha.figures.declaration import Declaration
-from icha.figures.ensembles import LINES_OF_SEEDS, draw_members, lines_handles
-from icha.figures.legends import legend_below, named_handles
-from icha.figures.options import SnapshotFigure
-from icha.figures.palette import BESIDE_LINE, MODEL_MARKERS, model_handle
+from icha.figures.curves import add_snapshot_legend, snapshot_looks
+from icha.figures.declaration import Declaration, SnapshotFigure
+from icha.figures.ensembles import draw_members
+from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
 from icha.figures.select import first_line, same_snapshots_by_boundary_elements
-from icha.figures.style import TWO_COLUMNS, logarithmic_axes, new_figure, styled, unit_for
+from icha.figures.style import logarithmic_axes, new_panels, styled, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,17 +21,7 @@ if TYPE_CHECKING:
 
 
 DECLARATION = Declaration(
-    description="Sizes of the contact patches of every material, on the study's first surface.",
-    caption=(
-        "Sizes of the contact patches, which are the areas A of the spots (united spots count as one), at the load "
-        "given in the figure, by interacting asperities; open markers are without adhesion. Panel (a) shows the "
-        "number density n(A) per area of a patch and per nominal area, where bins with few patches are joined. Panel "
-        f"(b) shows the number of patches larger than A per nominal area, down to the largest patch. {LINES_OF_SEEDS} "
-        "Dashed lines, with crosses in (a), if there are any, are boundary elements in the limit of a short range of "
-        "attraction, on the same topographies (means over the seeds that have them), in the colour of the material; "
-        "their patches are regions of cells in contact that share edges."
-    ),
-    options=SnapshotFigure,
+    description="Sizes of the contact patches of every material, on the study's first surface.", options=SnapshotFigure
 )
 
 # Patches per plotted point of the density: bins with less are joined with their neighbours.
@@ -44,36 +32,17 @@ _CURVE_POINTS = 300
 
 
 @styled
-def figure(
-    campaign: xr.DataTree,
-    *,
-    study: str,
-    kind: str | None = None,
-    target: float | None = None,
-) -> Figure:
-    """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    study : name of the study.
-    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or snapshot.
-    """
+def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
+    """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds."""
     lines = first_line(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
-    looks, scale = material_looks(campaign, study, lines)
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    left, right = fig.subplots(1, 2, sharex=True)
+    each_look, looks = snapshot_looks(campaign, study, lines)
+    fig, [(left, right)] = new_panels(3.1, sharex=True)
     truths = same_snapshots_by_boundary_elements(campaign, lines)
     period = float(lines[0].members[0][0]["period"])
     factor, unit = unit_for(period, "m")
     cell = (period * factor) ** 2
-    for line, truth, look in zip(lines, truths, looks, strict=True):
+    for line, truth, look in zip(lines, truths, each_look, strict=True):
         areas, true_areas = ([patch_areas(run, at) * factor**2 for run, at in each.members] for each in (line, truth))
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         for ax, points, own, marker in (
@@ -87,16 +56,10 @@ def figure(
     for ax in (left, right):
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
-    say_which_snapshots(fig, [left, right], dataset, lines, scale)
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    models = {model_name(dataset): {"ls": "-", "lw": 0.8, "mfc": "white"}}
-    if any(truth.members for truth in truths):
-        models[SHORT_RANGE] = BESIDE_LINE
-    seeds = lines_handles(len(line.members) for line in lines)
-    legend_below(
-        fig, named_handles([left]) | {name: model_handle(name, **look) for name, look in models.items()} | seeds
-    )
+    beside = [SHORT_RANGE] if any(truth.members for truth in truths) else []
+    add_snapshot_legend(fig, [left, right], dataset, lines, looks, beside)
     return fig
 
 

@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from icha.figures.curves import AREA_LABEL, gap_label
-from icha.figures.declaration import Campaign, Declaration
-from icha.figures.ensembles import POINTS_OF_SEEDS, draw_points, points_handles
-from icha.figures.legends import legend_below, named_handles
-from icha.figures.options import SnapshotFigure
-from icha.figures.palette import PLACE_MARKERS, material_colours, pale_look, place_markers
-from icha.figures.scale import MOST_COLOURS, places_scale
+from icha.figures.declaration import Campaign, Declaration, SnapshotFigure
+from icha.figures.ensembles import draw_points, points_handles
+from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import NothingToDraw, asked_seeds, is_applicable, snapshot_label, study_runs
-from icha.figures.style import GREY, TWO_COLUMNS, new_figure, panel_label, quantity, styled
+from icha.figures.style import GREY, material_label, new_panels, styled
 from icha.support.statistics import ensemble
 from icha.support.values import Problem
 
@@ -40,15 +37,6 @@ DECLARATION = Declaration(
         "Contact area and mean separation against the Tabor parameter. The study needs materials with adhesion that "
         "differ in their `interaction_range`."
     ),
-    caption=(
-        "Real contact area over nominal area (a) and mean separation over rms height (b; for a free square the mean "
-        "gap), by interacting asperities at the load given in the figure, against the Tabor parameter of the surface, "
-        "which is (R_c Δγ²/E*²)^(1/3) over the range of attraction, with R_c = 1/rms curvature. Runs that differ only "
-        "in the range are joined by a line: at a given surface energy a longer range (smaller Tabor parameter) lets "
-        "asperities jump into contact from farther away. They have the colour of the first of their materials. "
-        f"{POINTS_OF_SEEDS} Dashed lines are without adhesion. A shaded region, if there is one, has Tabor parameters "
-        "for which the jump-in distance is not verified."
-    ),
     options=TaborFigure,
 )
 
@@ -57,88 +45,64 @@ _LEAST_REACH = 0.05
 
 
 @styled
-def figure(
-    campaign: xr.DataTree,
-    *,
-    study: str,
-    kind: str | None = None,
-    target: float | None = None,
-) -> Figure:
-    """Draw all runs of a study at one snapshot.
-
-    Parameters
-    ----------
-    campaign : the campaign dataset.
-    study : name of the study; its materials should differ in their range of attraction.
-    kind, target : which snapshot; the first one of this kind, or the first of all, if left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study or snapshot, or no run with adhesion.
-    """
-    curves, bare, colours, shown = _points(campaign, study, kind, target)
-    fig = new_figure(TWO_COLUMNS, 3.1)
-    panels = fig.subplots(1, 2)
-    places = list(dict.fromkeys([*(place for place, *_ in curves), *bare]))
-    interfaces = list(dict.fromkeys(interface for _, interface, _ in curves))
-    scale = places_scale(places) if len(places) > MOST_COLOURS else None
-    markers = place_markers(places)
+def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
+    """Draw all runs of a study at one snapshot."""
+    curves, bare, shown = _points(campaign, study, kind, target)
+    dataset = campaign[study].to_dataset()
+    contacts = [contact for contact, _ in curves]
+    # Materials that differ only in their range are one line, so that their range is not in its name.
+    interfaces = dataset.sel(material=list(dict.fromkeys(material for material, *_ in contacts)))
+    looks = Looks(campaign, interfaces, contacts)
+    fig, [panels] = new_panels(3.1)
     drawn = []
-    for (place, interface, applicable), points in curves.items():
-        kind_of, place_of = interfaces.index(interface), places.index(place)
-        look = {
-            "color": scale.colours[place_of] if scale else colours[interface],
-            "marker": PLACE_MARKERS[kind_of % len(PLACE_MARKERS)] if scale else markers[place],
-            "label": _name(interface, place, [] if scale else places),
-        }
-        drawn += _draw_curve(panels, points, look if applicable else pale_look(look))
-    for place, members in bare.items():
-        colour = scale.colours[places.index(place)] if scale else GREY
-        name = "no adhesion" if place == next(iter(bare)) else None
+    for (contact, applicable), points in curves.items():
+        name = material_label(interfaces, contact[0]) if looks.scale else looks.name(contact)
+        drawn += _draw_curve(panels, points, {"label": name} | looks.look(contact, applicable=applicable))
+    for k, (contact, members) in enumerate(bare.items()):
+        colour = looks.colour(contact) if looks.by_place else GREY
+        name = None if k else "no adhesion"
         for ax, mean in zip(panels, ensemble(members).mean, strict=True):
             ax.axhline(mean, color=colour, ls=(0, (5, 2)), lw=1, label=name, zorder=1)
-    if scale:
-        scale.draw(fig, list(panels))
-    for ax, letter, label in zip(panels, "ab", (AREA_LABEL, gap_label(campaign[study].to_dataset())), strict=True):
+    for ax, label in zip(panels, (AREA_LABEL, gap_label(dataset)), strict=True):
         _finish(ax, min(drawn), max(drawn))
         ax.set_ylabel(label)
-        panel_label(ax, letter)
     panels[0].set_title(shown, loc="right")
     counts = [len(members) for points in curves.values() for members, _ in points.values()]
-    legend_below(fig, named_handles(panels) | points_handles(counts))
+    legend_below(fig, named_handles(panels) | points_handles(counts), scale=looks.scale, panels=panels)
     return fig
 
 
 def _points(campaign, study, kind, target):
     """Of every curve its points by range of attraction, a (Tabor parameter, area, separation) for each seed, and how
-    many seeds were asked for; those without adhesion by place, (area, separation) for each seed; colours by modulus
-    and energy; and what snapshot it is. Runs to which the asperity model is not applicable are curves of their own.
+    many seeds were asked for; those without adhesion by contact, (area, separation) for each seed; and what snapshot
+    it is. Materials that differ only in their range are a curve, named as the first of them; runs to which the
+    asperity model is not applicable are curves of their own.
     """
     from icha.datasets.campaign import find_snapshot
 
     runs, dataset = study_runs(campaign, study, ragged=False), campaign[study].to_dataset()
+    first_of: dict[tuple, str] = {}
     curves: dict[tuple, dict[float, tuple[dict[int, tuple], int]]] = {}
-    colours: dict[tuple, str] = {}
-    of_material = material_colours(campaign)
     bare: dict[tuple, list] = {}
     for labels, run in runs:
         at = find_snapshot(run, kind, target)
         step = int(run["snapshot_step"].values[at])
         state = [float(run[name].values[step]) for name in ("contact_area_fraction", "reduced_separation")]
-        place = (labels.surface, labels.rms_slope)
-        if float(run["surface_energy"]) > 0:
-            interface = (float(run["contact_modulus"]), float(run["surface_energy"]))
-            colours.setdefault(interface, of_material[labels.material])
-            points = curves.setdefault((place, interface, is_applicable(run)), {})
-            members, _ = points.setdefault(float(run["interaction_range"]), ({}, asked_seeds(dataset, labels)))
+        modulus, energy, reach = (float(run[name]) for name in _INTERFACE)
+        contact = first_of.setdefault((modulus, energy), labels.material), labels.surface, labels.rms_slope
+        if energy > 0:
+            points = curves.setdefault((contact, is_applicable(run)), {})
+            members, _ = points.setdefault(reach, ({}, asked_seeds(dataset, labels)))
             members[labels.seed] = (float(run["tabor_parameter"]), *state)
         elif is_applicable(run):
-            bare.setdefault(place, []).append(state)
+            bare.setdefault(contact, []).append(state)
         shown = snapshot_label(run, at)
     if not curves:
         raise NothingToDraw(f"study {study}: no complete run with adhesion, so none with a Tabor parameter")
-    return curves, bare, colours, shown
+    return curves, bare, shown
+
+
+_INTERFACE = ("contact_modulus", "surface_energy", "interaction_range")
 
 
 def _draw_curve(panels, points, look):
@@ -152,7 +116,7 @@ def _draw_curve(panels, points, look):
     mu = np.nanmean(states[..., 0], axis=0)
     order = np.argsort(mu)
     for k, ax in enumerate(panels, 1):
-        draw_points(ax, mu[order], states[:, order, k], look | {"lw": 0.8, "ms": 4}, positive=True, asked=asked[order])
+        draw_points(ax, mu[order], states[:, order, k], look, positive=True, asked=asked[order])
     return mu.tolist()
 
 
@@ -170,13 +134,3 @@ def _finish(ax, smallest, largest):
     # Differences of a few per mille are not blown up to fill the panel.
     reach = max(0.65 * (top - bottom), _LEAST_REACH * 0.5 * (top + bottom))
     ax.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)
-
-
-def _name(interface, place, places):
-    """What a curve is called: modulus and energy, and what tells its surface and slope apart."""
-    name = rf"$E^{{\ast}}$ = {quantity(interface[0], 'Pa')}, $\Delta\gamma$ = {quantity(interface[1], 'J/m²')}"
-    words = ("{}", r"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {:g}")
-    for k, word in enumerate(words):
-        if len({each[k] for each in places}) > 1:
-            name += ", " + word.format(place[k])
-    return name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,24 +12,13 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import UNLOADING
 from icha.figures.ensembles import draw_means
-from icha.figures.errors import interfaces_of
-from icha.figures.palette import (
-    PLACE_MARKERS,
-    closed_look,
-    material_colours,
-    material_layers,
-    pale_look,
-    place_markers,
-)
-from icha.figures.scale import MOST_COLOURS, materials_scale, places_scale
-from icha.figures.select import NothingToDraw, shown_model, study_runs, ways_back
-from icha.figures.style import GREY, legend_handle, material_label, slope_label
+from icha.figures.looks import Contact, Looks, interfaces_of
+from icha.figures.select import NothingToDraw, asked_seeds, is_applicable, shown_model, study_runs, ways_back
 from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
 
 # Tension of a smaller part of the largest pressure is rounding.
 ROUNDING = 1e-9
@@ -43,8 +32,6 @@ def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     ------
     NothingToDraw
         If no run is complete, or none was unloaded.
-    ValueError
-        If there is no such study.
     """
     runs = [(labels, run) for labels, run in study_runs(campaign, study, ragged=False) if ways_back(run)]
     if not runs:
@@ -66,8 +53,6 @@ def detached_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     ------
     NothingToDraw
         If there is no such run in the study.
-    ValueError
-        If there is no such study.
     """
     runs = [(labels, run) for labels, run in unloaded_runs(campaign, study) if "hysteresis_loss" in run]
     if not runs:
@@ -75,22 +60,38 @@ def detached_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     return runs
 
 
-def detached_runs_of(campaign: xr.DataTree, studies: Sequence[str]) -> Iterator[tuple[RunLabels, xr.Dataset]]:
-    """`detached_runs` of the studies that have any.
+def detached_lines(
+    campaign: xr.DataTree, studies: Sequence[str], *, along_slopes: bool = False
+) -> dict[tuple[Contact, bool], dict[RunLabels, dict[int, xr.Dataset]]]:
+    """`detached_runs` of the studies that have any, by line, point on it, and seed.
+
+    Parameters
+    ----------
+    along_slopes : whether rms slopes are points on a line, and not different lines.
+
+    Returns
+    -------
+    By contact, and whether the asperity model is applicable: by labels without seed: the runs by seed.
 
     Raises
     ------
     NothingToDraw
-        If none has.
+        If no study has any such run.
     """
-    reasons = []
+    found, reasons = {}, []
     for study in studies:
         try:
-            yield from detached_runs(campaign, study)
+            runs = detached_runs(campaign, study)
         except NothingToDraw as reason:
             reasons.append(str(reason))
-    if reasons and len(reasons) == len(studies):
+            continue
+        for labels, run in runs:
+            contact = labels.material, labels.surface, None if along_slopes else labels.rms_slope
+            line = found.setdefault((contact, is_applicable(run)), {})
+            line.setdefault(labels._replace(seed=None), {})[labels.seed] = run
+    if reasons and not found:
         raise NothingToDraw("; ".join(reasons))
+    return found
 
 
 def pull_off_step(run: xr.Dataset) -> int | None:
@@ -155,7 +156,15 @@ def averages(
     return Averages(*over.mean[order].T, *bands, over.count[order, 0], bool(common), members[:, order], asked)
 
 
-def draw_averages(axes, line: Averages, **look):
+def averages_of(
+    campaign: xr.DataTree, line: Mapping[RunLabels, Mapping[int, xr.Dataset]], x: str, y: str, factor: float = 1.0
+) -> Averages:
+    """`averages` of two quantities of the runs of a line of `detached_lines`."""
+    points = [{seed: (float(run[x]), float(run[y])) for seed, run in seeds.items()} for seeds in line.values()]
+    return averages(points, factor, [asked_seeds(campaign[labels.study].to_dataset(), labels) for labels in line])
+
+
+def draw_averages(axes: Axes, line: Averages, **look):
     """Draw the points of a line, with bars of their 95 % confidence or with their seeds where these are few."""
     # A coordinate that all seeds share, such as a slope, has no bar.
     x_band = line.x_band if np.any(line.x_band[1] > line.x_band[0] * (1 + 1e-9)) else None
@@ -164,96 +173,11 @@ def draw_averages(axes, line: Averages, **look):
     )
 
 
-class Lines:
-    """Look and name of every line of a figure: a colour for every material, a marker for every surface and slope.
-
-    The markers of lines without adhesion are open. A figure of one material has a colour of a map for every surface and
-    slope. Of many materials, or many surfaces and slopes, those have colours of a `scale`, which is None otherwise.
-    """
-
-    def __init__(self, campaign: xr.DataTree, studies: Sequence[str], keys: Sequence[tuple]):
-        """Take the studies that are drawn, and material, surface and slope (None: not told apart) of every line."""
-        self.keys = list(dict.fromkeys(keys))
-        self.materials = list(dict.fromkeys(material for material, *_ in self.keys))
-        self.places = list(dict.fromkeys((surface, slope) for _, surface, slope in self.keys))
-        self.interfaces = interfaces_of({study: campaign[study].to_dataset() for study in studies}, self.materials)
-        self.palette, self.markers = material_colours(campaign), place_markers(self.places)
-        self.layers = material_layers(self.interfaces, self.materials)
-        self.many_places = len(self.places) > MOST_COLOURS
-        self.scale = places_scale(self.places) if self.many_places else None
-        if not self.many_places and len(self.materials) > MOST_COLOURS:
-            self.scale = materials_scale(self.interfaces, self.materials)
-
-    def adhesive(self, material: str) -> bool:
-        """Whether a material has surface energy."""
-        return self.layers[material].adhesive
-
-    def colour(self, key: tuple) -> str:
-        """Colour of a line."""
-        material, *place = key
-        if self.scale:
-            at = self.places.index(tuple(place)) if self.many_places else self.materials.index(material)
-            return self.scale.colours[at]
-        if len(self.materials) == 1 < len(self.places):
-            return places_scale(self.places).colours[self.places.index(tuple(place))]
-        return self.palette[material]
-
-    def marker(self, key: tuple, *, applicable: bool = True) -> dict:
-        """Look of a line's markers, arguments of `Axes.plot`; pale if the asperity model is not applicable."""
-        material, *place = key
-        marker = self.markers[tuple(place)]
-        if self.many_places:
-            marker = PLACE_MARKERS[self.materials.index(material) % len(PLACE_MARKERS)]
-        look = closed_look(self.colour(key), self.layers[material])
-        own = {name: look[name] for name in ("mec", "mfc", "mew", "ms", "zorder")} | {"marker": marker}
-        return own if applicable else pale_look(own | {"color": look["color"]})
-
-    def handles(self, **look) -> dict[str, Line2D]:
-        """Legend of what tells the lines apart: materials by colour, surfaces and slopes by marker, in `look`.
-
-        What the scale tells is not in it.
-        """
-        first = self.places[0]
-        if self.many_places:
-            several = self.materials if 1 < len(self.materials) <= MOST_COLOURS else []
-            grey = {"color": GREY, "mec": GREY}
-            return {
-                material_label(self.interfaces, material): legend_handle(
-                    **look | self.marker((material, *first)) | grey
-                )
-                for material in several
-            }
-        if len(self.materials) == 1:
-            return {
-                self.name(key): legend_handle(color=self.colour(key), **look | self.marker(key)) for key in self.keys
-            }
-        handles = {
-            material_label(self.interfaces, material): legend_handle(
-                color=self.colour((material, *first)), **look | self.marker((material, *first))
-            )
-            for material in ([] if self.scale else self.materials)
-        }
-        # Places that are not told apart by slope have the first marker, which the materials show.
-        for place in self.places if len(self.places) > 1 else []:
-            name = self._place_name(place)
-            if name:
-                grey = {"mec": GREY, "mfc": GREY, "ls": "none"}
-                handles[name] = legend_handle(**look | self.marker((self.materials[0], *place)) | grey)
-        return handles
-
-    def _place_name(self, place):
-        surface, slope = place
-        parts = [surface] if len({each for each, _ in self.places}) > 1 else []
-        if slope is not None and len({each for _, each in self.places}) > 1:
-            parts.append(slope_label(slope))
-        return ", ".join(parts)
-
-    def name(self, key: tuple) -> str:
-        """What a line is called: what tells it apart in this figure."""
-        material, *place = key
-        parts = [material_label(self.interfaces, material)] if len(self.materials) > 1 else []
-        parts.append(self._place_name(place))
-        return ", ".join(filter(None, parts)) or material_label(self.interfaces, material)
+def looks_of(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:
+    """Looks of the lines of some studies; of a single material they have the colours of surfaces and slopes."""
+    contacts = list(contacts)
+    interfaces = interfaces_of(campaign[study].to_dataset() for study in studies)
+    return Looks(campaign, interfaces, contacts, by_place=len({material for material, *_ in contacts}) == 1)
 
 
 def say_which_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -> None:

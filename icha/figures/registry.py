@@ -1,14 +1,22 @@
-"""The figures that there are: the modules of this folder whose names begin with `fig` and a number."""
+"""The figures: modules of this folder whose names begin with `fig` and a number, and how one of them is drawn."""
 
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 import re
+import textwrap
+from collections.abc import Mapping, Sequence
 from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import icha.figures
 from icha.figures.declaration import Declaration
+from icha.figures.style import GREY, new_figure, save, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _NUMBERED = re.compile(r"fig(\d+)_")
 
@@ -30,3 +38,46 @@ def figure_module(name: str) -> ModuleType:
 
 # By name, in the order of their numbers.
 DECLARATIONS: dict[str, Declaration] = {name: figure_module(name).DECLARATION for name in _names()}
+
+
+def draw_figure(
+    name: str,
+    png: str | os.PathLike,
+    pdf: str | os.PathLike,
+    *,
+    inputs: Mapping[str, str | Sequence[str]],
+    arguments: Mapping[str, Any],
+) -> None:
+    """Draw a figure and write it to `png` and `pdf`.
+
+    `inputs` and `arguments` are those of its declaration. Where nothing of what it shows is complete, the figure is an
+    empty page that says so.
+    """
+    from icha.figures.select import NothingToDraw
+
+    data = {argument: _read(files) for argument, files in inputs.items()}
+    try:
+        figure = figure_module(name).figure(**data, **arguments)
+    except NothingToDraw as reason:
+        # The verdict says which runs failed; what can be drawn is drawn.
+        print(f"An empty page: {reason}")
+        figure = _empty_page(str(reason))
+    save(figure, png, pdf)
+
+
+def _read(files):
+    """A dataset or tree of a netCDF file, a list of those of several files; of other files the path."""
+    from icha.datasets.files import has_groups, read_campaign, read_dataset
+
+    if not isinstance(files, str | os.PathLike):
+        return [_read(file) for file in files]
+    if not str(files).endswith(".nc"):
+        return files
+    return read_campaign(files) if has_groups(files) else read_dataset(files)
+
+
+@styled
+def _empty_page(reason) -> Figure:
+    figure = new_figure(5.0, 2.5)
+    figure.text(0.5, 0.5, textwrap.fill(reason, 60), ha="center", va="center", color=GREY, parse_math=False)
+    return figure

@@ -1,4 +1,7 @@
-"""Picking what a figure shows out of a campaign dataset, with errors that say what there is."""
+"""Picking what a figure shows out of a campaign dataset.
+
+All functions raise ValueError where the campaign has no such study, run or snapshot, naming what there is.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +35,6 @@ def study_runs(
     ------
     NothingToDraw
         If no run of the study is complete.
-    ValueError
-        If the campaign has no such study.
     """
     import xarray as xr
 
@@ -57,13 +58,7 @@ def study_runs(
 def runs_by_boundary_elements(
     campaign: xr.DataTree, study: str, *, ragged: bool = False
 ) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All complete runs of a study by boundary elements, without patches and events if not `ragged`; none if none are.
-
-    Raises
-    ------
-    ValueError
-        If the campaign has no such study.
-    """
+    """All complete runs of a study by boundary elements, if any, without patches and events if not `ragged`."""
     try:
         return study_runs(campaign, study, ragged=ragged, model=BOUNDARY_ELEMENTS)
     except NothingToDraw:
@@ -123,8 +118,6 @@ def pick_run(
     ------
     NothingToDraw
         If it is not complete.
-    ValueError
-        If there is no such study or run.
     """
     from icha.datasets.campaign import run_labels, run_place, select_run
     from icha.datasets.variables.campaign import COMPLETE
@@ -147,7 +140,7 @@ def pick_run(
 
 
 def run_on_topography(
-    campaign: xr.DataTree, study: str, topography: xr.Dataset, **asked
+    campaign: xr.DataTree, study: str, topography: xr.Dataset, *, surface_name: str | None = None, **which: object
 ) -> tuple[RunLabels, xr.Dataset]:
     """The run that `pick_run` finds, if a surface file's dataset is its topography.
 
@@ -158,7 +151,7 @@ def run_on_topography(
     ValueError
         If there is no such study or run, or the surface is another one's.
     """
-    labels, run = pick_run(campaign, study, **asked)
+    labels, run = pick_run(campaign, study, surface=surface_name, **which)
     same = np.isclose(float(topography["period"]), float(run["period"]), rtol=1e-9)
     if not same or int(topography["grid"]) != int(run["grid"]):
         raise ValueError(f"{labels}: the surface given has another period or grid")
@@ -208,11 +201,6 @@ def first_line(
     """Of every material on the first surface and slope of a study a snapshot of every seed, by its `shown_model`.
 
     Runs to which the asperity model is not applicable are apart from the others of their material.
-
-    Raises
-    ------
-    ValueError
-        If there is no such study, run or snapshot.
     """
     from icha.datasets.campaign import find_snapshot
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import contextmanager
-from functools import wraps
+from functools import cache, wraps
+from string import ascii_lowercase
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -92,6 +93,17 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def new_panels(
+    height: float, rows: int = 1, columns: int = 2, *, width: float = TWO_COLUMNS, **options: object
+) -> tuple[Figure, np.ndarray]:
+    """A figure and its panels (rows, columns), which are marked as (a), (b), …; `options` as for `Figure.subplots`."""
+    figure = new_figure(width, height)
+    panels = figure.subplots(rows, columns, squeeze=False, **options)
+    for axes, letter in zip(panels.ravel(), ascii_lowercase, strict=False):
+        panel_label(axes, letter)
+    return figure, panels
+
+
 def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
     """Write a figure to both formats, without date or name of the software that would change with its version."""
     with _in_style():
@@ -104,11 +116,40 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
 
 def logarithmic_axes(axes, directions: str = "xy") -> None:
     """Make the axes of these directions logarithmic; between powers of ten only as much is labelled as has room."""
-    from icha.figures.ticks import FewLabels
-
     for direction in directions:
         axes.set(**{f"{direction}scale": "log"})
-        getattr(axes, f"{direction}axis").set_minor_formatter(FewLabels())
+        getattr(axes, f"{direction}axis").set_minor_formatter(_few_labels()())
+
+
+@cache
+def _few_labels() -> type:
+    """Return the class of labels of logarithmic axes."""
+    from matplotlib.ticker import LogFormatterSciNotation
+
+    class FewLabels(LogFormatterSciNotation):
+        """Labels of the ticks between powers of ten: twos and fives where an axis shows less than two powers.
+
+        Where these are too few as well, some of the ticks that there are.
+        """
+
+        _MOST = 3
+
+        def set_locs(self, locs):
+            """Choose among the ticks."""
+            low, high = sorted(self.axis.get_view_interval())
+            powers = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
+            inside = [at for at in locs if low <= at <= high]
+            digits = [at / 10 ** np.floor(np.log10(at)) for at in inside]
+            chosen = [at for at, digit in zip(inside, digits, strict=True) if np.isclose(digit, (2, 5)).any()]
+            if len(chosen) + powers < 2:
+                chosen = inside[:: -(-len(inside) // self._MOST) or 1]
+            self._chosen = chosen if powers < 2 else []
+
+        def __call__(self, x, pos=None):
+            """The label of a tick."""
+            return super().__call__(x, pos) if x in self._chosen else ""
+
+    return FewLabels
 
 
 def line_artist(x, y, **look) -> Line2D:

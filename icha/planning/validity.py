@@ -72,7 +72,7 @@ def rms_curvature(campaign: Campaign, name: str) -> float:
 
 
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
-    """Values of a surface by the names of `icha.analysis.validated_range.VALIDATED`, as far as a surface has them.
+    """Values of a surface by the names of `icha.analysis.validity.VALIDATED`, as far as a surface has them.
 
     A random surface is Gaussian and isotropic; one from a file is measured.
     """

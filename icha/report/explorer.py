@@ -6,35 +6,44 @@ contact. The same results and choices give the same bytes.
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
 
-from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS, MODELS
 from icha.datasets import results
-from icha.datasets.campaign import find_snapshot, run_labels, select_run
+from icha.datasets.attributes import why_no_result
+from icha.datasets.campaign import find_snapshot, reduced_gap, run_labels, select_run, spots_of
 from icha.datasets.files import read_campaign, read_dataset, readable
 from icha.datasets.labels import RunLabels, parts
-from icha.report.explorer_data import (
-    CONTACT_COLOUR,
-    LEAST_DENSITY,
-    MOST_CELLS,
-    MOST_HEIGHTS,
-    partners,
-    picture,
-    run_entry,
-    topography,
-)
+from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
+from icha.figures.fig8_patch_sizes import patch_areas, patch_density, patches_above
+from icha.figures.maps import block_means
+from icha.path.targets import BETWEEN
 from icha.report.template import template
 from icha.support.atomic_files import whole_file
 from icha.support.in_words import counted, printable_lines
 
 # What one chooses a contact by, in this order.
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
+
+
+# Cells along an edge of a topography and of a map of contact, of which patches are finer than the topography.
+MOST_HEIGHTS, MOST_CELLS = 256, 512
+# Bins of the pressure with less than this part of the highest density are not shown: JKR's tail has no end.
+LEAST_DENSITY = 1e-3
+_LEVELS = 255
+
+
+# Red, green and blue of contact, for spots and patches alike.
+CONTACT_COLOUR = (230, 0, 13)
 
 
 class NothingToExplore(ValueError):
@@ -51,11 +60,7 @@ class Written(NamedTuple):
 
 
 def write_explorer(
-    folder: str | os.PathLike,
-    page: str | os.PathLike,
-    *,
-    only: Mapping[str, Collection] = {},
-    largest: float,
+    folder: str | os.PathLike, page: str | os.PathLike, *, only: Mapping[str, Collection] = {}, largest: float
 ) -> Written:
     """Write the page of a campaign.
 
@@ -200,3 +205,133 @@ def _filled(campaign, data, *, library, largest, left_out=0, without_steps=0) ->
         left_out=left_out and counted(left_out, "contact"),
         without_steps=without_steps and counted(without_steps, "contact"),
     )
+
+
+# --- what the page shows of a contact; arrays are the base64 text of their bytes ---
+
+
+def floats(values: np.ndarray) -> str:
+    """Numbers as the base64 text of their bytes, little-endian and in single precision."""
+    return base64.b64encode(np.asarray(values, "<f4").tobytes()).decode("ascii")
+
+
+def topography(surface: xr.Dataset) -> dict:
+    """Heights of a surface file in units of its rms height: means over blocks of nodes, in 256 levels."""
+    heights = surface["height"].transpose("y", "x").values / float(surface["rms_height"])
+    shown = block_means(heights, MOST_HEIGHTS)
+    low, high = float(shown.min()), float(shown.max())
+    levels = np.rint((shown - low) / (high - low) * _LEVELS).astype(np.uint8)
+    return {
+        "grid": len(heights),
+        "cells": len(shown),
+        "low": low,
+        "high": high,
+        "levels": base64.b64encode(levels.tobytes()).decode("ascii"),
+    }
+
+
+def run_entry(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
+    """The curves of a run and its snapshots.
+
+    Parameters
+    ----------
+    run : a run as in a campaign dataset, with at least one step.
+    maps : of boundary elements, the `picture` of every snapshot; None of asperities, whose spots are in the run, and
+        where the file with the maps is not there.
+    """
+    kinds, targets = run["step_kind"].values.astype(str), run["step_target"].values
+    return {
+        "failure": why_no_result(run.attrs),
+        "period": float(run["period"]),
+        "periodic": str(run["boundary"].values) == "periodic",
+        "grid": int(run["grid"]),
+        "rms_height": float(run["rms_height"]),
+        "pressure": floats(run["reduced_pressure"]),
+        "area": floats(run["contact_area_fraction"]),
+        "gap": floats(reduced_gap(run)),
+        "spots": run["spot_count"].values.tolist(),
+        "leg": run["leg"].values.tolist(),
+        "stops": [
+            None if kind == BETWEEN else f"{kind} {target:.6g}" for kind, target in zip(kinds, targets, strict=True)
+        ],
+        "snapshots": [_snapshot(run, k, maps) for k in range(run.sizes["snapshot"])],
+    }
+
+
+def _snapshot(run, at, maps):
+    """Spots or patches of a snapshot, and the distributions that figures 3 and 8 show."""
+    step = int(run["snapshot_step"].values[at])
+    cell = float(run["period"]) ** 2
+    areas = [patch_areas(run, at)]
+    found = {
+        "step": step,
+        "gap": _points(gap_densities([(run, at)])),
+        "pressure": _pressures(run, at),
+        "sizes": _points(patch_density(areas, cell)),
+        "larger": _points(patches_above(areas, cell)),
+    }
+    if maps is not None:
+        return found | {"map": maps[at]}
+    if run.attrs["contact_model"] != ASPERITIES:
+        return found
+    spots = spots_of(run, at)
+    return found | {"circles": [floats(spots[f"spot_{name}"]) for name in ("x", "y", "radius")]}
+
+
+def _points(curve):
+    """Points of the curve of a single run."""
+    x, (y,) = curve
+    return [floats(x), floats(y)]
+
+
+def _pressures(run, at):
+    """Points of the density of the pressure, without its thinnest tail; bins of few nodes are joined."""
+    densities = pressure_densities if run.attrs["contact_model"] == ASPERITIES else joined_pressure_densities
+    pressure, (density,) = densities([(run, at)])
+    shown = density > LEAST_DENSITY * density.max(initial=0)
+    return [floats(pressure[shown]), floats(density[shown])]
+
+
+def picture(contact: np.ndarray) -> str:
+    """A map of contact as a PNG in base64, its first row at the bottom: the part of a cell in contact as its opacity.
+
+    contact : (n, n), from 0 to 1, along y and x.
+    """
+    from PIL import Image
+
+    part = block_means(np.asarray(contact, float), MOST_CELLS)[::-1]
+    levels = np.rint(part * _LEVELS).astype(np.uint8)
+    image = Image.frombytes("P", levels.shape, levels.tobytes())
+    image.putpalette(CONTACT_COLOUR * (_LEVELS + 1))
+    file = io.BytesIO()
+    image.save(file, "PNG", transparency=bytes(range(_LEVELS + 1)))
+    return base64.b64encode(file.getvalue()).decode("ascii")
+
+
+def partners(one: Mapping, other: Mapping) -> list[int]:
+    """For every step of a run the step of another at the same state of the path, or -1 where it has none.
+
+    A stop is the one on the same leg that was asked for; an equilibrium between stops has for its partner the one on
+    the same leg at the nearest mean separation.
+
+    Parameters
+    ----------
+    one, other : runs, of which `step_kind`, `step_target`, `leg` and `mean_separation` are used.
+    """
+    kinds, others = ([str(kind) for kind in run["step_kind"].values] for run in (one, other))
+    asked = zip(other["leg"].values.tolist(), others, other["step_target"].values.tolist(), strict=True)
+    stops = {stop: k for k, stop in enumerate(asked) if stop[1] != BETWEEN}
+    legs, separations = other["leg"].values, other["mean_separation"].values
+    found = []
+    for k, (leg, kind, target) in enumerate(
+        zip(one["leg"].values.tolist(), kinds, one["step_target"].values.tolist(), strict=True)
+    ):
+        same = np.flatnonzero(legs == leg)
+        if kind != BETWEEN:
+            found.append(stops.get((leg, kind, target), -1))
+        elif len(same):
+            distance = np.abs(separations[same] - float(one["mean_separation"].values[k]))
+            found.append(int(same[np.argmin(distance)]))
+        else:
+            found.append(-1)
+    return found

@@ -23,10 +23,8 @@ from icha.datasets.attributes import MODEL_PAPER
 from icha.datasets.results import EXPLORER
 from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
-from icha.report.model_error import entry_section
-from icha.report.provenance import provenance
+from icha.report.sections import entry_section, provenance, sources, spectra, surface_row
 from icha.report.studies import study_section
-from icha.report.surfaces import sources, spectra, surface_row
 from icha.report.template import MOST_ROWS, template
 from icha.support.atomic_files import whole_file
 
@@ -70,8 +68,7 @@ def write_report(
     ----------
     path : the HTML file; links to other files are relative to its folder.
     campaign : the campaign dataset; its title, summary and licence head the page.
-    figures : in order; the PNGs become part of the page, the PDFs are linked. Those of one study stand with it, the
-        others before all studies.
+    figures : in order; those of one study stand with it, the others before all studies.
     checks : findings of `icha.analysis.checks.check_campaign`.
     comparison : `icha.analysis.common_loads.compare_campaign` of the campaign, if there is one.
     model_error : `icha.analysis.model_error.model_error` of the campaign, if it has boundary elements.
@@ -80,55 +77,75 @@ def write_report(
     configuration : text of the configuration as used.
     dataset_path : the campaign dataset's file, to be linked.
     files : further files to be linked, by what they are called.
-    results : the folder of the campaign's results, in which the runs and surfaces lie, to be linked, and where a page
-        for exploring will be once it has been asked for.
+    results : the folder of the campaign's results, to be linked; a page for exploring will be in it.
     citations : further sources to cite, such as those of measurements.
     further_software : packages that the campaign needs besides those that every campaign needs.
     """
-    folder = Path(path).parent
-    checks, surfaces = list(checks), list(surfaces)
 
     def link(target):
-        return Path(os.path.relpath(target, folder)).as_posix()
+        return None if target is None else Path(os.path.relpath(target, Path(path).parent)).as_posix()
 
     pictures = _pictures(figures, campaign, link)
     studies = [study_section(campaign, name, comparison) for name in campaign.children]
-    dataset = link(dataset_path) if dataset_path is not None else None
+    surfaces = list(surfaces)
     linked = {name: link(target) for name, target in files.items()}
     page = template("report.html").render(
-        title=campaign.attrs.get("title", "Rough contact campaign"),
-        summary=campaign.attrs.get("summary", ""),
-        attributes=campaign.attrs,
+        **_of_campaign(campaign, studies),
+        **_of_checks(list(checks)),
+        **_of_surfaces(surfaces),
         figures=pictures,
-        graph=provenance(studies, surfaces, pictures, model_error, linked, dataset),
-        studies=studies,
-        totals={name: sum(study[name] for study in studies) for name in ("asked", "complete", "failed", "missing")}
-        | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
+        graph=provenance(studies, surfaces, pictures, model_error, linked, link(dataset_path)),
         entries=[entry_section(node.to_dataset()) for node in _entries(model_error)],
-        surfaces=[surface_row(surface) for surface in surfaces[:MOST_ROWS]],
-        surface_count=len(surfaces),
-        sources=sources(surfaces),
-        spectra=spectra(surfaces),
-        checks=worst(checks),
-        check_count=len(checks),
-        validity=of_dataset(campaign),
-        failed=[check for check in checks if not check.passed],
-        times=link(times_path) if times_path is not None else None,
-        configuration=configuration,
-        dataset=dataset,
-        dataset_name=Path(dataset_path).name if dataset_path is not None else None,
+        **_links(link, dataset_path, times_path, results),
         files=linked,
-        results=link(results) if results is not None else None,
-        explorer=link(Path(results, EXPLORER)) if results is not None else None,
-        most_rows=MOST_ROWS,
-        folded=_FOLDED,
-        paper=MODEL_PAPER.line,
+        configuration=configuration,
         citations=citations,
         references=_references(campaign, model_error),
         software={name: _version(name) for name in (*SOFTWARE, *further_software)},
     )
     with whole_file(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _links(link, dataset, times, results):
+    return {
+        "dataset": link(dataset),
+        "dataset_name": Path(dataset).name if dataset is not None else None,
+        "times": link(times),
+        "results": link(results),
+        "explorer": link(Path(results, EXPLORER)) if results is not None else None,
+    }
+
+
+def _of_campaign(campaign, studies):
+    """What the page says of the campaign as a whole."""
+    totals = {name: sum(study[name] for study in studies) for name in ("asked", "complete", "failed", "missing")}
+    return {
+        "title": campaign.attrs.get("title", "Rough contact campaign"),
+        "summary": campaign.attrs.get("summary", ""),
+        "attributes": campaign.attrs,
+        "studies": studies,
+        "totals": totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
+        "validity": of_dataset(campaign),
+        "most_rows": MOST_ROWS,
+        "folded": _FOLDED,
+        "paper": MODEL_PAPER.line,
+    }
+
+
+def _of_checks(checks):
+    failed = [check for check in checks if not check.passed]
+    return {"checks": worst(checks), "check_count": len(checks), "failed": failed}
+
+
+def _of_surfaces(surfaces):
+    rows = [surface_row(surface) for surface in surfaces[:MOST_ROWS]]
+    return {
+        "surfaces": rows,
+        "surface_count": len(surfaces),
+        "sources": sources(surfaces),
+        "spectra": spectra(surfaces),
+    }
 
 
 def _pictures(figures, campaign, link):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import json
+import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from icha.report.template import template
 from icha.support.atomic_files import whole_file
@@ -59,41 +57,21 @@ def write_times_page(path: str | os.PathLike, jobs: Sequence[Benchmark]) -> None
         temporary.write_text(page, encoding="utf-8")
 
 
-def read_benchmarks(files: Mapping[str, str | os.PathLike]) -> list[Benchmark]:
-    """Read Snakemake's benchmark files, `.jsonl` or tab-separated, by name of their job; repeats add up.
-
-    Files that are not there (a job that was not run again after an update, say) are left out.
-    """
-    found = []
-    for job, path in files.items():
-        path = Path(path)
-        if not path.exists():
-            continue
-        text = path.read_text(encoding="utf-8")
-        if path.suffix == ".jsonl":
-            rows = [json.loads(line) for line in text.splitlines() if line.strip()]
-        else:
-            rows = list(csv.DictReader(text.splitlines(), delimiter="\t"))
-        seconds = sum(float(row["s"]) for row in rows)
-        peaks = [row.get("max_uss", row.get("max_rss")) for row in rows]
-        memory = [float(peak) for peak in peaks if _is_number(peak)]
-        found.append(Benchmark(job, seconds, max(memory, default=None)))
-    return found
-
-
-def _is_number(text):
-    try:
-        return np.isfinite(float(text))
-    except (TypeError, ValueError):
-        return False
-
-
 def write_times(table: str | os.PathLike, page: str | os.PathLike, benchmarks: str | os.PathLike) -> None:
     """Write wall time and peak memory of every job that left a benchmark file below a folder, as table and page."""
     folder = Path(benchmarks)
-    files = {str(path.relative_to(folder).with_suffix("")): path for path in sorted(folder.rglob("*.jsonl"))}
-    jobs = read_benchmarks(files)
+    jobs = [
+        read_benchmark(path, str(path.relative_to(folder).with_suffix(""))) for path in sorted(folder.rglob("*.jsonl"))
+    ]
     rows = [f"{each.job}\t{each.seconds:.2f}\t{each.megabytes or 0:.0f}" for each in jobs]
     with whole_file(table) as temporary:
         temporary.write_text("\n".join(["job\tseconds\tmegabytes", *rows]) + "\n", encoding="utf-8")
     write_times_page(page, jobs)
+
+
+def read_benchmark(path: Path, job: str) -> Benchmark:
+    """Read a benchmark file of Snakemake, `.jsonl`; repeats add up."""
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    memory = [row.get("max_uss", row.get("max_rss")) for row in rows]
+    known = [float(each) for each in memory if isinstance(each, int | float) and math.isfinite(each)]
+    return Benchmark(job, sum(float(row["s"]) for row in rows), max(known, default=None))

@@ -47,11 +47,7 @@ def study_section(campaign, name, comparison):
                 "name": material,
                 **{
                     key: quantity(float(dataset[key].sel(material=material)), unit)
-                    for key, unit in (
-                        ("contact_modulus", "Pa"),
-                        ("surface_energy", "J/m²"),
-                        ("interaction_range", "m"),
-                    )
+                    for key, unit in (("contact_modulus", "Pa"), ("surface_energy", "J/m²"), ("interaction_range", "m"))
                     if np.isfinite(dataset[key].sel(material=material))
                 },
             }

@@ -9,6 +9,14 @@ import math
 import re
 
 _PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: ""}
+_CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
+# Marks that cannot be seen, overrides and isolates of direction, separators of lines, halves of surrogate pairs, tags.
+# Not the joiners U+200C and U+200D, with which Persian, the languages of India and emoji are written.
+_UNSEEN = (
+    "\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
+)
+_IN_LINES = re.compile(f"[{_CONTROLS}{_UNSEEN}]")
+_IN_A_LINE = re.compile(f"[\t\n{_CONTROLS}{_UNSEEN}]")
 
 
 def counted(number: int, thing: str) -> str:
@@ -47,16 +55,6 @@ def length(metres: float) -> str:
     power = 3 * math.floor(math.log10(abs(metres)) / 3 + 1e-9) if metres else 0
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     return f"{metres * 10.0**-power:.6g} {_PREFIXES[power]}m"
-
-
-_CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
-# Marks that cannot be seen, overrides and isolates of direction, separators of lines, halves of surrogate pairs, tags.
-# Not the joiners U+200C and U+200D, with which Persian, the languages of India and emoji are written.
-_UNSEEN = (
-    "\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
-)
-_IN_LINES = re.compile(f"[{_CONTROLS}{_UNSEEN}]")
-_IN_A_LINE = re.compile(f"[\t\n{_CONTROLS}{_UNSEEN}]")
 
 
 def printable(text: object) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 # The folder beside the installed package; pyproject.toml puts it there (tool.hatch.build.targets.wheel.hooks).
 INSTALLED = "icha_workflow"
 _PACKAGE = Path(__file__).resolve().parent.parent
+_PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def own_workflow() -> Path:
@@ -31,9 +32,6 @@ def package_of(workflow: Path) -> Path:
 
 if __name__ == "__main__":
     print(own_workflow())
-
-
-_PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def beginning_of(process: int) -> str:

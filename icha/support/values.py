@@ -56,6 +56,24 @@ _SUGGESTED = {
 }
 
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
+# Names are those of folders and files, too, which commands would take for options if they began with a hyphen.
+NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
+# Letters of a name, and of one with the values that a study varies: a file's name with its ending has up to 255.
+_LONGEST_NAME, LONGEST_LABEL = 80, 200
+# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
+ROUNDING = 1e-9
+# Names that messages list at most.
+_MOST_LISTED = 30
+# Location in a configuration, value, and what is wrong with it and allowed.
+Problem = tuple[tuple, Any, str]
+# In the place of a value that is not there, in problems.
+NOTHING = object()
+Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGEST_NAME)]
+# A name, or that of a variant made by a study's `vary`.
+Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
+_RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
+# More are a slip of the pen.
+_MOST_SEEDS = 10**5
 
 
 @cache
@@ -177,31 +195,12 @@ def finite(value) -> float:
     return value
 
 
-# Names are those of folders and files, too, which commands would take for options if they began with a hyphen.
-NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
-# Letters of a name, and of one with the values that a study varies: a file's name with its ending has up to 255.
-_LONGEST_NAME, LONGEST_LABEL = 80, 200
-# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
-ROUNDING = 1e-9
-
-
 def quantity(rule: Real, example: str):
     """Type of a value that is written with its unit and kept as a float in that of `rule`."""
-    allowed = f"{PHYSICAL_NAMES[rule.unit]} with its unit"
     bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
-    allowed += f", {bounds}, such as {example!r}"
-
-    def read(value: Any) -> float:
-        try:
-            result = to_si(value, rule.unit)
-        except ValueError as error:
-            raise ValueError(f"{error}; allowed: {allowed}") from None
-        if not rule.holds(result):
-            raise ValueError(f"is out of range; allowed: {allowed}")
-        return result
-
+    allowed = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), Unit(rule.unit)]
+    return _float(lambda value: to_si(value, rule.unit), rule, allowed, schema, Unit(rule.unit))
 
 
 @dataclass(frozen=True)
@@ -213,19 +212,24 @@ class Unit:
 
 def number(rule: Real):
     """Type of a pure number; `1e-3`, which YAML takes for text, is one."""
+    bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
+    schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
+    return _float(to_number, rule, rule.allowed, schema)
+
+
+def _float(convert, rule, allowed, schema, *metadata):
+    """Type of a float that `convert` reads and that keeps to a rule; refused with what is allowed."""
 
     def read(value: Any) -> float:
         try:
-            result = to_number(value)
+            result = convert(value)
         except ValueError as error:
-            raise ValueError(f"{error}; allowed: {rule.allowed}") from None
+            raise ValueError(f"{error}; allowed: {allowed}") from None
         if not rule.holds(result):
-            raise ValueError(f"is out of range; allowed: {rule.allowed}")
+            raise ValueError(f"is out of range; allowed: {allowed}")
         return result
 
-    bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
-    schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
-    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema)]
+    return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), *metadata]
 
 
 def integer(rule: Integer):
@@ -283,10 +287,6 @@ def exactly_one(section):
     return section
 
 
-# Names that messages list at most.
-_MOST_LISTED = 30
-
-
 def listed(names: Iterable) -> str:
     """Names as a message lists them: `a, b, c`, or the first ones and how many more there are."""
     names = list(names)
@@ -294,21 +294,10 @@ def listed(names: Iterable) -> str:
     return ", ".join(map(str, names[:_MOST_LISTED])) + more
 
 
-# Location in a configuration, value, and what is wrong with it and allowed.
-Problem = tuple[tuple, Any, str]
-# In the place of a value that is not there, in problems.
-NOTHING = object()
-
-
 def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
     """The problem of a name that is none of some section's, if it is one."""
     if name not in names:
         yield location, name, f"is not defined; allowed: {listed(names) or 'none, for there is none'}"
-
-
-Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGEST_NAME)]
-# A name, or that of a variant made by a study's `vary`.
-Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
 
 
 def _without_controls(value: str) -> str:
@@ -353,11 +342,6 @@ class Section(BaseModel):
     """A part of the configuration: immutable, and without room for keys that nobody reads."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-_RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
-# More are a slip of the pen.
-_MOST_SEEDS = 10**5
 
 
 def _seeds(value: Any) -> Any:

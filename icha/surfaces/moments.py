@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 # isotropic surfaces have about 0.2 summits for every square of the shortest wave.
 RESOLVED_CELLS = 8
 LEAST_CELLS_OF_SUMMIT = 80
+# A smaller mean square slope, over that across it, is rounding.
+_NO_SLOPE = 1e-12
+# Waves shorter than this part of the period are so dense that sums over them are integrals.
+_DENSE = 64
 
 
 def cells_per_short_wave(grid: int, summits: float) -> float:
@@ -31,12 +35,6 @@ def cells_per_short_wave(grid: int, summits: float) -> float:
 def summit_density(m2: float, m4: float) -> float:
     """Maxima of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), of its moments; m^-2 (Nayak 1971)."""
     return m4 / (6 * math.sqrt(3) * math.pi * m2)
-
-
-# A smaller mean square slope, over that across it, is rounding.
-_NO_SLOPE = 1e-12
-# Waves shorter than this part of the period are so dense that sums over them are integrals.
-_DENSE = 64
 
 
 def self_affine_full_contact_energy(

@@ -58,6 +58,12 @@ _BEYOND = 32
 # Rows or columns of the grid, and points between them, that are worked on at a time, which bounds the memory.
 _LINES = 16
 _POINTS = 4096
+# Largest share of the load, and of the summits, that may be without support before asperities do not stand for the
+# surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
+MAX_SHARE = 0.1
+# Rows and columns between a node and the summit that stands for it: on a crest oblique to the grid there are two nodes
+# higher than their neighbours beside one summit.
+_NEAR = range(-2, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,14 +288,6 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
     step = np.stack([(hxx * gy - hyx * gx) / safe, (hyy * gx - hyx * gy) / safe], axis=-1)
     step[~concave] = 0.0
     return concave, determinant, step
-
-
-# Largest share of the load, and of the summits, that may be without support before asperities do not stand for the
-# surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
-MAX_SHARE = 0.1
-# Rows and columns between a node and the summit that stands for it: on a crest oblique to the grid there are two nodes
-# higher than their neighbours beside one summit.
-_NEAR = range(-2, 3)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,22 +6,6 @@ import pytest
 from icha.configuration.cases import run_cases
 from icha.configuration.errors import ConfigurationError
 
-BAD = {
-    # key, value, what the message must say of it
-    "unknown default": (
-        "defaults",
-        {"materials": {"modulus": "1 MPa"}},
-        "defaults.materials.modulus: unknown key",
-    ),
-    "default of no kind of surface": ("defaults", {"surfaces": {"hrust": 0.8}}, "defaults.surfaces.hrust: unknown key"),
-    "unknown section of defaults": ("defaults", {"figures": {}}, "defaults.figures: unknown key; allowed: materials"),
-}
-
-
-@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
-def test_mistakes_are_named(case, refused):
-    refused(*BAD[case])
-
 
 def test_defaults_serve_entries_that_do_not_give_their_own(load, tmp_path):
     np.save(tmp_path / "own.npy", np.random.default_rng(1).random((16, 16)))

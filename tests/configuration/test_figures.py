@@ -6,53 +6,6 @@ from demo_configuration import LONG_RANGE, TRUTH
 from icha.configuration.errors import ConfigurationError
 from icha.figures.fig4_contact_map import finest_solution
 
-BAD = {
-    # key, value, what the message must say of it
-    "figure of a loss without a way back": (
-        "figures",
-        {"fig15_loss": {"studies": ["one"]}},
-        "figures.fig15_loss.studies[0]: 'one' is not unloaded",
-    ),
-    "figure of loops without a way back": ("figures", {"fig13_loops": {"study": "one"}}, "is not unloaded"),
-    "figure of pull-off of no study": (
-        "figures",
-        {"fig14_pull_off": {"study": "one", "load_studies": ["two"]}},
-        "figures.fig14_pull_off.load_studies[0]: 'two' is not defined",
-    ),
-    "figure of no study": ("figures", {"fig2_area_and_gap": {"study": "two"}}, "'two' is not defined; allowed: one"),
-    "unknown figure": ("figures", {"fig7": {}}, "figures.fig7: unknown key"),
-    "figure without its snapshots": (
-        "figures",
-        {"fig6_spots_by_slope": {"study": "one"}},
-        "has no snapshot of kind relative_load",
-    ),
-    "figure of another snapshot": (
-        "figures",
-        {"fig3_distributions": {"study": "one", "snapshot": {"area_fraction": 0.1}}},
-        "'area_fraction 0.1' is no snapshot of study 'one'; allowed: area_fraction 0.02",
-    ),
-    "map of a seed that is not there": (
-        "figures",
-        {"fig4_contact_map": {"study": "one", "seed": 9}},
-        "figures.fig4_contact_map.seed: 9 is not in study 'one'; allowed: 1, 2",
-    ),
-    "error without boundary elements": (
-        "figures",
-        {"fig10_model_error": {"study": "one"}},
-        "figures.fig10_model_error.study: 'one' has no boundary elements beside it",
-    ),
-    "figure of error sources": (
-        "figures",
-        {"fig12_error_sources": {"entry": "why"}},
-        "figures.fig12_error_sources: is no longer a figure",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
-def test_mistakes_are_named(case, refused):
-    refused(*BAD[case])
-
 
 def test_figures_of_snapshots_need_one(load):
     figures = {"fig3_distributions": {"study": "one"}}

@@ -1,11 +1,13 @@
 """Files of configurations: what is no configuration, overrides, all mistakes at once."""
 
+from datetime import date
+
 import pytest
 from demo_configuration import measured_surface
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
-from icha.configuration.yaml_files import read_yaml
+from icha.configuration.yaml_files import dumped, read_yaml
 
 
 def test_all_mistakes_are_named_at_once(load):
@@ -64,9 +66,25 @@ def test_missing_file(tmp_path):
         load_configuration(tmp_path / "none.yaml")
 
 
-def test_days_that_no_calendar_has_are_text_until_they_are_checked(tmp_path):
-    (tmp_path / "one.yaml").write_text("publication: {date: 2026-02-30}")
-    assert read_yaml(tmp_path / "one.yaml") == {"publication": {"date": "2026-02-30"}}
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("064", 64),
+        ("[010, 0_20, -07]", [10, 20, -7]),
+        ("0", 0),
+        ("0x10", 16),
+        ("1_000", 1000),
+        ("1:30", "1:30"),
+        ("1:30.5", "1:30.5"),
+        ("2001-02-03", date(2001, 2, 3)),
+    ],
+)
+def test_leading_zeros_are_no_octal_numbers_and_colons_no_base_of_60(tmp_path, text, value):
+    (tmp_path / "a.yaml").write_text(f"grid: {text}\n")
+    content = read_yaml(tmp_path / "a.yaml")
+    assert content == {"grid": value}
+    (tmp_path / "b.yaml").write_text(dumped(content, "a"))
+    assert read_yaml(tmp_path / "b.yaml") == content
 
 
 @pytest.mark.parametrize(
@@ -90,3 +108,8 @@ def test_slopes_of_scans_are_compared_once_they_are_known(load):
     assert load({**measured, "figures": {"fig4_contact_map": {"study": "one", "rms_slope": slope}}})
     with pytest.raises(ConfigurationError, match=r"rms_slope: 0.5 is not in study 'one'"):
         load({**measured, "figures": {"fig4_contact_map": {"study": "one", "rms_slope": 0.5}}})
+
+
+def test_campaigns_are_immutable(load):
+    with pytest.raises(ValueError, match="frozen"):
+        load().campaign.materials["soft"].contact_modulus = 1.0

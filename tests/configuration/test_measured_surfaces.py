@@ -4,7 +4,6 @@ import pytest
 from demo_configuration import measured_surface
 
 from icha.configuration.cases import run_cases, surface_settings
-from icha.configuration.errors import ConfigurationError
 from icha.configuration.surfaces import MeasuredSurface
 from icha.surfaces.measured.settings import Preparation
 from icha.surfaces.measured.topography import prepared_topography
@@ -69,34 +68,6 @@ def test_a_measured_surface_at_its_own_slope(load):
 
 def surface_settings_of_file(campaign, name):
     return {key: value for key, value in surface_settings(campaign, name).items() if key != "kind"}
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"path": "none.txt"}, "surfaces.rough.path: "),
-        ({"boundary": "reflecting"}, "surfaces.rough.boundary: 'reflecting' is not a choice; allowed: 'periodic'"),
-        ({"boundary": None}, "surfaces.rough.boundary: the key is missing; needed: What lies beyond the edges"),
-        ({"missing": "refuse"}, "surfaces.rough.missing: 'refuse'"),
-        ({"height_unit": None}, "surfaces.rough.height_unit: "),
-        ({"height_unit": "kg"}, "surfaces.rough.height_unit: 'kg'"),
-        ({"size": ["1 mm"]}, "surfaces.rough.size: ['1 mm'] has 1 entries; allowed: one length"),
-        ({"crop": {"x": "0 um", "y": "0 um", "side": "1 mm"}}, "surfaces.rough.crop: "),
-        ({"crop": {"x": "0 um", "z": "0 um"}}, "surfaces.rough.crop.z: unknown key"),
-        ({"taper": 0.7}, "surfaces.rough.taper: 0.7 is out of range; allowed: a number in (0, 0.5]"),
-        ({"boundary": "mirror", "taper": 0.2}, "taper: is for boundary window, this one is mirror; allowed"),
-        ({"boundary": "periodic", "detrend": "tilt"}, "detrend: 'tilt' would break the periodicity; allowed"),
-        ({"format": "xyz"}, "surfaces.rough.path: "),
-        ({"hurst": 0.8}, "surfaces.rough.hurst: unknown key"),
-    ],
-)
-def test_mistakes_about_measured_surfaces(changes, message, load, tmp_path):
-    section = {key: value for key, value in measured_surface(**changes).items() if value is not None}
-    with pytest.raises(ConfigurationError) as error:
-        load({"surfaces.rough": section})
-    lines = str(error.value).splitlines()
-    assert any(message in line and line.startswith(f"{tmp_path}/campaign.yaml: ") for line in lines), lines
-    assert all("allowed: " in line or "needed: " in line for line in lines), lines
 
 
 def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):

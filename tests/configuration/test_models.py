@@ -1,7 +1,7 @@
 """Key `models` of a study: by which models of contact its runs are computed."""
 
 import pytest
-from demo_configuration import LONG_RANGE, TRUTH, measured_surface
+from demo_configuration import measured_surface
 
 from icha.configuration.cases import run_cases, run_settings, run_sha256
 from icha.configuration.errors import ConfigurationError
@@ -12,37 +12,6 @@ from icha.planning.results import campaign_files
 
 BOTH = {"studies.one.models": ["asperities", "boundary_elements"]}
 ALONE = {"studies.one.models": ["boundary_elements"]}
-BAD = {
-    "none": ("studies.one.models", [], "studies.one.models: [] is empty; allowed: at least one"),
-    "no list": ("studies.one.models", "boundary_elements", "studies.one.models: 'boundary_elements' is not a list"),
-    "twice": ("studies.one.models", ["asperities", "asperities"], "'asperities' is given twice; allowed: every entry"),
-    "unknown": (
-        "studies.one.models",
-        ["tamaas"],
-        "studies.one.models[0]: 'tamaas' is not a choice; allowed: 'asperities' or 'boundary_elements'",
-    ),
-    "free square": (
-        None,
-        BOTH | {"surfaces.rough": measured_surface(boundary="free")},
-        "studies.one.models[1]: 'boundary_elements' need a periodic surface, and 'rough' is a square with free edges",
-    ),
-    "grid too coarse": (
-        None,
-        ALONE | {"surfaces.rough.grid": 39},
-        "'boundary_elements' need at least 4 grid cells per shortest wavelength, and 'rough' has 3.9; allowed: "
-        "asperities, or a `grid` of 40 or more for 'rough' (recommended: 80)",
-    ),
-    "nothing to compare with": (
-        None,
-        ALONE | LONG_RANGE | {"finite_range": {"truth": TRUTH}},
-        "finite_range.truth.study: 'one' has no runs to compare with; allowed: a study with 'asperities' among",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
-def test_mistakes_are_named(case, refused):
-    refused(*BAD[case])
 
 
 def test_grids_of_4_to_8_cells_are_warned_of_only_for_boundary_elements(load):

@@ -58,10 +58,8 @@ def test_wrong_keys_are_named(file, keys, words):
 
 
 def test_importing_the_package_loads_no_reader():
-    script = (
-        "import icha, sys; print([m for m in ('numpy', 'pydantic', 'h5py', 'SurfaceTopography') if m in sys.modules])"
-    )
-    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout.strip() == "[]"
+    script = "import icha, sys; print(not {'numpy', 'pydantic', 'h5py', 'SurfaceTopography'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout.strip() == "True"
 
 
 @pytest.mark.filterwarnings("error")
@@ -74,7 +72,7 @@ def test_periodic_surfaces_give_no_warning(grid, cells, roll_off, hurst):
 
 @pytest.mark.filterwarnings("error")
 def test_white_noise_single_waves_and_domes_give_no_warning():
-    for seed in range(300):
+    for seed in range(50):
         icha.Surface(np.random.default_rng(seed).normal(size=(8, 8)), 1.0)
     x = np.arange(64)
     for k in (1, 2, 7, 31):

@@ -8,52 +8,6 @@ from icha.configuration.cases import run_cases, surface_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
 from icha.datasets.labels import number_label
 
-BAD = {
-    # key, value, what the message must say of it
-    "unknown key of a surface": ("surfaces.rough.hrust", 0.8, "surfaces.rough.hrust: unknown key"),
-    "missing unit in text": ("surfaces.rough.period", "100", "surfaces.rough.period: '100' the unit is missing"),
-    "unknown unit": ("surfaces.rough.period", "100 umm", "'umm' is not a unit of length"),
-    "unit on a number": ("surfaces.rough.hurst", "0.8 m", "is a pure number and takes no unit"),
-    "infinite length": ("surfaces.rough.period", "1e999 m", "is not finite"),
-    "not a number of metres": ("surfaces.rough.period", "nan m", "is not a number with a unit"),
-    "boolean quantity": ("surfaces.rough.period", True, "is not a number with a unit"),
-    "Hurst exponent 0": ("surfaces.rough.hurst", 0, "(0, 1]"),
-    "Hurst exponent above 1": ("surfaces.rough.hurst", 1.2, "surfaces.rough.hurst: 1.2 is out of range"),
-    "boolean Hurst exponent": ("surfaces.rough.hurst", True, "surfaces.rough.hurst: True is not a number"),
-    "NaN": ("surfaces.rough.hurst", float("nan"), "is not finite"),
-    "cut-off below two cells": ("surfaces.rough.grid", 19, "1.9 grid cells per shortest wavelength"),
-    "grid is no integer": ("surfaces.rough.grid", 80.0, "is not an integer"),
-    "boolean grid": ("surfaces.rough.grid", True, "is not an integer"),
-    "q0 below qL": ("surfaces.rough.rolloff_wavelength", "101 um", "longer than the period (q0 < qL)"),
-    "q1 at q0": ("surfaces.rough.short_wavelength", "20 um", "not shorter than the roll-off wavelength (q1 <= q0)"),
-    "unknown kind of surface": ("surfaces.rough.kind", "fractal", "allowed: self_affine, file"),
-    "unknown amplitudes": ("surfaces.rough.amplitudes", "random", "'fixed' or 'gaussian'"),
-    "no surfaces": ("surfaces", {}, "surfaces: {} is empty"),
-    "surfaces no mapping": ("surfaces", [1], "is not a mapping"),
-    "section no mapping": ("surfaces.rough", 3, "surfaces.rough"),
-    "grid beyond any memory": ("surfaces.rough.grid", 10**9, "surfaces.rough.grid"),
-    "missing surface file": (
-        "surfaces.rough",
-        {"kind": "file", "path": "none.npy", "height_unit": "um", "period": "1 mm"},
-        "no such file",
-    ),
-    "height unit": (
-        "surfaces.rough",
-        {"kind": "file", "path": "none.npy", "height_unit": "kg", "period": "1 mm"},
-        "allowed: a unit of length",
-    ),
-    "braces in a path": (
-        "surfaces.rough",
-        {"kind": "measured", "path": "scans{1}/a.txt"},
-        "surfaces.rough.path: 'scans{1}/a.txt' has braces; allowed: the path of a file without { and } in it",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
-def test_mistakes_are_named(case, refused):
-    refused(*BAD[case])
-
 
 def test_the_slope_that_a_topography_has(load, tmp_path):
     period, amplitude, size = 1e-3, 2e-6, 32

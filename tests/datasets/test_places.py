@@ -35,7 +35,7 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
-from icha.report import model_error as error_section
+from icha.report import sections as error_section
 from icha.report.studies import study_section
 
 

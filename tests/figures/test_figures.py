@@ -1,7 +1,6 @@
 """Figures can be drawn from small and unusual campaigns, say what is wrong, and have the same bytes every time."""
 
 import itertools
-import re
 
 import compared_campaign as compared
 import cyclic_campaign as cyclic
@@ -32,22 +31,10 @@ from icha.figures import (
     fig11_distribution_error,
 )
 from icha.figures.curves import GAP_LABEL, SEPARATION_LABEL, gap_label
-from icha.figures.maps import block_means
-from icha.figures.palette import material_colours, place_markers
-from icha.figures.scale import Scale, materials_scale, places_scale
-from icha.figures.select import NothingToDraw, branches, path_steps, snapshot_label, study_runs
-from icha.figures.spots import circles_in_cell
-from icha.figures.style import (
-    BLACK,
-    logarithmic_axes,
-    material_label,
-    new_figure,
-    number,
-    quantity,
-    save,
-    slope_label,
-    unit_for,
-)
+from icha.figures.looks import Scale, material_colours, materials_scale, place_markers, places_scale
+from icha.figures.maps import block_means, circles_in_cell
+from icha.figures.select import NothingToDraw, branches, path_steps, study_runs
+from icha.figures.style import BLACK, logarithmic_axes, new_figure, number, quantity, save, slope_label, unit_for
 from icha.references.persson import persson_area
 from icha.references.theories import reference_dataset
 from icha.support.statistics import ensemble
@@ -67,57 +54,22 @@ def solution(pressure=3e-3, shift=0):
     return own.assign(contact=own["contact"].roll(x=shift))
 
 
-def draw(name, surface):
-    tree = small.tree()
-    return {
-        "fig1": lambda: fig1_jkr.figure(),
-        "fig2": lambda: fig2_area_and_gap.figure(tree, reference_dataset(small.SPECTRUM), study="slopes"),
-        "fig2_alone": lambda: fig2_area_and_gap.figure(tree, study="single"),
-        "fig3": lambda: fig3_distributions.figure(tree, study="slopes"),
-        "fig3_one": lambda: fig3_distributions.figure(tree, study="single", kind="area_fraction"),
-        "fig4": lambda: fig4_contact_map.figure(tree, surface, study="slopes", rms_slope=0.2, material="hertz"),
-        "fig5": lambda: fig5_multi_slope.figure(tree, study="slopes"),
-        "fig5_one": lambda: fig5_multi_slope.figure(tree, study="single"),
-        "fig6": lambda: fig6_spots_by_slope.figure(tree, study="slopes", material="hertz"),
-        "fig6_one": lambda: fig6_spots_by_slope.figure(tree, study="single", seed=2),
-        "fig7": lambda: fig7_stiffness.figure(tree, reference_dataset(small.SPECTRUM), study="slopes"),
-        "fig7_alone": lambda: fig7_stiffness.figure(tree, study="single"),
-        "fig8": lambda: fig8_patch_sizes.figure(tree, study="slopes"),
-        "fig8_one": lambda: fig8_patch_sizes.figure(tree, study="single", kind="area_fraction"),
-        "fig9": lambda: fig9_tabor.figure(tree, study="slopes"),
-        "fig2_truth": lambda: fig2_area_and_gap.figure(compared.tree_of_both(), None, compared.errors(), study="one"),
-        "fig3_truth": lambda: fig3_distributions.figure(compared.tree(), compared.errors(), study="one"),
-        "fig7_truth": lambda: fig7_stiffness.figure(compared.tree_of_both(), study="one"),
-        "fig8_truth": lambda: fig8_patch_sizes.figure(compared.tree_of_both(), study="one"),
-        "fig4_truth": lambda: fig4_contact_map.figure(compared.tree(), surface, solution(), study="one"),
-        "fig10": lambda: fig10_model_error.figure(compared.tree(), compared.errors(), study="one"),
-        "fig11": lambda: fig11_distribution_error.figure(compared.tree(), compared.errors(), study="one"),
-        "fig2_loops": lambda: fig2_area_and_gap.figure(cyclic.tree(), study="loops"),
-        "fig5_loops": lambda: fig5_multi_slope.figure(cyclic.tree(), study="loops"),
-        "fig9_one": lambda: fig9_tabor.figure(tree, study="single", kind="area_fraction"),
-    }[name]()
-
-
-NAMES = ["fig1", "fig2", "fig2_alone", "fig3", "fig3_one", "fig4", "fig5", "fig5_one", "fig6", "fig6_one"]
-NAMES += ["fig7", "fig7_alone", "fig8", "fig8_one", "fig9", "fig9_one"]
-NAMES += ["fig2_loops", "fig5_loops", "fig2_truth", "fig3_truth", "fig4_truth", "fig7_truth", "fig8_truth"]
-NAMES += ["fig10", "fig11"]
-FIGURES = [fig1_jkr, fig2_area_and_gap, fig3_distributions, fig4_contact_map, fig5_multi_slope, fig6_spots_by_slope]
-FIGURES += [fig7_stiffness, fig8_patch_sizes, fig9_tabor]
 KIND = "reduced_pressure"
-COMPARED = [fig10_model_error, fig11_distribution_error]
 
 
-QUICK = ("fig4_truth", "fig6")  # with images, and with circles
-
-
-@pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
-)
+# With images, with circles, and with the colours of many surfaces.
+@pytest.mark.parametrize("name", ["fig6", *(pytest.param(name, marks=pytest.mark.slow) for name in ("fig4", "fig10"))])
 def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, name):
-    save(draw(name, surface), tmp_path / "a.png", tmp_path / "a.pdf")
+    def draw():
+        return {
+            "fig4": lambda: fig4_contact_map.figure(compared.tree(), surface, solution(), study="one"),
+            "fig6": lambda: fig6_spots_by_slope.figure(small.tree(), study="slopes", material="hertz"),
+            "fig10": lambda: fig10_model_error.figure(compared.tree(), compared.errors(), study="one"),
+        }[name]()
+
+    save(draw(), tmp_path / "a.png", tmp_path / "a.pdf")
     with mpl.rc_context({"font.size": 30, "lines.linewidth": 9, "axes.grid": True, "savefig.dpi": 33}):
-        save(draw(name, surface), tmp_path / "b.png", tmp_path / "b.pdf")
+        save(draw(), tmp_path / "b.png", tmp_path / "b.pdf")
     for kind in ("png", "pdf"):
         one, two = ((tmp_path / f"{each}.{kind}").read_bytes() for each in "ab")
         assert one == two
@@ -130,32 +82,12 @@ def legend(figure):
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def lines(axes):
-    return [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
-
-
 def test_fig1_passes_through_the_known_points():
     axes = fig1_jkr.figure(tabor_parameter=3.0).axes[0]
     marks = {text.get_text(): text.xy for text in axes.texts if text.get_text() in "ABC" and text.get_text()}
     assert marks["C"] == pytest.approx((-1.608772, -5 * np.pi / 6), abs=1e-5)
     assert marks["B"] == pytest.approx((-0.773417, -1.5 * np.pi), abs=1e-5)
     assert marks["A"] == pytest.approx(((1 - 2.641 * 3 ** (3 / 7)) / 3, 0), abs=1e-9)
-
-
-def test_fig2_shows_every_run_and_the_references():
-    figure = fig2_area_and_gap.figure(small.tree(), reference_dataset(small.SPECTRUM), study="slopes")
-    left, right = figure.axes[:2]
-    # Published points are those of another surface.
-    assert {"Persson", "Bush, Gibson & Thomas"} <= set(legend(figure)) and "GFMD, no adhesion" not in legend(figure)
-    published = icha.SelfAffineSpectrum(period=1e-4, rolloff_wavelength=1e-4, short_wavelength=1e-6, hurst=0.8)
-    other = fig2_area_and_gap.figure(small.tree(), reference_dataset(published), study="slopes")
-    assert "GFMD, no adhesion" in legend(other)
-    drawn = [line for line in left.get_lines() if line.get_linestyle() == "None" and len(line.get_xdata()) == 4]
-    assert len(drawn) == 4
-    run = small.run(rms_slope=0.2, material="soft")
-    expected = path_steps(run)["contact_area_fraction"].values
-    assert any(np.array_equal(line.get_ydata(), expected) for line in drawn)
-    assert left.get_xscale() == left.get_yscale() == right.get_xscale() == right.get_yscale() == "log"
 
 
 def test_branches_begin_where_the_one_before_ends():
@@ -178,13 +110,11 @@ def test_stops_are_those_of_the_first_loading():
         )
 
 
-@pytest.mark.parametrize("module", [fig2_area_and_gap, fig5_multi_slope])
-def test_ways_back_are_thin_dashed_lines_in_the_colour_of_the_material(module):
+def test_ways_back_are_thin_dashed_lines_in_the_colour_of_the_material():
     runs = {labels: run for labels, run in cyclic.runs().items() if (labels.study, labels.seed) == ("loops", 2)}
-    figure = module.figure(campaign_tree(runs.items()), study="loops")
-    left, right = figure.axes[:2]
+    figure = fig5_multi_slope.figure(campaign_tree(runs.items()), study="loops")
     assert legend(figure).count("unloading") == 1
-    for axes in (left, right):
+    for axes in figure.axes:
         ways = [line for line in axes.get_lines() if line.get_linewidth() == 0.7 and len(line.get_xdata())]
         markers = [line for line in axes.get_lines() if line.get_marker() not in ("None", "") and len(line.get_xdata())]
         assert len(ways) == len(markers) == 2
@@ -195,13 +125,10 @@ def test_ways_back_are_thin_dashed_lines_in_the_colour_of_the_material(module):
             assert way.get_xdata()[0] in {line.get_xdata()[-1] for line in markers}
             assert np.all(way.get_xdata()[np.isfinite(way.get_xdata())] > 0)
     run = cyclic.run(seed=2, material="soft", between=4)
-    back = run.isel(step=run["leg"].values == 1)
-    pushed = back["reduced_pressure"].values > 0
-    assert 0 < np.count_nonzero(pushed) < len(pushed)
-    drawn = np.concatenate([line.get_xdata() for line in left.get_lines() if line.get_linewidth() == 0.7])
-    assert set(back["reduced_pressure"].values[pushed]) <= set(drawn)
-    alone = module.figure(small.tree(), study="slopes")
-    assert not [line for axes in alone.axes for line in axes.get_lines() if line.get_linewidth() == 0.7]
+    back = run["reduced_pressure"].values[run["leg"].values == 1]
+    assert 0 < np.count_nonzero(back > 0) < len(back)
+    drawn = np.concatenate([line.get_xdata() for line in figure.axes[0].get_lines() if line.get_linewidth() == 0.7])
+    assert set(back[back > 0]) <= set(drawn)
 
 
 def test_figures_of_the_first_loading_do_not_see_the_way_back():
@@ -216,17 +143,15 @@ def test_figures_of_the_first_loading_do_not_see_the_way_back():
             np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
 
 
-def test_the_state_of_pull_off_can_be_drawn(tmp_path):
+def test_the_state_of_pull_off_can_be_drawn():
     run = cyclic.run(between=2).copy(deep=True)
     run["snapshot_kind"].values[1] = "pull_off"
     run["snapshot_target"].values[1] = 0.0
     run["snapshot_step"].values[1] = run.sizes["step"] - 2
-    assert snapshot_label(run, 1) == "pull-off"
     tree = campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)])
-    for module in (fig3_distributions, fig8_patch_sizes):
-        figure = module.figure(tree, study="one", kind="pull_off")
-        assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
-        assert not any(line.get_label() == "Persson" for axes in figure.axes for line in axes.get_lines())
+    figure = fig3_distributions.figure(tree, study="one", kind="pull_off")
+    assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
+    assert "Persson" not in legend(figure)
 
 
 def test_fig3_points_keep_the_probability():
@@ -255,38 +180,30 @@ def test_fig4_refuses_the_surface_of_another_run(tmp_path, surface):
 
 
 def test_fig4_draws_means_of_large_topographies():
-    rng = np.random.default_rng(5)
-    for n in (3000, 2048, 1024, 7):
-        heights = rng.normal(size=(n, n)) if n < 3000 else np.add.outer(np.arange(n) ** 2.0, np.arange(n) * 10.0)
-        drawn = block_means(heights)
-        assert drawn.shape == (min(n, 1024),) * 2
-        if n == 2048:
-            assert drawn[3, 5] == pytest.approx(heights[6:8, 10:12].mean())
-        if n == 3000:
-            # A block of nodes from 3000 k/1024 to the next.
-            rows, columns = np.arange(2929, 2932), np.arange(1464, 1467)
-            assert drawn[1000, 500] == pytest.approx(np.add.outer(rows**2.0, columns * 10.0).mean())
+    n = 3000
+    heights = np.add.outer(np.arange(n) ** 2.0, np.arange(n) * 10.0)
+    drawn = block_means(heights)
+    assert drawn.shape == (1024, 1024) and block_means(heights[:7, :7]).shape == (7, 7)
+    # A block of nodes from 3000 k/1024 to the next.
+    rows, columns = np.arange(2929, 2932), np.arange(1464, 1467)
+    assert drawn[1000, 500] == pytest.approx(np.add.outer(rows**2.0, columns * 10.0).mean())
 
 
-def test_fig4_enlarges_small_spots_more_and_stays_small(tmp_path):
+def test_fig4_enlarges_small_spots_more(tmp_path):
     rng = np.random.default_rng(4)
-    grid, count = 1500, 5000
+    grid, count = 1100, 50
     surface = icha.Surface(rng.normal(size=(grid, grid)) * 1e-8, period=100e-6)
     write_surface(tmp_path / "s.nc", surface, name="rough", seed=1)
     run = small.run().drop_dims("spot")
-    radius = rng.uniform(0.05e-6, 0.1e-6, count)
-    spots = {"spot_x": rng.uniform(0, 1e-4, count), "spot_y": rng.uniform(0, 1e-4, count), "spot_radius": radius}
-    spots |= {"spot_snapshot": np.zeros(count, int)}
+    spots = {name: rng.uniform(0, 1e-4, count) for name in ("spot_x", "spot_y")}
+    spots |= {"spot_radius": rng.uniform(0.05e-6, 0.1e-6, count), "spot_snapshot": np.zeros(count, int)}
     run = run.assign({name: ("spot", values, small.run()[name].attrs) for name, values in spots.items()})
     run["grid"] = run["grid"].copy(data=grid)
     tree = campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)])
     figure = fig4_contact_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="one")
     whole, enlarged = (np.ptp(axes.get_xlim()) for axes in figure.axes[:2])
-    assert whole == pytest.approx(100)
     # 40 radii are 3.2 um or so, but 64 cells are more.
-    assert enlarged == pytest.approx(100 / 16)
-    save(figure, tmp_path / "a.png", tmp_path / "a.pdf")
-    assert (tmp_path / "a.pdf").stat().st_size < 2e6
+    assert whole == pytest.approx(100) and enlarged == pytest.approx(100 / 16)
 
 
 def test_circles_continue_across_borders():
@@ -322,22 +239,17 @@ def test_fig5_lays_measurements_over_the_curves(tmp_path):
     np.testing.assert_allclose(shifted[0].get_xdata(), [2e-4, 2e-3, 4e-3])
 
 
-def test_fig5_slope_orders_the_curves_at_equal_load():
-    right = fig5_multi_slope.figure(small.tree(), study="slopes").axes[1]
-    by_marker = {}
-    for line in lines(right):
-        by_marker.setdefault(line.get_marker(), []).append((line.get_xdata(), line.get_ydata()))
-    assert set(by_marker) == {"o", "s"}
-    (steep, _), (flat, _) = by_marker["o"][0], by_marker["s"][0]
-    np.testing.assert_allclose(flat, 0.2 * steep, rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    "module", [m for m in FIGURES if m not in (fig1_jkr, fig4_contact_map)], ids=lambda m: m.__name__
-)
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig3_distributions, fig6_spots_by_slope, fig9_tabor])
 def test_unknown_studies_are_named(module):
     with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, single"):
         module.figure(small.tree(), study="nothing")
+
+
+def test_what_is_not_there_is_named_with_what_is():
+    with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; there are some for one"):
+        fig10_model_error.figure(compared.tree(), compared.errors(), study="slopes")
+    with pytest.raises(ValueError, match="no material 'steel' in this study; there are soft"):
+        fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
 
 
 def test_fig7_is_the_slope_of_fig2_whatever_the_rms_slope():
@@ -381,35 +293,12 @@ def test_fig8_density_and_counts_of_a_known_distribution():
     np.testing.assert_allclose(above * nominal, [np.count_nonzero(area >= a) for a in at])
 
 
-@pytest.mark.parametrize("areas", [[], [2.0], [2.0, 2.0], [1.0, 2.0, 5.0]])
+@pytest.mark.parametrize("areas", [[], [2.0], [1.0, 2.0, 5.0]])
 def test_fig8_of_few_patches(areas):
     at, (density,) = fig8_patch_sizes.patch_density([np.array(areas)], 10.0)
     assert len(at) == min(len(areas), 1) and np.all(np.isfinite(density))
     at, (above,) = fig8_patch_sizes.patches_above([np.array(areas)], 10.0)
     assert len(at) == len(above) == len(areas)
-
-
-def test_fig8_counts_the_patches_of_every_member():
-    rng = np.random.default_rng(3)
-    areas = [np.sort(rng.pareto(1.0, count) + 1) for count in (900, 1100, 0)]
-    at, densities = fig8_patch_sizes.patch_density(areas, 10.0)
-    assert densities.shape == (3, len(at)) and not densities[2].any()
-    ratio = densities[1] / densities[0]
-    # One distribution, and eleven patches for nine.
-    assert np.median(ratio) == pytest.approx(11 / 9, rel=0.2)
-    at, above = fig8_patch_sizes.patches_above(areas, 10.0)
-    for counts, area in zip(above * 10.0, areas, strict=True):
-        np.testing.assert_allclose(counts, [np.count_nonzero(area >= a) for a in at])
-
-
-def test_fig8_counts_the_spots_of_the_snapshot():
-    run = small.run()
-    for at in range(run.sizes["snapshot"]):
-        step = int(run["snapshot_step"].values[at])
-        areas = fig8_patch_sizes.patch_areas(run, at)
-        assert len(areas) == int(run["spot_count"].values[step])
-        share = areas.sum() / float(run["period"]) ** 2
-        assert share == pytest.approx(float(run["contact_area_fraction"].values[step]), rel=1e-9)
 
 
 def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
@@ -451,23 +340,6 @@ def test_fig2_marks_boundary_elements_in_the_colour_of_the_material():
     assert not [line for line in alone.axes[0].get_lines() if line.get_marker() in ("+", "1")]
 
 
-def test_fig2_marks_both_kinds_of_boundary_elements():
-    tree = compared.tree_of_both(area=1.5, separation=0.9)
-    figure = fig2_area_and_gap.figure(tree, None, compared.short_range_errors(), study="one")
-    runs = compared.runs()
-    for axes, name, factor in zip(
-        figure.axes[:2], ("contact_area_fraction", "reduced_separation"), (1.5, 0.9), strict=True
-    ):
-        crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
-        assert len(crosses) == 2
-        for line, material in zip(crosses, ("soft", "hertz"), strict=True):
-            own = [run[name].values for labels, run in runs.items() if labels.material == material]
-            np.testing.assert_allclose(line.get_ydata(), factor * np.mean(own, axis=0), rtol=1e-9)
-        assert len([line for line in axes.get_lines() if line.get_marker() == "1" and len(line.get_xdata())]) == 2
-    names = legend(figure)
-    assert {"boundary elements", "boundary elements at finite range"} <= set(names) and len(names) == len(set(names))
-
-
 def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
     moments = spectral_moments(small.surface())
     adhesive = {(1.0, "soft"): small.MATERIALS["soft"], (1.0, "other"): icha.Material(1e6, 0.02, 2e-9)}
@@ -478,6 +350,11 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
         names
     )
     assert len(names) == len(set(names))
+    # Published points are those of another surface.
+    assert "GFMD, no adhesion" not in names
+    published = icha.SelfAffineSpectrum(period=1e-4, rolloff_wavelength=1e-4, short_wavelength=1e-6, hurst=0.8)
+    other = fig2_area_and_gap.figure(small.tree(), reference_dataset(published), study="slopes")
+    assert "GFMD, no adhesion" in legend(other)
     for axes, name in zip(figure.axes[:2], ("summit_area_fraction", "reduced_separation"), strict=True):
         drawn = [line for line in axes.get_lines() if line.get_linewidth() == 0.8 and len(line.get_xdata())]
         assert len(drawn) == 2  # Greenwood & Williamson, and Fuller & Tabor of the study's material
@@ -487,16 +364,6 @@ def test_fig2_draws_theories_of_separate_summits_where_there_are_any():
         assert np.all(drawn[1].get_xdata() > 0)
         runs = {line.get_markeredgecolor() for line in axes.get_lines() if line.get_marker() not in ("1", "x", "None")}
         assert drawn[1].get_color() in runs
-
-
-def test_fig2_tells_further_solutions_of_the_same_states_apart():
-    bare = compared.errors()["bare"].to_dataset()
-    twice = xr.DataTree.from_dict({"/first": bare, "/finer": bare})
-    figure = fig2_area_and_gap.figure(compared.tree(), None, twice, study="one")
-    axes, names = figure.axes[0], legend(figure)
-    name = "boundary elements at finite range"
-    assert name in names and f"{name}, finer" in names
-    assert {"1", "2"} <= {line.get_marker() for line in axes.get_lines()}
 
 
 def test_fig3_shows_boundary_elements_of_the_same_state_only():
@@ -535,21 +402,6 @@ def test_fig3_shows_the_limit_of_a_short_range_where_it_is_known():
     assert {"boundary elements", "boundary elements at finite range"} <= set(legend(figure))
 
 
-def test_fig3_joined_bins_keep_what_they_hold():
-    rng = np.random.default_rng(3)
-    edges, content = np.cumsum(rng.uniform(0.1, 1, 41)), rng.uniform(0, 1, 40) * (rng.random(40) < 0.5)
-    low, high, (density,) = fig3_distributions._joined(edges, content[None], 0.7)
-    assert low[0] == edges[0] and np.array_equal(low[1:], high[:-1])
-    held = density * (high - low)
-    assert np.all(held >= 0.7 - 1e-12)
-    assert 0 <= content.sum() - held.sum() < 0.7
-    # Of several members the bins are the same, and each keeps what it holds.
-    shares = np.array([0.2, 0.5, 0.3])
-    same = fig3_distributions._joined(edges, shares[:, None] * content, 0.7)
-    np.testing.assert_array_equal(same[0], low)
-    np.testing.assert_allclose(same[2], shares[:, None] * density)
-
-
 def test_fig4_puts_boundary_elements_beside_the_spots(surface):
     truth = solution(shift=2)
     run = compared.runs()["one", "asperities", "rough", 1, 1.0, "soft"]
@@ -568,6 +420,11 @@ def test_fig4_puts_boundary_elements_beside_the_spots(surface):
     assert counts["both"] + counts["truth"] == np.count_nonzero(contact)
     assert counts["both"] / sum(counts.values()) == jaccard(covered, contact) < 1
     assert float(run["rms_slope"]) == pytest.approx(1)
+
+
+def test_fig4_refuses_the_boundary_elements_of_another_state(surface):
+    with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/soft: boundary elements of reduced pressure 0\.01"):
+        fig4_contact_map.figure(compared.tree(), surface, solution(1e-2), study="one")
 
 
 def test_fig4_shows_the_maps_of_the_other_model(surface):
@@ -606,14 +463,6 @@ def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
         assert legend(figure).count("boundary elements") == 1
 
 
-def test_fig4_refuses_the_boundary_elements_of_another_state(surface):
-    with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/soft: boundary elements of reduced pressure 0\.01"):
-        fig4_contact_map.figure(compared.tree(), surface, solution(1e-2), study="one")
-    other = solution().assign(surface_energy=0.04)
-    with pytest.raises(ValueError, match=r"soft: the boundary elements given are of another contact: surface_energy"):
-        fig4_contact_map.figure(compared.tree(), surface, other, study="one")
-
-
 def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
     left, right = fig10_model_error.figure(compared.tree(), compared.errors(), study="one").axes
     expected = 100 * (1 / np.array(list(compared.AREA_FACTORS.values())) - 1)
@@ -638,26 +487,17 @@ def test_fig10_names_finite_ranges_where_the_limit_of_a_short_one_is_known():
     assert len(left.containers) == 4
     for container in left.containers[:2]:
         np.testing.assert_allclose(container[0].get_ydata(), 100 * (1 / 1.5 - 1))
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert sum("at finite range" in name for name in names) == 2
-    assert sum(name.startswith("relative to the energetic area (energy of adhesion") for name in names) == 1
-    only = xr.DataTree.from_dict({"/one": compared.short_range_errors()["one"].to_dataset()})
-    figure = fig10_model_error.figure(compared.tree(), only, study="one")
-    assert not [line for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert not any("finite range" in name or "energetic" in name for name in names)
+    assert sum("at finite range" in name for name in legend(figure)) == 2
+    assert sum("energetic area" in name for name in legend(figure)) == 1
 
 
-@pytest.mark.parametrize("module", COMPARED)
-def test_errors_of_runs_that_all_failed_are_nothing_to_draw(module):
-    errors = compared.errors()
+def test_errors_of_runs_that_all_failed_are_nothing_to_draw():
     empty = {
-        f"/{name}": node.to_dataset().drop_vars("applicability") * np.nan for name, node in errors.children.items()
+        f"/{name}": (node.to_dataset().drop_vars("applicability") * np.nan).assign_attrs(node.attrs)
+        for name, node in compared.errors().children.items()
     }
-    for name, node in errors.children.items():
-        empty[f"/{name}"].attrs = node.attrs
     with pytest.raises(NothingToDraw, match="study one: no run beside boundary elements is complete"):
-        module.figure(compared.tree(), xr.DataTree.from_dict(empty), study="one")
+        fig11_distribution_error.figure(compared.tree(), xr.DataTree.from_dict(empty), study="one")
 
 
 def test_surfaces_of_different_slopes_are_compared_at_their_own_alone():
@@ -665,7 +505,7 @@ def test_surfaces_of_different_slopes_are_compared_at_their_own_alone():
     assert errors["adhesive"].sizes["surface"] == errors["adhesive"].sizes["rms_slope"] == 2
     figure = fig10_model_error.figure(compared.tree(), errors, study="one")
     assert len(figure.axes[0].containers) == 4
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    names = legend(figure)
     assert sum("other" in name for name in names) == sum("rough" in name for name in names) == 2
     left = fig2_area_and_gap.figure(compared.tree(), model_error=errors, study="one").axes[0]
     assert np.all(np.isfinite(left.get_xlim() + left.get_ylim()))
@@ -685,7 +525,7 @@ def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
     assert [len(axes.containers) for axes in panels] == [9, 9, 9, 9]
     # Too many for a legend: a scale names them.
     assert bar.get_ylabel() == "s" and [text.get_text() for text in bar.get_yticklabels()] == list("012345678")
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    names = legend(figure)
     assert len(names) == 2 and "single seeds beside their mean, n = 3" in names
     assert len({container[0].get_color() for container in panels[0].containers}) == 9
 
@@ -700,33 +540,6 @@ def test_fig11_shows_distances_and_overlap():
             np.testing.assert_array_equal(container[0].get_ydata(), values)
         assert panel.get_ylim()[0] == 0
     assert axes[2].get_ylim()[1] == 1
-
-
-@pytest.mark.parametrize("module", COMPARED, ids=lambda module: module.__name__)
-def test_studies_without_boundary_elements_are_named(module):
-    with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; there are some for one"):
-        module.figure(compared.tree(), compared.errors(), study="slopes")
-
-
-def test_materials_that_differ_in_range_alone_are_told_apart_by_it():
-    study = small.tree()["slopes"].to_dataset()
-    assert "range" not in material_label(study, "soft")
-    alike = study.sel(material=["soft", "soft"]).assign_coords(material=["soft", "longer"])
-    alike["interaction_range"] = ("material", [2e-9, 4e-9])
-    assert material_label(alike, "longer").endswith("range 4 nm")
-
-
-def test_what_is_not_there_is_named_with_what_is():
-    with pytest.raises(ValueError, match="no material 'steel' in this study; there are soft"):
-        fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
-    with pytest.raises(ValueError, match=r"no snapshot of reduced_pressure 0\.01; there are: relative_load 0\.002"):
-        find_snapshot(small.run(), "reduced_pressure", 0.01)
-
-
-def test_incomplete_campaigns_are_drawn_with_what_they_have():
-    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
-    tree = campaign_tree(runs[:-1])
-    assert len(lines(fig5_multi_slope.figure(tree, study="slopes").axes[0])) == 3
 
 
 def test_only_complete_runs_are_drawn():
@@ -842,39 +655,28 @@ def test_fig2_compares_models_at_equal_loads_whatever_their_stops():
     np.testing.assert_allclose(line.get_xydata(), [(1e-2, 100 * (area[1] / true_area - 1))], rtol=1e-6)
 
 
-def test_stiffness_and_patches_of_boundary_elements_stand_beside_those_of_asperities():
+def test_patches_of_boundary_elements_stand_beside_those_of_asperities():
     tree = compared.tree_of_both()
-    colours = material_colours(tree)
-    figure = fig7_stiffness.figure(tree, study="one")
-    for axes in figure.axes:
-        crosses = [line for line in axes.get_lines() if line.get_marker() == "+" and len(line.get_xdata())]
-        circles = {line.get_color(): line for line in axes.get_lines() if line.get_marker() == "o"}
-        assert {line.get_color() for line in crosses} == set(circles) == set(colours.values())
-        for line in crosses:  # made of the same states
-            np.testing.assert_allclose(line.get_xydata(), circles[line.get_color()].get_xydata(), rtol=1e-9)
-    assert legend(figure).count("boundary elements") == 1
     figure = fig8_patch_sizes.figure(tree, study="one", target=3e-3)
     for axes in figure.axes:
         dashed = [line for line in axes.get_lines() if line.is_dashed()]
-        assert {line.get_color() for line in dashed} == set(colours.values())
+        assert {line.get_color() for line in dashed} == set(material_colours(tree).values())
         solid = [line.get_xydata() for line in axes.get_lines() if not line.is_dashed()]
-        for line in dashed:
+        for line in dashed:  # made of the same states
             assert any(np.array_equal(line.get_xydata(), own) for own in solid)
     assert {"asperities", "boundary elements"} <= set(legend(figure))
-    for module in (fig7_stiffness, fig8_patch_sizes):
-        assert "boundary elements" not in legend(module.figure(compared.tree(), study="one"))
+    assert "boundary elements" not in legend(fig8_patch_sizes.figure(compared.tree(), study="one"))
 
 
-def test_figures_of_boundary_elements_alone_call_them_so():
-    alone = campaign_tree(compared.patches())
-    for module in (fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig7_stiffness, fig8_patch_sizes):
-        figure = module.figure(alone, study="one")
-        assert legend(figure).count("boundary elements") == 1 and "asperities" not in legend(figure)
-        assert "+" in {line.get_marker() for line in figure.axes[0].get_lines()}
-        assert "o" not in {line.get_marker() for line in figure.axes[0].get_lines()}
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig8_patch_sizes])
+def test_figures_of_boundary_elements_alone_call_them_so(module):
+    figure = module.figure(campaign_tree(compared.patches()), study="one")
+    assert legend(figure).count("boundary elements") == 1 and "asperities" not in legend(figure)
+    markers = {line.get_marker() for line in figure.axes[0].get_lines()}
+    assert "+" in markers and "o" not in markers
 
 
-def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_campaign(surface):
+def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_campaign():
     # Another study names the materials in another order.
     first = [
         (RunLabels("first", *labels[1:]), run) for labels, run in compared.runs().items() if labels.material == "hertz"
@@ -883,24 +685,17 @@ def test_a_material_has_one_colour_and_a_model_one_marker_in_all_figures_of_a_ca
     errors = compared.short_range_errors()
     colours = material_colours(tree)
     assert list(colours) == ["hertz", "soft"] and len(set(colours.values())) == 2
-    soft = colours["soft"]
     for figure in (
         fig2_area_and_gap.figure(tree, None, errors, study="one"),
-        fig3_distributions.figure(tree, errors, study="one", target=3e-3),
-        fig5_multi_slope.figure(tree, study="one"),
-        fig7_stiffness.figure(tree, study="one"),
         fig8_patch_sizes.figure(tree, study="one"),
         fig9_tabor.figure(tree, study="one"),
         fig10_model_error.figure(tree, errors, study="one"),
-        fig11_distribution_error.figure(tree, errors, study="one"),
     ):
-        adhesive = next(text for text in legend(figure) if "= 50 mJ/m²" in text)
-        handle = figure.legends[0].legend_handles[legend(figure).index(adhesive)]
+        adhesive = next(k for k, name in enumerate(legend(figure)) if "= 50 mJ/m²" in name)
+        handle = figure.legends[0].legend_handles[adhesive]
         line = handle if hasattr(handle, "get_color") else handle.get_children()[0]
-        assert to_hex(
-            np.ravel(line.get_color())[0] if not isinstance(line.get_color(), str) else line.get_color()
-        ) == to_hex(soft)
-        drawn = [line for line in figure.axes[0].get_lines() if line.get_color() == soft]
+        assert to_hex(np.atleast_1d(line.get_color())[0]) == to_hex(colours["soft"])
+        drawn = [line for line in figure.axes[0].get_lines() if line.get_color() == colours["soft"]]
         assert drawn and {line.get_marker() for line in drawn} <= {"o", "+", "1", ".", "None", None}
 
 
@@ -920,13 +715,6 @@ def test_materials_of_a_study_never_share_a_colour():
     assert place_markers([("a", 0.2), ("a", 1.0), ("b", 0.5)]) == {("a", 1.0): "o", ("a", 0.2): "s", ("b", 0.5): "^"}
 
 
-def test_legends_stand_off_the_data(surface):
-    for name in NAMES:
-        if name not in ("fig1", "fig4", "fig4_truth", "fig6", "fig6_one"):
-            figure = draw(name, surface)
-            assert len(figure.legends) == 1 and not any(axes.get_legend() for axes in figure.axes), name
-
-
 def test_rounding_errors_stretch_no_axis():
     run = small.run().copy(deep=True)
     run["contact_area_fraction"].values[0] = run["reduced_pressure"].values[0] = 1e-52
@@ -944,19 +732,16 @@ def test_fig9_points_are_means_over_the_seeds():
     np.testing.assert_allclose(curve.get_ydata(), [np.mean(runs["soft"])])
     (dots,) = [line for line in left.get_lines() if dotted(line)]
     assert bars == () and sorted(dots.get_ydata()) == sorted(runs["soft"])
-    left = fig9_tabor.figure(many_seeds(), study="many").axes[0]
-    ((_, _, (bars,)),) = left.containers
-    at = [find_snapshot(small.run(k), None, None) for k in range(1, 6)]
-    areas = [
-        float(small.run(k).contact_area_fraction[int(small.run(k).snapshot_step[own])]) for k, own in enumerate(at, 1)
-    ]
-    np.testing.assert_allclose(bars.get_segments()[0][:, 1], ensemble(areas).band(positive=True))
-    left, _ = fig9_tabor.figure(compared.tree(), study="one").axes
     bare = next(line for line in left.get_lines() if line.is_dashed())
     np.testing.assert_allclose(bare.get_ydata(), np.mean(runs["hertz"]))
+    left = fig9_tabor.figure(many_seeds(), study="many").axes[0]
+    ((_, _, (bars,)),) = left.containers
+    steps = {k: int(small.run(k).snapshot_step[find_snapshot(small.run(k), None, None)]) for k in range(1, 6)}
+    areas = [float(small.run(k).contact_area_fraction[step]) for k, step in steps.items()]
+    np.testing.assert_allclose(bars.get_segments()[0][:, 1], ensemble(areas).band(positive=True))
 
 
-def many(surfaces=30, materials=1):
+def many(surfaces=9, materials=1):
     """A study of many surfaces or materials, of the same run, named as variations of a parameter."""
     names = [f"rough-hurst{0.2 + 0.02 * k:.2f}" for k in range(surfaces)]
     kinds = ["soft"] if materials == 1 else [f"soft-surface_energy{k}mJ" for k in range(materials)]
@@ -976,8 +761,8 @@ def two_surfaces(slopes=(1.0,)):
     return names, campaign_tree(runs)
 
 
-@pytest.mark.parametrize("slopes", [(1.0,), (1.0, 0.2)])
-def test_fig5_tells_surfaces_apart(slopes):
+def test_fig5_tells_surfaces_apart():
+    slopes = (1.0, 0.2)
     names, tree = two_surfaces(slopes)
     figure = fig5_multi_slope.figure(tree, study="vary")
     (legend,) = figure.legends
@@ -995,88 +780,47 @@ def test_fig5_tells_surfaces_apart(slopes):
 
 def test_theories_say_whose_they_are_where_there_are_several_surfaces():
     names, tree = two_surfaces()
-    for module in (fig2_area_and_gap, fig7_stiffness):
-        for study, there in ((tree, {f"theories: {names[0]}"}), (small.tree(), set())):
-            name = next(iter(study.children))
-            figure = module.figure(study, reference_dataset(small.SPECTRUM), study=name)
-            legends = [legend for part in (figure, *figure.axes) for legend in _legends(part)]
-            words = {text.get_text() for legend in legends for text in legend.get_texts()}
-            assert {text for text in words if text.startswith("theories")} == there
+    figure = fig7_stiffness.figure(tree, reference_dataset(small.SPECTRUM), study="vary")
+    assert {text for text in legend(figure) if text.startswith("theories")} == {f"theories: {names[0]}"}
 
 
-@pytest.mark.parametrize("module", [fig3_distributions, fig8_patch_sizes], ids=lambda module: module.__name__)
-def test_figures_of_one_surface_say_which(module):
-    names, tree = two_surfaces()
-    assert module.figure(tree, study="vary").axes[1].get_title(loc="right") == names[0]
-    assert module.figure(small.tree(), study="single").axes[1].get_title(loc="right") == ""
+def test_figures_of_one_surface_say_which():
     names, tree = two_surfaces((1.0, 0.2))
-    title = module.figure(tree, study="vary").axes[1].get_title(loc="right")
+    title = fig8_patch_sizes.figure(tree, study="vary").axes[1].get_title(loc="right")
     assert title == f"{names[0]}, {slope_label(0.2)}"
+    assert fig3_distributions.figure(small.tree(), study="single").axes[1].get_title(loc="right") == ""
 
 
-@pytest.mark.parametrize(
-    ("limits", "expected"),
-    [
-        ((1.5e-4, 9e-4), [2, 5]),
-        ((2e-4, 3e-3), [2, 5, 2]),
-        ((2e-4, 3e-2), []),
-        ((0.9e-3, 2.9e-3), [2]),
-    ],
-)
-def test_logarithmic_axes_label_no_more_than_has_room(limits, expected):
+@pytest.mark.parametrize("limits", [(1.5e-4, 9e-4), (2e-4, 3e-3), (0.9e-3, 2.9e-3), (6.1e-3, 8.9e-3), (1.001, 1.06)])
+def test_logarithmic_axes_label_no_more_than_has_room(limits):
     figure = new_figure(3.5, 3)
     axes = figure.subplots()
     logarithmic_axes(axes, "x")
     axes.set_xlim(limits)
     figure.canvas.draw()
-    labels = [text.get_text() for text in axes.get_xticklabels(minor=True) if text.get_text()]
-    assert [int(re.search(r"(\d)\\times", label)[1]) for label in labels] == expected
-    renderer = figure.canvas.get_renderer()
     shown = [
-        text.get_window_extent(renderer)
+        text.get_window_extent(figure.canvas.get_renderer())
         for minor in (False, True)
         for text in axes.get_xticklabels(minor=minor)
         if text.get_text() and limits[0] <= text.get_position()[0] <= limits[1]
     ]
     shown.sort(key=lambda box: box.x0)
-    assert len(shown) > 1
+    assert 1 < len(shown) < 6
     assert all(one.x1 < two.x0 for one, two in itertools.pairwise(shown))
 
 
-@pytest.mark.parametrize("limits", [(6.1e-3, 8.9e-3), (1.001, 1.06), (5.5, 7.5)])
-def test_logarithmic_axes_of_small_ranges_have_some_labels(limits):
-    figure = new_figure(3.5, 3)
-    axes = figure.subplots()
-    logarithmic_axes(axes, "x")
-    axes.set_xlim(limits)
-    figure.canvas.draw()
-    assert 1 < sum(bool(text.get_text()) for text in axes.get_xticklabels(minor=True)) < 5
-
-
-MANY = [fig2_area_and_gap, fig5_multi_slope, fig7_stiffness, fig9_tabor]
-
-
-@pytest.mark.parametrize("module", MANY, ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [fig5_multi_slope, fig9_tabor])
 def test_many_surfaces_have_a_scale_of_colours(module):
     figure = module.figure(many(), study="many")
     bar = figure.axes[-1]
     labels = [text.get_text() for text in bar.get_yticklabels()]
-    assert bar.get_ylabel() == "rough-hurst" and labels[0] == "0.20" and labels[-1] == "0.78" and len(labels) == 9
+    assert bar.get_ylabel() == "rough-hurst" and labels[0] == "0.20" and labels[-1] == "0.36" and len(labels) == 9
     own = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o" and len(line.get_xdata())]
-    assert len({line.get_color() for line in own}) == 30
-    legends = [legend for each in (figure, *figure.axes) for legend in _legends(each)]
-    assert sum(len(legend.get_texts()) for legend in legends) < 4
+    assert len({line.get_color() for line in own}) == 9
+    assert len(legend(figure)) < 4
 
 
-def _legends(part):
-    if hasattr(part, "legends"):
-        return part.legends
-    return [part.get_legend()] if part.get_legend() else []
-
-
-@pytest.mark.parametrize(
-    "module", [fig2_area_and_gap, fig3_distributions, fig5_multi_slope, fig8_patch_sizes], ids=lambda m: m.__name__
-)
+@pytest.mark.parametrize("module", [fig2_area_and_gap, fig3_distributions])
 def test_many_materials_have_a_scale_of_what_differs(module):
     figure = module.figure(many(surfaces=1, materials=12), study="many")
     bar = figure.axes[-1]

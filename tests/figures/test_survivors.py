@@ -1,29 +1,33 @@
 """Figures of means whose runs are not all there show it, and count what is missing in their captions."""
 
+import itertools
+
 import cyclic_campaign as cyclic
 import numpy as np
 import pytest
 import small_campaign as small
 
 from icha.datasets.campaign import campaign_tree
+from icha.datasets.files import read_dataset
 from icha.datasets.labels import RunLabels
+from icha.datasets.surface_file import write_surface
 from icha.figures import (
     fig2_area_and_gap,
+    fig4_contact_map,
     fig5_multi_slope,
-    fig7_stiffness,
+    fig6_spots_by_slope,
     fig13_loops,
-    fig14_pull_off,
     fig15_loss,
 )
 from icha.figures.captions import count_runs
 from icha.figures.ensembles import draw_members, draw_points
-from icha.figures.legends import FEWER_SEEDS, NOT_APPLICABLE
+from icha.figures.looks import FEWER_SEEDS, NOT_APPLICABLE, NOT_APPLICABLE_ALONE
 from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)
 REASON = "asperity model not applicable: 40 % of the load is on summits that no node supports"
-LOADING = (fig2_area_and_gap, fig5_multi_slope, fig7_stiffness)
-LOOPS = (fig13_loops, fig14_pull_off, fig15_loss)
+LOADING = (fig2_area_and_gap, fig5_multi_slope)
+LOOPS = (fig13_loops, fig15_loss)
 
 
 def campaign(failed=None, checks=None, pale=(), lacking=(), run=small.run):
@@ -80,6 +84,10 @@ def test_means_over_the_survivors_are_crossed_with_their_number(module):
         ]
         assert any(np.array_equal(line.get_data(), (x, y)) for line in hollow)
     assert legend(figure).count(FEWER_SEEDS) == 1
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        boxes = [text.get_window_extent() for text in axes.texts if text.get_text().startswith("n=")]
+        assert not any(one.overlaps(two) for one, two in itertools.combinations(boxes, 2))
 
 
 def test_runs_that_failed_at_different_steps_are_in_no_mean():
@@ -121,12 +129,20 @@ def test_runs_that_the_model_is_not_applicable_to_are_pale_and_apart(module):
     assert legend(figure).count(NOT_APPLICABLE) == 1
 
 
+def test_figures_of_one_run_say_that_the_model_is_not_applicable(tmp_path):
+    write_surface(tmp_path / "s.nc", small.surface(), name="rough", seed=1)
+    tree = campaign(pale=(1,))
+    figure = fig4_contact_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="five")
+    assert NOT_APPLICABLE_ALONE in figure.get_suptitle()
+    assert NOT_APPLICABLE_ALONE in legend(fig6_spots_by_slope.figure(tree, study="five"))[0]
+
+
 def test_captions_count_what_is_missing():
     assert count_runs(campaign(), ["five"]) == ""
     tree = campaign(lacking=(2,), failed={3: 2}, checks=(4,), pale=(1, 5))
     assert count_runs(tree, ["five"]) == (
         "2 of 5 seeds of material soft did not complete and 1 of 5 seeds of material soft failed their checks: "
-        f"see Failed runs. 2 runs are drawn pale: {REASON}."
+        f"see Failed runs. 2 runs are marked: {REASON}."
     )
 
 

@@ -43,6 +43,7 @@ def test_campaigns_without_them_do_not(tmp_path, monkeypatch):
     assert further_software(campaign) == () and missing_software(campaign) is None
 
 
+@pytest.mark.slow
 def test_a_campaign_that_needs_it_is_refused_before_anything_is_computed(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(WITHOUT)
     command, environment = snakemake_command("-d", str(tmp_path), configuration=VALIDATION)

@@ -13,8 +13,8 @@ from icha.datasets.files import read_campaign, read_dataset, read_run, write_dat
 from icha.datasets.format import RUN, flaws
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
-from icha.figures.drawing import draw_figure
 from icha.figures.fig2_area_and_gap import figure
+from icha.figures.registry import draw_figure
 from icha.figures.select import NothingToDraw
 from icha.surfaces.surface import Surface
 

@@ -2,7 +2,7 @@
 
 from job import guarded
 
-from icha.figures.drawing import draw_figure
+from icha.figures.registry import draw_figure
 
 if "snakemake" in globals():
     with guarded(snakemake):

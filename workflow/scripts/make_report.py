@@ -6,10 +6,10 @@ from job import guarded
 
 from icha.analysis.checks import read_checks
 from icha.datasets.files import read_campaign
-from icha.figures.registry import DECLARATIONS
+from icha.figures.captions import caption_of
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import write_times
-from icha.report.surfaces import read_surface_statistics
+from icha.report.sections import read_surface_statistics
 
 if "snakemake" in globals():
     with guarded(snakemake):
@@ -21,7 +21,7 @@ if "snakemake" in globals():
             page,
             campaign=read_campaign(files.campaign),
             figures=[
-                ReportFigure(name, DECLARATIONS[name].caption, png, pdf, tuple(studies))
+                ReportFigure(name, caption_of(name), png, pdf, tuple(studies))
                 for (name, studies), png, pdf in zip(
                     params.figures.items(), files.figures[::2], files.figures[1::2], strict=True
                 )

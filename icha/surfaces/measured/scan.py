@@ -78,10 +78,13 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     if size is None:
         raise UnfitTopography("size", "is missing, and the file does not say it; allowed: a length, such as '90 um'")
     rows, columns = found.heights.shape
-    said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
-    said += "".join(f"; {remark}" for remark in (found.remark, _replaced(how, found)) if remark)
+    said = f"{name}, {rows} rows x {columns} columns of points"
     if found.data:
         said += f", data {printable(found.data)} of several"
+    sides = [in_words.length(float(side)) for side in size]
+    pixel = [in_words.length(size[0] / columns), in_words.length(size[1] / rows)]
+    said += f"; pixels of {' x '.join(pixel)}, {' x '.join(sides)} in all; heights in {in_words.length(unit)}"
+    said += "".join(f"; {remark}" for remark in (found.remark, _replaced(how, found)) if remark)
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     scan = Scan(found.heights.astype(float) * unit, tuple(size), (said,), coordinate_unit, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
@@ -92,13 +95,13 @@ def load_scan(path: Path, how: Preparation) -> Scan:
 
 
 def _replaced(how, found):
-    """Size and unit of the file that are not used, as others are given."""
+    """Say which size and unit of the file are not used, because others are given; empty if there are none."""
     replaced = []
     if how.size and found.size and not np.allclose(how.size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"its size {' x '.join(map(in_words.length, found.size))}")
     if how.height_unit and found.unit and not np.isclose(how.height_unit, found.unit, rtol=1e-3, atol=0):
         replaced.append(f"its unit of heights {in_words.length(found.unit)}")
-    return f"as given, not {' and '.join(replaced)}" if replaced else ""
+    return f"the file has, and you replace, {' and '.join(replaced)}" if replaced else ""
 
 
 def _read(path, how):

@@ -16,6 +16,16 @@ from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 # Rounding of the quotient of two lengths must not cost a pixel.
 _ROUNDING = 1e-9
+# Heights that differ by less than this part of the largest one, once their trend is removed, are rounding.
+_FLAT = 1e-13
+# Relative difference of the two sides of a pixel that counts as square.
+SQUARE = 1e-3
+# Standard deviation of the weights over the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi) (ISO 16610-61).
+DEVIATION = math.sqrt(math.log(2) / 2) / math.pi
+# Below so many pixels the weights are too few to have the transmission of the standard.
+LEAST_PIXELS = 4
+# Standard deviations after which the weights end; what is cut off is 2e-9.
+_REACH = 6
 
 
 def cropped(scan: Scan, how: Preparation) -> Scan:
@@ -55,10 +65,6 @@ def cropped(scan: Scan, how: Preparation) -> Scan:
     part = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
     said = () if part.shape == scan.heights.shape else (f"cut to {nx} x {ny} points from ({first_x}, {first_y})",)
     return scan.after(part, *said, size=(nx * dx, ny * dy))
-
-
-# Heights that differ by less than this part of the largest one, once their trend is removed, are rounding.
-_FLAT = 1e-13
 
 
 def detrended(scan: Scan, how: Preparation) -> Scan:
@@ -133,10 +139,6 @@ def _harmonic(heights, missing, *, periodic):
     return scipy.sparse.linalg.spsolve(coupling + scipy.sparse.diags(neighbours, format="csc"), right)
 
 
-# Relative difference of the two sides of a pixel that counts as square.
-SQUARE = 1e-3
-
-
 def squared(scan: Scan, how: Preparation) -> Scan:
     """On square cells as large as the shorter side of a pixel.
 
@@ -167,14 +169,6 @@ def _by_cosine_series(heights, axis, step, count):
     # sum_k series_k cos(pi k y/n) at y = step (j + 1/2): a chirp z-transform.
     turn = 1j * np.pi * step / n
     return np.moveaxis(czt(series, count, w=np.exp(turn), a=np.exp(-turn / 2), axis=0).real, 0, axis)
-
-
-# Standard deviation of the weights over the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi) (ISO 16610-61).
-DEVIATION = math.sqrt(math.log(2) / 2) / math.pi
-# Below so many pixels the weights are too few to have the transmission of the standard.
-LEAST_PIXELS = 4
-# Standard deviations after which the weights end; what is cut off is 2e-9.
-_REACH = 6
 
 
 def without_short_waves(scan: Scan, how: Preparation) -> Scan:

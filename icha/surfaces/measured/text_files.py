@@ -25,6 +25,27 @@ from icha.surfaces.measured.text_tables import AMBIGUOUS_COMMA, WIDTH, SourceFil
 
 # A surface has at least so many columns of heights.
 _FEWEST_COLUMNS = 8
+_VALUE = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
+_LENGTH = re.compile(rf"{_VALUE}\s*(\S+)?$")
+_TWO_LENGTHS = re.compile(rf"{_VALUE}\s*(\S+)?\s*[x×*]\s*{_VALUE}\s*(\S+)?$")
+# A line of a heading: a name, a colon, an equals sign, a delimiter or blanks, and a value.
+_LINE = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
+# Title of a column: its name and, in brackets, its unit.
+_TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE)
+_NAMES_OF_Z = ("z", "h", "height")
+# Names in small letters, without punctuation.
+_SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
+_PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
+_UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
+_ROWS = ("nrows", "rows", "lines", "number of rows", "number of lines")
+_COLUMNS = ("ncols", "cols", "columns", "samples", "number of columns")
+# ESRI's grids have this one if their headings give no other.
+_ESRI_MISSING = "-9999"
+# Numbers that are written with seven digits, or were of single precision, agree to this part.
+_FEW_DIGITS = 1e-6
+_MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
+# The spectrum, its conjugate, their difference, the heights, and what is where.
+_BYTES_OF_NODE = 64
 
 
 def read_matrix(file: SourceFile, how: Preparation) -> Found:
@@ -112,10 +133,6 @@ class _Title:
     unit: float | None
 
 
-_TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE)
-_NAMES_OF_Z = ("z", "h", "height")
-
-
 def _titles(layout, columns=None):
     """The titles of the columns x, y and z, by these names; none if a name is not there, or if others are asked for."""
     if not layout.heading:
@@ -198,24 +215,6 @@ def looks_like_fourier(values: np.ndarray) -> bool:
     return max(differences, default=0.0) <= 1e-4 * np.max(np.abs(modes), initial=1e-300)
 
 
-_VALUE = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
-_LENGTH = re.compile(rf"{_VALUE}\s*(\S+)?$")
-_TWO_LENGTHS = re.compile(rf"{_VALUE}\s*(\S+)?\s*[x×*]\s*{_VALUE}\s*(\S+)?$")
-# A line of a heading: a name, a colon, an equals sign, a delimiter or blanks, and a value.
-_LINE = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
-# Names in small letters, without punctuation.
-_SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
-_PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
-_UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
-_ROWS = ("nrows", "rows", "lines", "number of rows", "number of lines")
-_COLUMNS = ("ncols", "cols", "columns", "samples", "number of columns")
-# ESRI's grids have this one if their headings give no other.
-_ESRI_MISSING = "-9999"
-# Numbers that are written with seven digits, or were of single precision, agree to this part.
-_FEW_DIGITS = 1e-6
-_MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
-
-
 @dataclass(frozen=True)
 class Heading:
     """What a heading says.
@@ -254,7 +253,9 @@ def read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bo
     size, coordinates = _sizes(lines, said, shape)
     lateral = metres_of(said["lateral units"]) if "lateral units" in said else None
     lengths = [said[name] for name in (*_SIZES, *_PIXELS) if name in said]
-    lengths += [text for line in lines if (found := WIDTH.match(line)) for text in found.groups()]
+    for line, following in itertools.pairwise(lines):
+        if WIDTH.match(line):
+            lengths += [each.partition(":")[2].strip() for each in (line, following)]
     unclear = [text for text in lengths if not decimal_comma and AMBIGUOUS_COMMA.match(text)]
     unit = next((unit for unit in units if unit), None)
     return Heading(unit, lateral, size, coordinates, tuple(missing), unclear[0] if unclear else "")
@@ -293,10 +294,6 @@ def _length(text):
 
 def _value(text):
     return float(text.replace(",", "."))
-
-
-# The spectrum, its conjugate, their difference, the heights, and what is where.
-_BYTES_OF_NODE = 64
 
 
 def read_fourier(file: SourceFile, how: Preparation) -> Found:

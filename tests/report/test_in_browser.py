@@ -1,4 +1,4 @@
-"""The page for exploring in headless Chromium: real keys move what they should; it asks for nothing from outside."""
+"""Report and page for exploring in headless Chromium: real keys move what they should; nothing comes from outside."""
 
 import io
 import json
@@ -6,37 +6,90 @@ import re
 
 import numpy as np
 import pytest
+import small_campaign as small
 from chromium import WANTED, chromium
 from explorer_results import write_results
 from PIL import Image
 
+from icha.analysis.checks import check_campaign
+from icha.analysis.common_loads import compare_campaign
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.surface_file import write_surface
+from icha.figures import fig1_jkr, fig2_area_and_gap
+from icha.figures.style import save
 from icha.report.explorer import write_explorer
+from icha.report.report import ReportFigure, write_report
+from icha.report.run_times import Benchmark, write_times_page
+from icha.report.sections import read_surface_statistics
 
 pytestmark = WANTED
 
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory):
+def explorer_file(tmp_path_factory):
     folder = write_results(tmp_path_factory.mktemp("results"))
     write_explorer(folder, folder / "explore.html", largest=20)
     return folder / "explore.html"
 
 
 @pytest.fixture(scope="module")
-def browser(file, tmp_path_factory):
+def report_file(tmp_path_factory):
+    """A report with figures, a failed run and run times, in a folder as results have it."""
+    folder = tmp_path_factory.mktemp("report")
+    runs = list(small.runs())
+    runs[1] = (runs[1][0], runs[1][1].assign_attrs(incomplete="no equilibrium at the second stop"))
+    tree = campaign_tree(runs, attrs={"title": "Small campaign", "license": "CC0-1.0"})
+    write_surface(folder / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
+    pictures = []
+    for name, figure, studies in (
+        ("fig1_jkr", fig1_jkr.figure(), ()),
+        ("fig2_area_and_gap", fig2_area_and_gap.figure(tree, study="slopes"), ("slopes",)),
+    ):
+        files = [folder / "figures" / f"{name}.{ending}" for ending in ("png", "pdf")]
+        save(figure, *files)
+        pictures.append(ReportFigure(name, f"Caption of {name}.", *files, studies))
+    write_times_page(folder / "benchmarks" / "index.html", [Benchmark("runs/one", 75.0, 120.0)])
+    write_report(
+        folder / "report.html",
+        campaign=tree,
+        figures=pictures,
+        checks=check_campaign(tree),
+        comparison=compare_campaign(tree),
+        surfaces=[read_surface_statistics(folder / "s.nc")],
+        dataset_path=folder / "dataset" / "small.nc",
+        times_path=folder / "benchmarks" / "index.html",
+        results=folder,
+    )
+    return folder / "report.html"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
     with chromium(tmp_path_factory.mktemp("profile")) as page:
         yield page
 
 
-@pytest.fixture
-def page(browser, file):
-    """The page, newly opened; nothing that a test does may lead to an error or to a request."""
+def opened(browser, file):
+    """A page, newly opened; nothing that a test does may lead to an error or to a request."""
     browser.console.clear(), browser.addresses.clear()
     browser.show(1300)
     browser.open(file)
     yield browser
     assert browser.console == []
     assert {address for address in browser.addresses if not address.startswith(("file:", "data:"))} == set()
+
+
+@pytest.fixture
+def page(browser, explorer_file):
+    yield from opened(browser, explorer_file)
+
+
+@pytest.fixture
+def report(browser, report_file):
+    yield from opened(browser, report_file)
+
+
+# --- the page for exploring -------------------------------------------------------------------------------------
 
 
 def choose(page, **choices):
@@ -136,10 +189,6 @@ def test_everything_is_reached_and_used_by_keys(page):
     # From top to bottom; lists with one entry have nothing to choose.
     assert order == ["study", "material", "seed", "model", "log", "before", "stop"], order
     assert set(outlines) == {"solid3"}
-    labels = page.value(
-        "[...document.querySelectorAll('select, input')].map((each) => each.labels[0].textContent.trim())"
-    )
-    assert len(labels) == 8 and all(labels)
     # The first list, by keys alone.
     page.value("document.getElementById('study').focus()")
     before = page.value("document.getElementById('study').value")
@@ -196,17 +245,21 @@ def test_spots_are_where_the_dataset_has_them(page):
     assert part == pytest.approx(sum(np.pi * radius**2 for *_, radius in circles) / period**2, rel=0.25)
 
 
+def brightness(colour):
+    return sum(map(int, re.findall(r"\d+", colour)[:3])) / 3
+
+
 def test_dark_and_light_follow_the_reader(page):
-    def brightness():
+    def looks():
         found = page.value(
             "[getComputedStyle(document.body).backgroundColor, document.getElementById('area').layout.font.color,"
             " document.getElementById('area').data[0].line.color]"
         )
-        return [sum(map(int, re.findall(r"\d+", colour)[:3])) / 3 for colour in found]
+        return map(brightness, found)
 
-    paper, ink, curve = brightness()
+    paper, ink, curve = looks()
     page.show(1300, scheme="dark")
-    dark_paper, dark_ink, dark_curve = brightness()
+    dark_paper, dark_ink, dark_curve = looks()
     assert paper > 200 > 80 > dark_paper and ink < 80 < 200 < dark_ink
     assert curve < paper - 80 and dark_curve > dark_paper + 80
 
@@ -225,11 +278,73 @@ def test_nothing_is_wider_than_the_window(page, width):
     assert top == 0 and bottom < 250
 
 
-def test_errors_and_requests_would_be_seen(browser, file, tmp_path):
-    text = re.sub("<meta http-equiv.*?>", "", file.read_text(encoding="utf-8"))
+def test_errors_and_requests_would_be_seen(browser, explorer_file, tmp_path):
+    text = re.sub("<meta http-equiv.*?>", "", explorer_file.read_text(encoding="utf-8"))
     wrong = '<img src="http://localhost:9/x.png"><script>nothing.at.all;</script></body>'
     (tmp_path / "wrong.html").write_text(text.replace("</body>", wrong), encoding="utf-8")
     browser.console.clear(), browser.addresses.clear()
     browser.open(tmp_path / "wrong.html")
     assert "http://localhost:9/x.png" in browser.addresses
     assert any("nothing is not defined" in line for line in browser.console)
+
+
+# --- the report -------------------------------------------------------------------------------------------------
+
+
+def test_figures_are_enlarged_by_a_click_and_left_again(report):
+    states = report.value("""(async () => {
+      const viewer = document.getElementById("viewer");
+      const pause = () => new Promise((go) => setTimeout(go, 200));
+      const image = () => viewer.querySelector("img");
+      const at = () => figures.findIndex((figure) => figure.querySelector("img").src === image().src);
+      const states = [viewer.open];
+      const state = () => states.push([viewer.open, at(), image().getBoundingClientRect().width]);
+      const key = (name) => viewer.dispatchEvent(new KeyboardEvent("keydown", {key: name}));
+      document.querySelectorAll("figure button")[1].click(); await pause(); state();
+      key("ArrowRight"); await pause(); state();
+      viewer.querySelector(".previous").click(); await pause(); state();
+      states.push(viewer.querySelector(".words").textContent.startsWith("Figure 2."));
+      states.push(document.querySelector("figure img").getBoundingClientRect().width);
+      image().click(); states.push(viewer.open);
+      return states;
+    })()""")
+    closed, one, following, before, caption, small_width, at_last = states
+    assert closed is at_last is False and caption is True
+    # After the last figure comes the first.
+    assert [state[:2] for state in (one, following, before)] == [[True, 1], [True, 0], [True, 1]]
+    assert one[2] > small_width
+
+
+def test_every_link_of_the_contents_leads_to_its_heading(report):
+    found = report.value("""(async () => {
+      document.documentElement.style.scrollBehavior = "auto";
+      const found = [];
+      for (const link of document.querySelectorAll("nav a")) {
+        link.click();
+        await new Promise((go) => setTimeout(go, 60));
+        const place = document.getElementById(link.hash.slice(1)).getBoundingClientRect();
+        const end = scrollY + innerHeight >= document.documentElement.scrollHeight - 2;
+        found.push([link.hash, place.top >= -1 && place.top < (end ? innerHeight : 120),
+                    document.querySelectorAll("nav a[aria-current]").length]);
+      }
+      return found;
+    })()""")
+    there = {at for at, *_ in found}
+    assert {"#failures", "#studies", "#study-slopes", "#surfaces", "#checks", "#times", "#data"} <= there
+    assert all(there and current == 1 for _, there, current in found), found
+
+
+def test_the_report_is_read_on_a_telephone_and_in_the_dark(report):
+    report.show(500)
+    assert report.value("document.documentElement.scrollWidth <= innerWidth")
+    colours = "[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color]"
+    paper, ink = map(brightness, report.value(colours))
+    other_paper, other_ink = map(brightness, report.value(f"(document.getElementById('theme').click(), {colours})"))
+    assert (paper - ink) * (other_paper - other_ink) < 0
+    assert min(abs(paper - ink), abs(other_paper - other_ink)) > 150
+
+
+def test_run_times_are_shown_where_they_are(report):
+    report.value("document.querySelector('object.times').scrollIntoView()")
+    report.settle()
+    assert report.value("document.querySelector('object.times p').getBoundingClientRect().height") == 0

@@ -1,0 +1,169 @@
+"""Tables and the figure of docs/benchmarks.md from what benchmarks/run.py kept; nothing is measured here."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+from validation.tables import DOCS, Table, percent, write_tables
+
+RESULTS = Path(__file__).resolve().parent / "results"
+MIB = 2.0**20
+OWN = ("icha", "icha-boundary-elements")  # ICHA's models
+WITH = {False: "without adhesion", True: "with adhesion"}
+
+
+def read_results() -> dict[str, dict]:
+    """All results by name."""
+    return {path.stem: json.loads(path.read_text()) for path in sorted(RESULTS.glob("*.json"))}
+
+
+def chosen(results, prefix, **wanted) -> list[dict]:
+    """The results whose name starts so and whose entries are those."""
+    return [
+        result
+        for name, result in results.items()
+        if name.startswith(prefix) and all(result.get(key) == value for key, value in wanted.items())
+    ]
+
+
+def grids(results) -> list[int]:
+    """The grids of the sweeps."""
+    return sorted({result["grid"] for result in chosen(results, "sweep-")})
+
+
+def seconds(value: float) -> str:
+    return f"{value:.2f} s" if value < 10 else f"{value:.0f} s"
+
+
+def times(ratio: float) -> str:
+    return f"{ratio:.2g}" if ratio < 10 else f"{ratio:.0f}"
+
+
+def mib(value: float) -> str:
+    return f"{value / MIB:.0f} MiB"
+
+
+# --- the sweep ----------------------------------------------------------------------------------------------------
+
+
+def surfaces(results) -> Table:
+    """The surfaces of the sweeps."""
+    rows = [
+        [
+            f"{task['grid']}²",
+            f"{task['short_wavelength'] * 1e6:.3g} µm",
+            f"{task['rms_height'] * 1e6:.3g} µm",
+            f"{task['interaction_range'] * 1e9:.3g} nm",
+            f"{task['tabor_parameter']:.2f}",
+        ]
+        for task in sorted(chosen(results, "task-"), key=lambda task: task["grid"])
+    ]
+    return Table(["grid", "shortest wave", "h_rms", "range ρ", "Tabor parameter"], rows, numbers=True)
+
+
+def rival(results, result) -> dict:
+    """ICHA's sweep with the stops of another code's."""
+    same = {key: result[key] for key in ("grid", "adhesion", "control")}
+    (found,) = chosen(results, "sweep-icha-", code="icha", outcome="complete", **same)
+    return found
+
+
+def computation(result) -> float:
+    """Seconds from the end of the imports to the last stop that was reached."""
+    return result["stops"][-1]["seconds"]
+
+
+def differences(results, result) -> list[str]:
+    """ICHA's area and gap, or load, against another code's, over their common stops: median and range."""
+    pairs = list(zip(rival(results, result)["stops"], result["stops"], strict=False))
+
+    def spread(name):
+        values = np.array([mine[name] / theirs[name] - 1 for mine, theirs in pairs])
+        median, least, most = (f"{percent(value, 1)} %" for value in (np.median(values), values.min(), values.max()))
+        return f"{median} ({least} to {most})"
+
+    if result["control"] == "gap":
+        return [spread("area_fraction"), "load " + spread("pressure")]
+    rms_height = results[f"task-{result['grid']}"]["rms_height"]
+    gap = np.array([(mine["mean_gap"] - theirs["mean_gap"]) / rms_height for mine, theirs in pairs])
+    return [spread("area_fraction"), f"gap {np.median(gap):+.3f} ({gap.min():+.3f} to {gap.max():+.3f}) h_rms"]
+
+
+def sweep(results, grid, adhesion) -> Table:
+    """A row per code, ICHA first; of one that was stopped at its limit, what it took at least."""
+    rows = []
+    order = sorted(
+        chosen(results, "sweep-", grid=grid, adhesion=adhesion),
+        key=lambda r: (r["code"] != "icha", r["code"] not in OWN, r["control"] != "load", r["code"], r["threads"]),
+    )
+    for result in order:
+        name = result["code"] + (", given gaps" if result["control"] == "gap" else "")
+        name += f", {result['threads']} threads" if result["threads"] > 1 else ""
+        if not result.get("stops"):
+            rows.append([name, f"{result['outcome']}: {result['last_words']}", *[""] * 8])
+            continue
+        more = "> " if result["outcome"] == "over time" else ""
+        compute = f"{len(result['stops'])} stops in " if more else ""
+        ratios = ["1", "1", "1", "", ""]
+        if result["code"] != "icha":
+            icha = rival(results, result)
+            ratios = [
+                more + times(result["processor"] / icha["processor"]),
+                more + times(computation(result) / computation(icha)),
+                times(result["peak"] / icha["peak"]),
+                *differences(results, result),
+            ]
+        spent = [more + seconds(result["wall"]), more + seconds(result["processor"])]
+        rows.append([name, *spent, compute + seconds(computation(result)), mib(result["peak"]), *ratios])
+    head = ["code", "wall", "processor", "computation", "memory", "time / ICHA's", "computation / ICHA's"]
+    return Table([*head, "memory / ICHA's", "ICHA's area", "and gap or load"], rows, numbers=True)
+
+
+# --- the figure --------------------------------------------------------------------------------------------------
+
+
+def draw_sweep(results, path: Path) -> None:
+    """Processor time of a sweep over the nodes along a side, one line per code."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 4.4), sharey=True, layout="constrained")
+    others = sorted({run["code"] for run in chosen(results, "sweep-")} - {"icha"})
+    colours = {"icha": "black"} | {code: f"C{number}" for number, code in enumerate(others)}
+    lines = {}
+    for axis, adhesion in zip(axes, (False, True), strict=True):
+        runs = chosen(results, "sweep-", adhesion=adhesion, threads=1, outcome="complete")
+        for code, control in sorted({(run["code"], run["control"]) for run in runs}):
+            line = sorted(
+                (run["grid"], run["processor"]) for run in runs if (run["code"], run["control"]) == (code, control)
+            )
+            style = {"lw": 2.5 if code == "icha" else 1.5, "ls": "--" if control == "gap" else "-"}
+            (lines[f"{code}, given {control}s"],) = axis.loglog(
+                *zip(*line, strict=True), marker="o", color=colours[code], **style
+            )
+        axis.set_title(WITH[adhesion])
+        axis.set_xlabel("nodes along a side")
+        axis.set_xticks(grids(results), [str(grid) for grid in grids(results)], minor=False)
+        axis.set_xticks([], minor=True)
+        axis.grid(alpha=0.3)
+    figure.legend(lines.values(), lines.keys(), loc="outside lower center", ncols=4, fontsize=8)
+    axes[0].set_ylabel("processor time of the process, s")
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
+def tables(results) -> dict[str, Table]:
+    """All tables of the page."""
+    found = {"surfaces": surfaces(results)}
+    for grid in grids(results):
+        found |= {f"{grid}_{'adhesive' if energy else 'bare'}": sweep(results, grid, energy) for energy in WITH}
+    return {f"benchmarks_{name}": table for name, table in found.items()}
+
+
+if __name__ == "__main__":
+    results = read_results()
+    write_tables(tables(results))
+    draw_sweep(results, DOCS / "images/benchmark_sweep.png")

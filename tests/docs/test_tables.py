@@ -1,0 +1,29 @@
+"""Tables that pages include: they are there, and those whose measurements are kept are written from them."""
+
+import re
+
+import pytest
+
+from benchmarks import tables as benchmarks
+from validation import faults, short_range
+from validation.tables import DOCS
+
+
+def test_every_table_is_shown_by_one_page():
+    pages = "".join(page.read_text(encoding="utf-8") for page in DOCS.glob("*.md"))
+    shown = re.findall(r"^```\{include\} tables/(\w+)\.md\n```$", pages, flags=re.MULTILINE)
+    assert sorted(shown) == sorted(file.stem for file in (DOCS / "tables").iterdir())
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        lambda: benchmarks.tables(benchmarks.read_results()),
+        lambda: short_range.tables(short_range.kept()),
+        lambda: faults.tables(faults.kept()),
+    ],
+    ids=["benchmarks", "short_range", "faults"],
+)
+def test_tables_are_those_of_what_was_measured(tables):
+    for name, table in tables().items():
+        assert (DOCS / "tables" / f"{name}.md").read_text(encoding="utf-8") == str(table), name
