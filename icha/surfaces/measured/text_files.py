@@ -50,7 +50,7 @@ _BYTES_OF_NODE = 64
 
 def read_matrix(file: SourceFile, how: Preparation) -> Found:
     """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
-    values, layout = file.values, file.layout
+    values, layout = file.values, file.table_layout
     file.refuse_blocks()
     heights, steps, remark = without_scales(values)
     _check_counts(layout.heading, (values.shape, heights.shape))
@@ -100,7 +100,7 @@ def _as_instrument_file(file, how):
 
 def read_xyz(file: SourceFile, how: Preparation) -> Found:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
-    layout = file.layout
+    layout = file.table_layout
     titles = _titles(layout, how.columns)
     points = _columns_of_points(file.values, how, titles)
     heading = read_heading(layout.heading, points.shape, layout.decimal_comma)
@@ -116,8 +116,10 @@ def read_xyz(file: SourceFile, how: Preparation) -> Found:
     heights = np.full(nx * ny, np.nan)
     heights[place] = _without_missing(points[:, 2], heading)
     sides, units = (nx * dx, ny * dy), [titles[axis].unit if axis in titles else None for axis in "xyz"]
-    lateral = [unit or heading.lateral_unit for unit in units[:2]]
-    size = tuple(np.multiply(sides, lateral)) if all(lateral) and how.lateral_unit is None else None
+    along_x, along_y = (unit or heading.lateral_unit for unit in units[:2])
+    size = None
+    if along_x and along_y and how.lateral_unit is None:
+        size = sides[0] * along_x, sides[1] * along_y
     named = titles and sorted(titles, key=lambda axis: titles[axis].column) != ["x", "y", "z"]
     remark = f"columns {', '.join(f'{axis} {titles[axis].column}' for axis in 'xyz')} by their names" if named else ""
     known = _said(layout.heading).get("channel") == how.data

@@ -4,7 +4,7 @@ import csv
 import gzip
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -43,9 +43,9 @@ _OTHER_COMPRESSION = {b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"\x28\xb5\x2f\xfd": "
 _EQUAL_STEPS = 1e-2
 # A scale spans so many units of its last digit.
 _FEWEST_UNITS = 4
-# A line of heights resembles the next one: this part of its steps has the same sign, and the two differ by less than
-# this factor times the difference of the next two.
-_SAME_SIGN, _DIFFERENCE = 0.8, 5
+# A line of heights resembles the next one if the two differ by less than this factor times the difference of the next
+# two, and if this part of its steps has the same sign or these differences are so small a part of the heights.
+_DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
 # Shortest row or column in which such a scale is looked for.
 _SHORTEST_SCALE = 8
 
@@ -88,7 +88,7 @@ class SourceFile:
     def __init__(self, path: Path, data: str | None = None):
         """Read nothing yet."""
         self.path, self.data = path, data
-        self._gaps = []
+        self._gaps: list[tuple[int, int]] = []
 
     @cached_property
     def layout(self) -> Layout | None:
@@ -101,6 +101,16 @@ class SourceFile:
             raise _damaged() from None
         return layout
 
+    @property
+    def table_layout(self) -> Layout:
+        """The layout; UnfitTopography if the file is no text of numbers."""
+        if self.layout is None or not self.layout.columns:
+            raise UnfitTopography(
+                "path",
+                "cannot be read as a table, as it holds no numbers; allowed: a row of heights, or x y z, in every line",
+            )
+        return self.layout
+
     @cached_property
     def values(self) -> np.ndarray:
         """Numbers (rows, columns) of a text, nan where one is missing.
@@ -110,14 +120,10 @@ class SourceFile:
         UnfitTopography
             If it has no numbers, a field that is no number, or a row of another length; with the line's number.
         """
-        if self.layout is None or not self.layout.columns:
-            raise UnfitTopography(
-                "path",
-                "cannot be read as a table, as it holds no numbers; allowed: a row of heights, or x y z, in every line",
-            )
+        layout = self.table_layout
         try:
-            values = _read_clean(self.path, self.layout, self._gaps)
-            return _read_any(self.path, self.layout, self._gaps) if values is None else values
+            values = _read_clean(self.path, layout, self._gaps)
+            return _read_any(self.path, layout, self._gaps) if values is None else values
         except _DAMAGED:
             raise _damaged() from None
 
@@ -185,7 +191,8 @@ def layout_of(path: Path) -> Layout | None:
     lines = _first_lines(path)
     if lines is None:
         return None
-    heading, words = [], False
+    heading: list[str] = []
+    words = False
     for number, line in enumerate(lines[:_LONGEST_HEADING]):
         text = _without_remark(line)
         if text.strip():
@@ -193,7 +200,7 @@ def layout_of(path: Path) -> Layout | None:
             fields = _fields(text, delimiter)
             numbers = [_number(field, decimal) for field in fields]
             corner = numbers[0] is None and _is_scale(numbers[1:])
-            if corner or (None not in numbers and not np.all(np.isnan(numbers))):
+            if corner or (None not in numbers and not np.all(np.isnan(numbers))):  # type: ignore[arg-type]
                 _refuse_damaged_row(heading, found)
                 decimal = _decimal_comma(lines[number:], delimiter, len(fields), decimal)
                 return Layout(tuple(heading), words, number, delimiter, decimal, _columns(fields), corner)
@@ -359,8 +366,9 @@ def _fields(text: str, delimiter: str | None) -> list[str]:
     """Fields of a line, without blanks and quotes around them."""
     if delimiter is None:
         text = _NO_DATA.sub("nan", text)
-    quoted = delimiter is not None and '"' in text
-    fields = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True)) if quoted else text.split(delimiter)
+    fields = text.split(delimiter)
+    if delimiter is not None and '"' in text:
+        fields = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
     return [field.strip().strip("\"'").strip() for field in fields]
 
 
@@ -476,7 +484,8 @@ def without_scales(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] 
             )
     left_out = [name for name, step in (("row", across), ("column", down)) if step is not None]
     remark = f"first {' and '.join(left_out)} left out: numbers in equal steps, not heights"
-    return heights, (across, down) if len(left_out) == 2 else None, remark if left_out else ""
+    steps = None if across is None or down is None else (across, down)
+    return heights, steps, remark if left_out else ""
 
 
 def _scale(table, name=""):
@@ -513,10 +522,12 @@ def _resembles(line, others):
         return False
     line, others = line[known], others[:, known]
     same = np.mean(np.sign(np.diff(line)) == np.sign(np.diff(others[0])))
-    return same >= _SAME_SIGN and np.std(line - others[0]) <= _DIFFERENCE * np.std(others[0] - others[1])
+    usual = np.std(others[0] - others[1])
+    smooth = usual <= _SMOOTH * np.std(others[0])
+    return (same >= _SAME_SIGN or smooth) and np.std(line - others[0]) <= _DIFFERENCE * usual
 
 
-def _equal_steps(line: Sequence[float], *, rounded: bool = True) -> float | None:
+def _equal_steps(line: np.ndarray, *, rounded: bool = True) -> float | None:
     """The step of a line of equal steps, but for a corner, which may be anything; None if they are not equal.
 
     rounded : whether they may differ by the last digit that is written.
