@@ -8,7 +8,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.asperity.coalescence import covering_spot
 from icha.asperity.jkr import JKR
-from icha.contact.failures import NotConverged
+from icha.contact.model import NotConverged
 from icha.equilibrium.distributions import contact_cover
 from icha.half_space.ewald import HalfSpace
 from icha.half_space.interaction import Interaction, displacement_at

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from icha.contact.events import Events
+from icha.contact.model import Events
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from icha.cli.project import (
     shown,
     workflow_folder,
 )
-from icha.cli.scans import about_scan, check_picture, draw_scans
+from icha.cli.scans import about_scan, check_picture
 from icha.support import in_words
 from icha.support.in_words import counted
 
@@ -64,16 +64,18 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
         if plot is not None:
             raise Mistake("--plot: draws measured surfaces; the campaign presses none")
         return
-    from icha.contact.models import BOUNDARY_ELEMENTS
+    from icha.contact.models import MODELS
     from icha.surfaces.measured.resolution import scan_resolution
 
-    by_patches = {case.surface for case in run_cases(campaign) if case.model == BOUNDARY_ELEMENTS}
+    by_patches = {case.surface for case in run_cases(campaign) if MODELS[case.model].least_cells}
     scans = {name: scan_resolution(section.path, section.preparation) for name, section in measured.items()}
     say("")
     for name, scan in scans.items():
         for line in about_scan(name, scan, by_patches=name in by_patches):
             say(line)
     if plot is not None:
+        from icha.cli.quick_plot import draw_scans
+
         draw_scans(scans, plot)
         say(f"drawn: {shown(plot)}")
 

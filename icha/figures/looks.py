@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.models import MODELS
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.style import (
     BLACK,
@@ -45,14 +46,12 @@ MATERIAL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 MATERIAL_COLOURS += ("#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
 PLACE_MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
-ASPERITIES_NAME = "asperities"
+ASPERITIES_NAME = MODELS["asperities"].words
 # By what legends call the models. Boundary elements have another cross in unloading.
 MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
 WAY_BACK_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
 # Lines of boundary elements beside those of asperities.
 BESIDE_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
-# Further solutions of the same states at a finite range, on other grids.
-FINITE_RANGE_MARKERS = ("1", "2", "3", "4")
 
 # The most that a legend names, with a colour for each; more have a scale.
 MOST_COLOURS = len(COLOURS)

@@ -14,9 +14,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from icha.contact.models import ASPERITIES
 from icha.datasets.results import COMPRESSED_SIZES, LEFT_IN_FILE
-from icha.path.limits import DEFAULT_STEP
+from icha.path.targets import DEFAULT_STEP
 from icha.support.parallel import LARGE_GRID
 
 MiB = 2**20
@@ -84,7 +83,8 @@ LAWS = {
     "boundary_elements, adhesion, cycle": PowerLaw(0.14, 0.023, {"nodes": 0.65, "spots": 0.73}),
     "finite range": PowerLaw(0, 7.9e-8, {"nodes": 1.55, "load": 0.3}),
     "finite range, adhesion": PowerLaw(0, 1.2e-8, {"nodes": 1.56, "load": -0.5}),
-    "finite range, cycle": PowerLaw(0, 1.4e-6, {"nodes": 1.72, "step": -0.1}),
+    "finite range, cycle": PowerLaw(0, 2.8e-7, {"nodes": 1.72, "step": -0.1}),
+    "finite range, adhesion, cycle": PowerLaw(0, 1.4e-6, {"nodes": 1.72, "step": -0.1}),
     "theories": PowerLaw(0.28, 0, {}),
     "dataset": PowerLaw(0.07, 0.015, {"runs": 1}),
     "comparison": PowerLaw(0.07, 0.003, {"runs": 1}),
@@ -94,6 +94,11 @@ LAWS = {
     "map": PowerLaw(0, 9.5e-8, {"nodes": 1}),
     "report": PowerLaw(0.25, 0.01, {"runs": 1}),
 }
+
+
+def _law(solver: str, *, adhesive: bool, cycle: bool = False) -> PowerLaw:
+    """The law of a solver with adhesion or without, of loading alone or of a cycle."""
+    return LAWS[", ".join([solver, *["adhesion"] * adhesive, *["cycle"] * cycle])]
 
 
 class Recorded(NamedTuple):
@@ -146,9 +151,28 @@ def spots(summits: float, load: float) -> float:
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 
-# Arrays of the grid that boundary elements hold at a time; bytes of a cell that a snapshot's maps take, compressed.
-PATCH_ARRAYS = 20
-_MAPS = 1.5
+@dataclass(frozen=True)
+class RunSize:
+    """Memory and disk of the runs of a model.
+
+    Parameters
+    ----------
+    arrays : arrays of the grid that a run holds at a time.
+    summit : bytes that a run holds for every summit.
+    maps : bytes in the file for every cell and snapshot, compressed.
+    minutes : after which a run is taken for stuck: of a loading, of a cycle, of one that gets several cores.
+    """
+
+    arrays: int
+    summit: int = 0
+    maps: float = 0.0
+    minutes: tuple[int, int, int] = (30, 120, 240)
+
+
+RUN_SIZES = {
+    "asperities": RunSize(arrays=1, summit=9 * 1024),
+    "boundary_elements": RunSize(arrays=20, maps=1.5, minutes=(240, 960, 1440)),
+}
 
 
 def run_cost(
@@ -176,7 +200,7 @@ def run_cost(
     max_step : longest step of the mean separation, in h_rms.
     """
     most, nodes = spots(summits, load), grid**2
-    law = LAWS[", ".join([model, *["adhesion"] * adhesive, *["cycle"] * bool(legs)])]
+    law = _law(model, adhesive=adhesive, cycle=bool(legs))
     seconds = law.seconds(nodes=nodes, spots=most, stops=stops)
     steps: float = stops
     if legs:
@@ -187,25 +211,22 @@ def run_cost(
     kept = snapshots + bool(legs)
     disk = 60e3 + 57 * most * max(kept, 1) + 160 * steps + 20e3 * bool(legs)
     memory = _memory_before(grid) + 9 * MiB * (1 + bool(legs))
-    if model == ASPERITIES:
-        memory += _DOUBLE * nodes + 9 * 1024 * summits
-    else:
-        memory += PATCH_ARRAYS * _DOUBLE * nodes
-        disk += _MAPS * nodes * kept
+    size = RUN_SIZES[model]
+    memory += size.arrays * _DOUBLE * nodes + size.summit * summits
+    disk += size.maps * nodes * kept
     return Cost(seconds, memory, disk, Recorded(steps, kept, most * kept))
 
 
 def solution_cost(nodes: int, reduced_pressure: float, *, adhesive: bool) -> Cost:
     """Boundary elements at a finite range, of `nodes` a side, at one load."""
-    law = LAWS["finite range, adhesion" if adhesive else "finite range"]
-    seconds = law.seconds(nodes=nodes**2, load=reduced_pressure)
+    seconds = _law("finite range", adhesive=adhesive).seconds(nodes=nodes**2, load=reduced_pressure)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
 def loop_cost(nodes: int, separation_step: float, *, adhesive: bool) -> Cost:
     """Boundary elements at a finite range, of `nodes` a side, in loading and unloading."""
-    # Without adhesion there are no jumps, at which steps are divided.
-    seconds = LAWS["finite range, cycle"].seconds(nodes=nodes**2, step=separation_step) * (1 if adhesive else 0.2)
+    law = _law("finite range", adhesive=adhesive, cycle=True)
+    seconds = law.seconds(nodes=nodes**2, step=separation_step)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 33e3)
 
 
@@ -214,7 +235,7 @@ def theories_cost() -> Cost:
     return Cost(LAWS["theories"].seconds(), WORKFLOW.forked, 35e3)
 
 
-# Edges of the bins of `icha.contact.bins`, whose imports `icha describe` would wait for.
+# Edges of the bins of `icha.contact.model`, whose imports `icha describe` would wait for.
 GAP_EDGES, PRESSURE_EDGES = 112, 501
 # Arrays along the steps and the spots of runs; texts count for several.
 _STEP_ARRAYS, _SPOT_ARRAYS = 30, 11

@@ -10,17 +10,17 @@ from outside_validators import sealed, validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import RELATIONS, RESOURCES, RelatedIdentifier
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import DEFAULT_MODEL, MODEL_PAPER, MODELS
 from icha.deposit.metadata import (
     citation_cff,
     datacite_metadata,
     discovery_attributes,
     known_licence,
     read_zenodo_metadata,
+    summary_of,
     web_address,
     zenodo_metadata,
 )
-from icha.models import asperities
 
 NEWER = LEAST.model_copy(update={"license": "CC-BY-3.0-IGO"})  # than the licences of the Citation File Format
 RELATED = [
@@ -69,7 +69,7 @@ def test_statements_are_the_same_everywhere(publication):
     # The paper of the model is cited as the program and every run cite it.
     paper = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))["preferred-citation"]
     assert cff["references"] == [paper]
-    assert zenodo["references"] == [asperities.MODEL.references.split("; ")[0]] == [MODEL_PAPER.line]
+    assert zenodo["references"] == [MODELS[DEFAULT_MODEL].references.split("; ")[0]] == [MODEL_PAPER.line]
     assert web_address(datacite["relatedIdentifiers"][-1]["relatedIdentifier"]) == paper["url"]
     # Nothing is said of what is not given.
     for content in (cff, zenodo, datacite):
@@ -135,8 +135,13 @@ def test_licences_are_those_of_spdx():
         known_licence("cc-by-4.0")
 
 
-@pytest.mark.parametrize("text", ["[1]", '{"title": ["a"]}', '{"creators": {"name": 1}}', 100_000 * "[", "\xff"])
+@pytest.mark.parametrize(
+    "text", ["[1]", 100_000 * "[", "\xff", '{"title": ["a"], "creators": {"name": 1}, "communities": [1]}']
+)
 def test_metadata_of_strangers_are_checked(text, tmp_path):
     (tmp_path / ".zenodo.json").write_text(text, encoding="latin-1")
+    if text.startswith("{"):
+        assert summary_of(read_zenodo_metadata(tmp_path))["title"] == "['a']"
+        return
     with pytest.raises(ValueError, match=r"^\.zenodo\.json: "):
         read_zenodo_metadata(tmp_path)

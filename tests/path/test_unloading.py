@@ -40,13 +40,11 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
-from icha.contact.failures import NotConverged
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, NotConverged
 from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.path.cycle import Account, Stride, resolved
 from icha.path.follow import follow
-from icha.path.limits import MAX_REDUCED_PRESSURE
-from icha.path.resolution import Account, Stride, resolved
-from icha.path.targets import LOAD_CONTROL
+from icha.path.targets import LOAD_CONTROL, MAX_REDUCED_PRESSURE
 from icha.surfaces.summits import find_summits
 from validation.surfaces import paraboloid
 
