@@ -2,20 +2,18 @@
 
 import hashlib
 import json
-import os
-import pty
 import re
-import sys
 import threading
 import zipfile
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import SimpleNamespace
 
 import pytest
 import requests
 from typer.testing import CliRunner
 from zenodo_mock.testing import spawn
 
-from icha.cli import app
+from icha.cli import app, deposits
 from icha.deposit import upload as client
 from icha.deposit.upload import Zenodo, ZenodoError, server_address
 
@@ -234,24 +232,17 @@ def test_nothing_is_sent_without_consent(server, deposit):
     assert f"({deposit.stat().st_size:,} bytes)" in said and server.requests == []
 
 
-@pytest.mark.parametrize("answers, requests_made", [("n\n", 0), ("y\nn\n", 5)])
-def test_a_declined_question(server, deposit, monkeypatch, capfd, answers, requests_made):
-    """In a terminal: of the questions, the first is about sending, the second about publishing."""
-    monkeypatch.setenv("ZENODO_TOKEN", TOKEN)
-    ours, theirs = pty.openpty()
-    os.write(ours, answers.encode())
-    with os.fdopen(theirs) as terminal, monkeypatch.context() as context, pytest.raises(SystemExit) as ended:
-        context.setattr(sys, "stdin", terminal)
-        app(["upload", str(deposit), "--url", server.address, "--publish"])
-    os.close(ours)
-    said = "".join(capfd.readouterr())
-    assert "Send it? [y/N]" in said and TOKEN not in said
-    assert len(server.requests) == requests_made, server.requests
-    assert not server.published
-    if requests_made:
-        assert ended.value.code == 0 and "cannot be deleted" in said and "It is a draft" in said
-    else:
-        assert ended.value.code == 1 and "Nothing was sent." in said
+@pytest.mark.parametrize(("answers", "status", "requests_made"), [([False], 1, 0), ([True, False], 0, 5)])
+def test_a_declined_question(answers, status, requests_made, server, deposit, monkeypatch):
+    """Of the questions at a terminal, the first is about sending, the second about publishing."""
+    asked = []
+    monkeypatch.setattr(deposits, "confirmed", lambda question: asked.append(question) or answers[len(asked) - 1])
+    terminal = SimpleNamespace(isatty=lambda: True)
+    monkeypatch.setattr(deposits, "sys", SimpleNamespace(stdin=terminal))
+    assert upload(deposit, "--url", server.address, "--publish")[0] == status
+    assert len(asked) == len(answers) and "Send it?" in asked[0]
+    assert all("cannot be deleted" in question for question in asked[1:])
+    assert len(server.requests) == requests_made and not server.published
 
 
 def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit, tmp_path):
