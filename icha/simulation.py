@@ -3,32 +3,36 @@
 import importlib
 import pathlib
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperity.full_contact import full_contact_energy_ratio
+from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import check_run, reasons_of_failure
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
-from icha.contact.events import JUMP_IN, Events
-from icha.contact.failures import NotConverged
-from icha.contact.model import ContactModel
-from icha.contact.models import ASPERITIES, MODELS
-from icha.contact.observables import summit_counts
+from icha.contact.model import (
+    GAP_BINS,
+    JUMP_IN,
+    PRESSURE_BINS,
+    ContactModel,
+    Events,
+    NotConverged,
+    gap_bins,
+    summit_counts,
+)
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.build import bin_values, build, described, joined, of, stacked
 from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
-from icha.models.applicability import asperity_applicability
-from icha.models.model import Model
 from icha.path.follow import follow
 from icha.path.hysteresis import hysteresis
-from icha.path.limits import LEAST_PRESSURE, MAX_REDUCED_PRESSURE
+from icha.path.limits import LEAST_PRESSURE, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
 from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
 from icha.path.waypoints import Waypoint
 from icha.support.rules import ALL_MODELS, Integer
@@ -36,6 +40,8 @@ from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_
 from icha.surfaces.summits import SummitCoverage, locate_summits
 from icha.surfaces.surface import Surface
 
+# Relative excess of a contact area over its limit that is within the tolerance of the equilibria.
+_AREA_TOLERANCE = 1e-6
 # Snapshots farther up, in h_rms, are far above any contact.
 _HIGHEST_SNAPSHOT = 20.0
 
@@ -66,7 +72,7 @@ def simulate(
     material: Material,
     path: Path,
     *,
-    model: str = ASPERITIES,
+    model: str = DEFAULT_MODEL,
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
     kept: pathlib.Path | None = None,
@@ -107,14 +113,16 @@ def simulate(
         If an equilibrium is not found or a target cannot be reached; its `dataset` holds the stops before.
     """
     _check_arguments(surface, material, path)
-    chosen = _model(model)
-    if kept is not None and chosen.kept is None:
+    solver = _solver(model)
+    if kept is not None and not MODELS[model].resumable:
         raise ValueError(f"kept: equilibria of the model {model} cannot be kept; allowed: None")
     seed = Integer(-1).checked("seed", seed)
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
-        observables = chosen.observables(surface, material, path)
-        contact = observables.contact if kept is None else chosen.kept(observables.contact, kept)
+        contact = solver.contact_of(surface, material)
+        observables = contact.observables(surface)
+        if kept is not None:
+            contact = solver.resumable(contact, kept)
         met = _followed(contact, observables, path, material.contact_modulus * surface.rms_slope, progress)
         loading = [step["mean_separation"] for step in met.steps if step["leg"] == 0]
         reasons = observables.reasons_against(loading)
@@ -137,7 +145,7 @@ def _count_uphill_jumps_in(steps: list[Events]) -> int:
 
 
 def unfollowed(
-    surface: Surface, material: Material, path: Path, reason: str, *, model: str = ASPERITIES, seed: int = -1
+    surface: Surface, material: Material, path: Path, reason: str, *, model: str = DEFAULT_MODEL, seed: int = -1
 ) -> xr.Dataset:
     """The dataset of a run of which nothing can be computed: no step, and the reason in the attribute `incomplete`.
 
@@ -150,7 +158,7 @@ def unfollowed(
 
 def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
     """All of a run but the loop as a whole; with the reason why it ends early, if it does."""
-    chosen, table = _model(name), RUN | FURTHER[name]
+    table = RUN | FURTHER[name]
     values = {
         **_of_path(table, path, met, surface.grid),
         **_of_surface(surface, material, seed),
@@ -159,24 +167,47 @@ def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
         **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.rms_slope)),
     }
     described_here = table | CYCLE | _targets(table, path)
-    dataset = build(described_here, values, _attributes(surface, material, path, name, chosen))
+    dataset = build(described_here, values, _attributes(surface, material, path, name))
     dataset.attrs["applicability"] = _applicability(name, values, met, reasons)
     return dataset.assign_attrs(incomplete=met.failure) if met.failure else dataset
 
 
 def _applicability(name, values, met, reasons):
     """Why the model is not applicable to the run; an empty text where it is."""
-    if name != ASPERITIES:
+    if not MODELS[name].by_summits:
         return ""
     largest = max((step["contact_area_fraction"] for step in met.steps), default=0.0)
     return asperity_applicability(values["full_contact_energy_ratio"], reasons, largest)
 
 
-def _model(name: str) -> Model:
-    """The model of a name. Only its own module is imported: what another is made of does not concern a run."""
-    if name not in MODELS:
+def asperity_applicability(
+    full_contact_energy_ratio: float, summit_reasons: Sequence[str] = (), contact_area_fraction: float = 0.0
+) -> str:
+    """Return why the asperity model is not applicable; an empty text where it is.
+
+    Parameters
+    ----------
+    full_contact_energy_ratio : elastic energy of full contact over the work of adhesion; infinite without adhesion.
+    summit_reasons : reasons that lie in the summits of the surface.
+    contact_area_fraction : largest A/A0 of the run.
+    """
+    reasons = []
+    if full_contact_energy_ratio < FULL_CONTACT_BELOW:
+        reasons.append(
+            f"full contact has the lower energy (U_full/dgamma = {full_contact_energy_ratio:.3g}, less than "
+            f"{FULL_CONTACT_BELOW:g})"
+        )
+    reasons += summit_reasons
+    if contact_area_fraction > MAX_AREA_FRACTION * (1 + _AREA_TOLERANCE):
+        reasons.append(f"contact area A/A0 = {contact_area_fraction:.3g}, beyond {MAX_AREA_FRACTION:g}")
+    return f"asperity model not applicable: {'; '.join(reasons)}" if reasons else ""
+
+
+def _solver(name: str) -> ModuleType:
+    """The module that makes the contact. Only this one is imported: what another is made of does not concern a run."""
+    if name not in tuple(MODELS):
         raise ValueError(f"model: {name!r} must be one of {', '.join(MODELS)}")
-    return importlib.import_module(f"icha.models.{name}").MODEL
+    return importlib.import_module(MODELS[name].module)
 
 
 def _check_arguments(surface, material, path):
@@ -347,7 +378,8 @@ def _of_surface(surface: Surface, material: Material, seed: int) -> dict:
     }
 
 
-def _attributes(surface, material, path, name, model):
+def _attributes(surface, material, path, name):
+    model = MODELS[name]
     attributes = discovery(
         f"Rough contact {'with' if material.surface_energy > 0 else 'without'} adhesion, {model.title}",
         f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "

@@ -13,7 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 import icha
 from icha import Material, Path
 from icha.asperity.jkr import JKR
-from icha.contact.events import Events
+from icha.contact.model import Events
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.surfaces.summits import Asperities

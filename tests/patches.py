@@ -1,10 +1,12 @@
 """In the place of boundary elements: asperities with all that a run by boundary elements has besides, quickly."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from icha.asperity.jkr import JKR
+from icha.boundary_elements import contact
 from icha.equilibrium.distributions import nodes_in_discs
-from icha.equilibrium.observables import AsperityObservables
-from icha.models import asperities, boundary_elements
+from icha.equilibrium.interacting_asperities import AsperityObservables, InteractingAsperities
+from icha.surfaces.summits import find_summits
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,12 +22,17 @@ class Patches(AsperityObservables):
         return super().of_snapshot(state) | {"contact_map": contact * 1.0, "contact_pressure": contact * 1e5}
 
 
+class Stand(InteractingAsperities):
+    """Asperities whose observables are those of patches."""
+
+    def observables(self, surface):
+        return Patches(self, surface)
+
+
 def stand_in(monkeypatch):
     """Let the model `boundary_elements` be asperities that say they were it."""
-    original = asperities.MODEL.observables
 
-    def observables(surface, material, path):
-        found = original(surface, material, path)
-        return Patches(found.contact, surface)
+    def contact_of(surface, material):
+        return Stand(JKR(material), find_summits(surface), surface.rms_height)
 
-    monkeypatch.setattr(boundary_elements, "MODEL", replace(boundary_elements.MODEL, observables=observables))
+    monkeypatch.setattr(contact, "contact_of", contact_of)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import icha
 from icha.analysis.checks import told
 from icha.checks.run import check_run
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.format import RUN, flaws
 
 # What an error of an argument begins with: the argument's name.
@@ -185,7 +185,7 @@ def cases(draw):
         topography,
         draw(_materials(topography)),
         draw(_paths(topography.height)),
-        draw(st.sampled_from([ASPERITIES, ASPERITIES, BOUNDARY_ELEMENTS])),
+        draw(st.sampled_from([DEFAULT_MODEL, DEFAULT_MODEL, REFERENCE_MODEL])),
     )
 
 

@@ -9,17 +9,17 @@ from hypothesis import strategies as st
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.boundary_elements import transforms
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.path.limits import UNRESOLVED_LOSS
 from icha.support import parallel
 
 PERIOD, MODULUS = 100e-6, 25e6
 # Grid and shortest waves along its side: some fifty asperities, and eight cells for each wave.
-SIZE = {ASPERITIES: (64, 16), BOUNDARY_ELEMENTS: (32, 4)}
+SIZE = {DEFAULT_MODEL: (64, 16), REFERENCE_MODEL: (32, 4)}
 # By how much two equilibria may differ, relatively, and in h_rms. Asperities rest to 1e-9 h_rms, fronts of boundary
 # elements to 1e-9 of sqrt(G/dgamma); loads and areas change by up to a hundred times themselves per h_rms, and next to
 # a jump by more.
-SAME = {ASPERITIES: 1e-7, BOUNDARY_ELEMENTS: 1e-5}
+SAME = {DEFAULT_MODEL: 1e-7, REFERENCE_MODEL: 1e-5}
 # Unions of asperities remember where they happened, which steps decide. Of few spots that is so much of their area.
 STEPS_WITH_UNIONS = 0.1
 # A largest tension is known to 1e-3, and what has been lost with every jump to UNRESOLVED_LOSS.
@@ -28,7 +28,7 @@ COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count", 
 # Powers of ten of the energy of adhesion, in units of what it takes to press the summits flat; None: no adhesion.
 NONE, ADHERING = st.none(), st.floats(-4, -1.5)
 ANY = st.one_of(NONE, ADHERING)
-BOTH = pytest.mark.parametrize("model", [ASPERITIES, BOUNDARY_ELEMENTS])
+BOTH = pytest.mark.parametrize("model", [DEFAULT_MODEL, REFERENCE_MODEL])
 
 
 # Of the random cases of other tests one in so many: each of these computes two runs and more.
@@ -106,14 +106,14 @@ def test_units_drop_out(model, data, lengths, pressures):
 
 @pytest.mark.slow
 @settings(max_examples=2)
-@given(contacts(ASPERITIES, ADHERING), st.floats(-4, 4), st.floats(-3, 3))
+@given(contacts(DEFAULT_MODEL, ADHERING), st.floats(-4, 4), st.floats(-3, 3))
 def test_units_drop_out_of_a_loop(contact, lengths, pressures):
     surface, material = contact
     length, stress = 10**lengths, 10**pressures
     larger = Surface(surface.heights * length, PERIOD * length)
     scaled = Material(MODULUS * stress, material.surface_energy * stress * length, material.interaction_range * length)
     way = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
-    one, other = (pressed(*each, ASPERITIES, **way) for each in ((surface, material), (larger, scaled)))
+    one, other = (pressed(*each, DEFAULT_MODEL, **way) for each in ((surface, material), (larger, scaled)))
     assert ("hysteresis_loss" in one) == ("hysteresis_loss" in other)
     assume("hysteresis_loss" in one)
     jumps = int(one["jump_in_count"][-1] + one["jump_off_count"][-1])
@@ -157,15 +157,15 @@ def test_heights_scale_apart_from_lengths(model, data, power):
 
 
 @some(SELDOM)
-@given(contacts(ASPERITIES, NONE))
+@given(contacts(DEFAULT_MODEL, NONE))
 def test_adhesion_vanishes_with_its_energy(contact):
     """An approach is less than Hertz's by sqrt(2 pi a dgamma/E*): what it changes falls with the root of the energy."""
     surface, bare = contact
-    expected, unit = pressed(surface, bare, ASPERITIES), surface.rms_height**1.5 * surface.rms_curvature**0.5
-    faint = [pressed(surface, Material(MODULUS, part * MODULUS * unit, 1e-9), ASPERITIES) for part in (1e-8, 1e-12)]
+    expected, unit = pressed(surface, bare, DEFAULT_MODEL), surface.rms_height**1.5 * surface.rms_curvature**0.5
+    faint = [pressed(surface, Material(MODULUS, part * MODULUS * unit, 1e-9), DEFAULT_MODEL) for part in (1e-8, 1e-12)]
     error = [float(np.abs(run["contact_area_fraction"] / expected["contact_area_fraction"] - 1).max()) for run in faint]
     if expected["coalescence_count"].max() == 0:
-        assert error[0] <= 1e-2 and error[1] <= 0.2 * error[0] + SAME[ASPERITIES]
+        assert error[0] <= 1e-2 and error[1] <= 0.2 * error[0] + SAME[DEFAULT_MODEL]
     assert error[1] <= STEPS_WITH_UNIONS
 
 
@@ -176,7 +176,7 @@ def test_steps_change_nothing_but_unions(model, data):
     surface, material = data.draw(contacts(model))
     long, short = (pressed(surface, material, model, max_step=step) for step in (0.5, 0.05))
     assert long.sizes["step"] == short.sizes["step"]
-    united = model == ASPERITIES and int(short["coalescence_count"].max()) > 0
+    united = model == DEFAULT_MODEL and int(short["coalescence_count"].max()) > 0
     if not united:
         # Patches that meet within a step count as one.
         assert_same(long, short, SAME[model], counts=["spot_count"])

@@ -286,7 +286,7 @@ def test_nothing_reached_is_an_empty_dataset_not_a_wrong_one(monkeypatch):
 
 
 def test_a_snapshot_that_is_not_finite_ends_a_cycle_with_what_was_reached(monkeypatch):
-    from icha.equilibrium.observables import AsperityObservables
+    from icha.equilibrium.interacting_asperities import AsperityObservables
 
     monkeypatch.setattr(AsperityObservables, "of_snapshot", lambda self, state: {"gap_density": np.array([np.nan])})
     with pytest.raises(ConvergenceError, match="with values of gap_density that are not finite") as caught:

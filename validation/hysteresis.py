@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from icha.configuration.load import load_configuration
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import read_campaign
 from validation.tables import Table, copy_figures, means, write_tables
 
@@ -26,7 +26,7 @@ def _cells(study):
 
 def _shown(study, slope):
     """The part of a study by asperities, on its first surface at a slope."""
-    return study.sel(model=ASPERITIES, rms_slope=slope).isel(surface=0)
+    return study.sel(model=DEFAULT_MODEL, rms_slope=slope).isel(surface=0)
 
 
 def _adhesive(study):

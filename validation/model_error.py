@@ -14,7 +14,7 @@ import xarray as xr
 from icha.analysis.model_error import run_of_same_contact
 from icha.configuration.cases import loop_cases
 from icha.configuration.load import load_configuration
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.campaign import run_labels, select_run
 from icha.datasets.files import read_campaign, read_dataset
 from validation.tables import Table, copy_figures, means, pressures, write_tables
@@ -176,8 +176,8 @@ def both_ways(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) ->
         gamma = float(solved["surface_energy"])
         for name, one in (
             ("boundary elements, finite range", solved),
-            ("boundary elements, short range", runs[labels._replace(model=BOUNDARY_ELEMENTS)]),
-            ("asperities", runs[labels._replace(model=ASPERITIES)]),
+            ("boundary elements, short range", runs[labels._replace(model=REFERENCE_MODEL)]),
+            ("asperities", runs[labels._replace(model=DEFAULT_MODEL)]),
         ):
             loss = float(one["hysteresis_loss"])
             rows.append(

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from icha.asperity.material import Material
-from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.contact import BoundaryElements, contact_of
 from icha.contact.model import PRESSURE, Control
 from icha.path.follow import follow
 from icha.path.targets import Path
@@ -55,7 +55,7 @@ def by_cells_per_wave(
     rows = []
     for count in cells:
         surface = coarse.refined(count // min(cells))
-        contact = BoundaryElements.of(surface, material)
+        contact = contact_of(surface, material)
         for separation, state in zip(separations, followed(contact, separations), strict=True):
             rows.append(
                 {
@@ -80,7 +80,7 @@ def symmetries(surface: Surface, separation: float, material: Material = SOFT) -
     }
 
     def solved(heights):
-        contact = BoundaryElements.of(Surface(heights, surface.period), material)
+        contact = contact_of(Surface(heights, surface.period), material)
         (state,) = followed(contact, [separation])
         return contact.pressure(state), contact.area_fraction(state), contact.fractions(state)
 
@@ -103,7 +103,7 @@ def by_steps(
     surface: Surface, separation: float, counts: Sequence[int], material: Material = SOFT, first: float = 3.0
 ) -> list[dict]:
     """A stop (h_rms) reached in so many equal steps from a separation `first`, against the most of them."""
-    contact = BoundaryElements.of(surface, material)
+    contact = contact_of(surface, material)
     unit, found = surface.rms_height, {}
     for count in sorted(counts, reverse=True):
         state = contact.untouched()
@@ -127,7 +127,7 @@ def loop(surface: Surface, largest_pressure: float, step: float, material: Mater
 
     Energies over dgamma, or over E* h_rms without adhesion; not_closed: work less all losses at the end, which is zero.
     """
-    contact = BoundaryElements.of(surface, material)
+    contact = contact_of(surface, material)
     path = Path(reduced_pressures=[largest_pressure], unload=True, max_step=step, snapshots=[])
     unit = material.surface_energy or material.contact_modulus * surface.rms_height
     pressure_unit = material.contact_modulus * surface.rms_slope
@@ -152,7 +152,7 @@ def without_adhesion(surface: Surface, reduced_pressures: Sequence[float]) -> li
 
     gap_error: rms of the difference of the gaps over h_rms; the others are relative, areas those of nodes counted.
     """
-    contact = BoundaryElements.of(surface, HARD)
+    contact = contact_of(surface, HARD)
     rows = []
     for p in reduced_pressures:
         theirs = contact_state(surface, HARD, p, tolerance=1e-10)
@@ -197,7 +197,7 @@ def towards_short_range(
                 }
             )
     material = Material(SOFT.contact_modulus, surface_energy, min(length for length, _ in lengths))
-    contact = BoundaryElements.of(surface, material)
+    contact = contact_of(surface, material)
     for u, state in zip(separations, followed(contact, separations), strict=True):
         rows.append(
             {

@@ -12,7 +12,7 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.contact import BoundaryElements, contact_of
 from icha.contact.model import PRESSURE, Control
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.surfaces.summits import find_summits
@@ -46,7 +46,7 @@ def sphere_there_and_back(
     cells: the radius of contact over the spacing, of the closed form.
     """
     surface, top = bump(grid, _PERIOD, offset)
-    contact, exact = BoundaryElements.of(surface, material), SphereInCell(material, 1.0, _PERIOD)
+    contact, exact = contact_of(surface, material), SphereInCell(material, 1.0, _PERIOD)
     radius = exact.contact_radius(approaches[0])
     state = contact.released(disc(grid, _PERIOD, radius, offset), top - approaches[0])
     rows = []
@@ -74,7 +74,7 @@ def sphere_there_and_back(
 def sphere_under_load(grid: int, offset=(0.0, 0.0), forces: Sequence[float] = (8.0, 4.0, 0.0, -4.0)) -> list[dict]:
     """A sphere under given forces (N, falling): errors of area, and of the approach over the unit of length."""
     surface, top = bump(grid, _PERIOD, offset)
-    contact, exact = BoundaryElements.of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
+    contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
     radius = exact.loaded_radius(forces[0])
     start = top - float(exact.approach(radius))
     state = contact.released(disc(grid, _PERIOD, radius, offset), start)
@@ -122,7 +122,7 @@ def largest_tension(contact: BoundaryElements, state, step: float) -> tuple[floa
 def sphere_pull_off(grid: int, offset=(0.0, 0.0), step: float = 0.05) -> dict:
     """The largest tension of a sphere that is drawn off, and where contact ends, by steps of the approach (m)."""
     surface, top = bump(grid, _PERIOD, offset)
-    contact, exact = BoundaryElements.of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
+    contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
     first = -0.5
     state = contact.released(disc(grid, _PERIOD, exact.contact_radius(first), offset), top - first)
     force, last = largest_tension(contact, state, step)
@@ -141,7 +141,7 @@ def sphere_jump_in(grid: int, range_: float = MATERIAL.interaction_range) -> dic
     """Where a sphere jumps into contact, against Wu's distance, and whether the contact there is that of the law."""
     material = Material(1.0, 1.0, range_)
     surface, top = bump(grid, _PERIOD)
-    contact, exact = BoundaryElements.of(surface, material), SphereInCell(material, 1.0, _PERIOD)
+    contact, exact = contact_of(surface, material), SphereInCell(material, 1.0, _PERIOD)
     wu = float(JKR(material).jump_in_approach(1.0))
     start = contact.untouched()
     before = contact.equilibrium(start, top - wu + 1e-6)
@@ -164,7 +164,7 @@ def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.
     """An elliptic paraboloid of radii of curvature sqrt(1/2) and sqrt(2), turned by an angle (degrees)."""
     radii = (math.sqrt(2), math.sqrt(1 / 2))
     surface, top = bump(grid, _PERIOD, (0.3, 0.1), radii, math.radians(angle))
-    contact = BoundaryElements.of(surface, MATERIAL)
+    contact = contact_of(surface, MATERIAL)
     start = SphereInCell(MATERIAL, 1.0, _PERIOD).contact_radius(approaches[0])
     state = contact.released(disc(grid, _PERIOD, start), top - approaches[0])
     rows = []
@@ -187,7 +187,7 @@ def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
     round_ = RoundPunch(MATERIAL, radius)
     let_go = round_.displacement_in_cell(round_.pull_off_force, period)
     surface, face = punch(grid, period, radius, 10 * let_go, square)
-    contact = BoundaryElements.of(surface, MATERIAL)
+    contact = contact_of(surface, MATERIAL)
     base = float(surface.heights.max())
     state = contact.released(face, base + 0.02 * let_go)
     compliance = 0.02 * let_go / -force_and_area(contact, state)[0]
@@ -210,7 +210,7 @@ def row_of_strips(grid: int, half_width: float) -> dict:
     exact = Strips(MATERIAL, cells / grid * period, period)
     let_go = exact.pull_off_tension * exact.compliance
     surface, face = strips(grid, period, exact.half_width, 10 * let_go)
-    contact = BoundaryElements.of(surface, MATERIAL)
+    contact = contact_of(surface, MATERIAL)
     base = float(surface.heights.max())
     state = contact.released(face, base + 0.02 * let_go)
     compliance = 0.02 * let_go / -contact.pressure(state)
@@ -234,7 +234,7 @@ def sinusoid(grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1
     energy = (alpha * math.pi * amplitude) ** 2 / 2
     material = Material(1.0, energy, 1e-4 * amplitude)
     exact = Sinusoid(material, amplitude, period)
-    contact = BoundaryElements.of(wave(grid, period, amplitude), material)
+    contact = contact_of(wave(grid, period, amplitude), material)
     x = (np.arange(grid) - grid // 2) / grid
     start = np.broadcast_to(np.abs(x) <= psi[0] / math.pi, (grid, grid))
     state = contact.released(start, float(exact.separation(psi[0])))
@@ -268,7 +268,7 @@ def crack(grid: int, radii: Sequence[float] = (0.2, 0.16, 0.12), amplitude: floa
     """
     material = Material(1.0, (0.3 * math.pi * amplitude) ** 2 / 2, 1e-4 * amplitude)
     exact = CrackInTrough(material, amplitude, 1.0)
-    contact = BoundaryElements.of(wave(grid, 1.0, amplitude, dimensions=2), material)
+    contact = contact_of(wave(grid, 1.0, amplitude, dimensions=2), material)
     x = np.minimum(np.arange(grid), grid - np.arange(grid)) / grid  # from the trough, at the cell's corner
     distance = np.hypot(x[:, None], x)
     state = contact.released(distance > radii[0], exact.separation(radii[0]))
@@ -296,7 +296,7 @@ def pair(grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0
     """
     period = 2 * _PERIOD
     surface, top = two_bumps(grid, period, distance)
-    contact = BoundaryElements.of(surface, MATERIAL)
+    contact = contact_of(surface, MATERIAL)
     asperities = InteractingAsperities(JKR(MATERIAL), find_summits(surface), surface.rms_height)
     radius = float(JKR(MATERIAL).contact_radius(approaches[0], 1.0))
     half = distance / 2 / surface.spacing

@@ -4,26 +4,21 @@
 `icha-boundary-elements` are ICHA's own boundary elements in the limit of short range.
 """
 
+import importlib
 import sys
 
 from task import Task
 from threadpoolctl import threadpool_limits
 
 import icha
+from icha.contact.models import MODELS
 from icha.path.follow import follow
 
 
 def contact_of(code, surface, material):
     """The contact by one of the two models."""
-    if code == "icha-boundary-elements":
-        from icha.boundary_elements.contact import BoundaryElements
-
-        return BoundaryElements.of(surface, material)
-    from icha.asperity.jkr import JKR
-    from icha.equilibrium.interacting_asperities import InteractingAsperities
-    from icha.surfaces.summits import find_summits
-
-    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+    model = "boundary_elements" if code == "icha-boundary-elements" else "asperities"
+    return importlib.import_module(MODELS[model].module).contact_of(surface, material)
 
 
 def main():

@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 from scipy.stats import wasserstein_distance
 
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS
-from icha.contact.models import ASPERITIES
+from icha.contact.model import GAP_BINS, PRESSURE_BINS
+from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.attributes import DERIVED, collected, why_no_result
 from icha.datasets.build import bin_values, described, variable
 from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spots_of
@@ -108,7 +108,7 @@ def _short_range_entries(select, runs, origins):
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
-        run = select(labels._replace(model=ASPERITIES))
+        run = select(labels._replace(model=DEFAULT_MODEL))
         states = entries.setdefault(labels.study, {})
         try:
             states |= _compare_stops(labels, run, truth)
@@ -397,7 +397,7 @@ def _of_asperities(quantity, labelled):
     for place in np.ndindex(values.shape):
         labels = dict(zip(_LABELS, labels_at(labelled, place, _LABELS), strict=True))
         with contextlib.suppress(KeyError):
-            values[place] = quantity.isel(place_of(quantity.to_dataset(), {"model": ASPERITIES} | labels)).item()
+            values[place] = quantity.isel(place_of(quantity.to_dataset(), {"model": DEFAULT_MODEL} | labels)).item()
     return xr.Variable(_LABELS, values, quantity.attrs)
 
 

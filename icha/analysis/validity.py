@@ -14,7 +14,7 @@ import numpy as np
 
 from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, MEANING
 from icha.asperity.material import WU_HOLDS_FROM
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS
 from icha.surfaces.moments import cells_per_short_wave
@@ -170,7 +170,7 @@ def statements(
     if sticky:
         text = f"attraction outweighs repulsion: {named(sticky)}; errors can be many times those of the validation"
         found.append(Statement("sticky", text, False))
-    of_asperities = [case for case in cases if case.model == ASPERITIES]
+    of_asperities = [case for case in cases if MODELS[case.model].by_summits]
     if of_asperities:
         found += [_surfaces(of_asperities), _accuracy(of_asperities)]
     return found
@@ -183,9 +183,9 @@ def _full_contact(cases):
         return
     lowest = min(adhesive, key=lambda case: case.ratio)
     text = f"U_full/dgamma is {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}); {MEANING}"
-    if any(case.model == ASPERITIES and case.ratio < FULL_CONTACT_BELOW for case in cases):
+    if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
-    if any(case.model != ASPERITIES and case.ratio < HIGH_PULL_OFF_BELOW for case in cases):
+    if any(MODELS[case.model].by_cells and case.ratio < HIGH_PULL_OFF_BELOW for case in cases):
         text += f"; boundary elements may take up to {MOST_OVER_EXPECTED} times as long as expected"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
 
@@ -240,7 +240,7 @@ def of_dataset(campaign: xr.DataTree) -> list[Statement]:
         study = node.to_dataset()
         models[name] = [str(model) for model in study["model"].values]
         cases += _cases(study)
-        if ASPERITIES not in models[name]:
+        if DEFAULT_MODEL not in models[name]:
             continue
         for surface, material, share in _outside(study):
             if share is not None:
@@ -291,7 +291,7 @@ def _outside(study):
 
     It is that at the end of the first loading; None without adhesion, where nothing jumps.
     """
-    runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=ASPERITIES)
+    runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL)
     status = runs["status"].transpose(*LABELS[1:]).values
     share, leg = (runs[name].transpose(*LABELS[1:], "step").values for name in ("outside_wu_fraction", "leg"))
     energy = runs["surface_energy"].values

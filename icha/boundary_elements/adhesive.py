@@ -13,7 +13,7 @@ from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import front_at_rest
 from icha.boundary_elements.regions import region
 from icha.boundary_elements.windows import relaxed_in_windows
-from icha.contact.failures import FullContact, NotConverged
+from icha.contact.model import FullContact, NotConverged
 
 # Deviation of sqrt(G/dgamma) at which a front rests well enough to see where new contact forms.
 _NEARLY_AT_REST = 1e-3

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import pathlib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 
 import numpy as np
 
@@ -16,11 +20,22 @@ from icha.boundary_elements.held_load import under_control
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import COARSE, FINE, FRONT_TOLERANCE, front_residual, tangent
 from icha.boundary_elements.patch_events import patch_events
-from icha.boundary_elements.patches import BEYOND_EDGES, edges, labelled
-from icha.boundary_elements.states import CellState
-from icha.contact.events import Events
-from icha.contact.failures import NotConverged
-from icha.contact.model import PRESSURE, Control
+from icha.boundary_elements.patches import BEYOND_EDGES, centres, edges, labelled, labels_at
+from icha.boundary_elements.states import CellState, packed, unpacked
+from icha.contact.kept import Kept
+from icha.contact.model import (
+    COALESCENCE,
+    JUMP_IN,
+    JUMP_OFF,
+    PRESSURE,
+    PRESSURE_BINS,
+    SPLIT,
+    Control,
+    Events,
+    NotConverged,
+    gap_bins,
+    summit_counts,
+)
 from icha.surfaces.summits import Asperities, locate_summits
 from icha.surfaces.surface import Surface
 
@@ -47,36 +62,6 @@ class BoundaryElements:
     topography: Topography
     front: Front
     summits: Summits
-
-    @classmethod
-    def of(cls, surface: Surface, material: Material) -> BoundaryElements:
-        """The contact of a surface and a material.
-
-        Raises
-        ------
-        ValueError
-            If the surface is a free square, or adhesion is lost in the rounding of its heights.
-        """
-        surface.require_periodic("a model of boundary elements")
-        law, asperities, h = JKR(material), locate_summits(surface), surface.spacing
-        column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
-        cell = row * surface.grid + column
-        jump_in = law.jump_in_approach(asperities.radius_of_curvature)
-        summits = Summits(
-            cell,
-            (asperities.height - surface.heights.ravel()[cell]) / h,
-            -jump_in / h,
-            law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
-        )
-        front = Front(material.surface_energy / (material.contact_modulus * h))
-        if 0 < COMPLIANCE * front.strength < _LEAST_REACH * np.abs(surface.heights).max() / h:
-            raise ValueError(
-                f"surface_energy: {material.surface_energy:g} J/m^2 cannot be told from none at heights like these; "
-                "needed: none at all, or more"
-            )
-        space = HalfSpace.of(surface.grid)
-        topography = Topography.of(surface.heights / h)
-        return cls(surface.heights, h, law, surface.rms_height, asperities, space, topography, front, summits)
 
     # --- what a path asks of every model --------------------------------------------------------------------------
 
@@ -126,6 +111,10 @@ class BoundaryElements:
             new = under_control(self, state, separation, control, self._at, self._events)
         events = self._events(state, new)
         return replace(new, history=(*state.history, events) if len(events) else state.history)
+
+    def observables(self, surface: Surface) -> PatchObservables:
+        """What a run keeps of the states on the surface that is pressed."""
+        return PatchObservables(self, surface)
 
     def released(self, region: np.ndarray, separation: float) -> CellState:
         """The equilibrium at a separation (m) that a contact of a given region, (n, n) of bool, falls into."""
@@ -266,3 +255,151 @@ class BoundaryElements:
     def _set_free(self, state):
         """What every cell would set free if its patch jumped, J/m^2: without adhesion nothing jumps."""
         return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))
+
+
+@dataclass(frozen=True, eq=False)
+class PatchObservables:
+    """Observables of a contact of cells and of the surface that they are on, beyond those of every model."""
+
+    contact: BoundaryElements
+    surface: Surface
+
+    def of_contact(self) -> dict:
+        """What holds for all states."""
+        return summit_counts(self.contact.asperities)
+
+    def of_step(self, state: CellState) -> dict:
+        """Residuals of the equilibrium, events so far, and how far Wu's formula is known to hold."""
+        contact = self.contact
+        touched = np.isin(contact.summits.cell, state.cells)
+        verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
+        outside = np.count_nonzero(~verified) / max(len(verified), 1)
+        events = Events.joined(state.history)
+        counts = {
+            name: events.count(kind)
+            for name, kind in (
+                ("jump_in_count", JUMP_IN),
+                ("jump_off_count", JUMP_OFF),
+                ("coalescence_count", COALESCENCE),
+                ("split_count", SPLIT),
+            )
+        }
+        return counts | {
+            "residual": state.gap_residual / contact.rms_height,
+            "front_residual": state.front_residual,
+            "gap_residual": state.gap_residual / contact.rms_height,
+            "pending_count": state.pending,
+            "outside_wu_fraction": outside if contact.adhesive else 0.0,
+        }
+
+    def of_snapshot(self, state: CellState) -> dict:
+        """Distributions of gap and pressure, the patches, and the map of contact and pressure."""
+        cells = self.contact.area_of_cells(state)
+        gap = self._gap_density(state, cells)
+        pressure, mean = self._pressure_density(state, cells)
+        on_grid = self.contact.space.on_grid
+        return {
+            "overlap_fraction": 0.0,
+            "area_beyond_edges": 0.0,
+            "gap_density": gap,
+            "pressure_density": pressure,
+            "pressure_bin_mean": mean,
+            "contact_map": on_grid(state.cells, state.fraction, np.float32),
+            "contact_pressure": on_grid(state.cells, state.pressure, np.float32),
+            **self._patches(state, cells),
+        }
+
+    def reasons_against(self, separations: Iterable[float]) -> list[str]:
+        """No reasons: the cells are the surface itself."""
+        return []
+
+    @property
+    def largest_tension(self) -> float:
+        """Tension of all asperities pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
+        sum_of_radii = float(np.sum(self.contact.asperities.radius_of_curvature))
+        return 1.5 * np.pi * self.contact.law.material.surface_energy * sum_of_radii / self.contact.area
+
+    def _gap_density(self, state, cells):
+        """Density of the gap over the nominal area, outside contact: with the area, it is whole."""
+        edges_of_bins = gap_bins(self.surface)
+        gap = np.clip(self.contact.gap(state), 0.0, edges_of_bins[-1])
+        outside = 1 - self.contact.space.on_grid(state.cells, cells)
+        content, _ = np.histogram(gap, edges_of_bins, weights=outside)
+        return content / gap.size / np.diff(edges_of_bins)
+
+    def _pressure_density(self, state, cells):
+        """Density of the pressure over the nominal area, and its mean in every bin; the pressure is the patches'."""
+        edges_of_bins = PRESSURE_BINS * (self.contact.contact_modulus * self.surface.rms_slope)
+        # The force of a cell acts on the part of it that touches; what that is beside its area is the same everywhere.
+        weight = state.fraction * (np.sum(cells) / (np.sum(state.fraction) or 1.0))
+        pressure = state.pressure / weight
+        counted = np.clip(pressure, edges_of_bins[0], edges_of_bins[-1])
+        content, _ = np.histogram(counted, edges_of_bins, weights=weight)
+        force, _ = np.histogram(counted, edges_of_bins, weights=weight * pressure)
+        mean = np.divide(force, content, out=np.zeros(len(content)), where=content > 0)
+        return content / self.contact.heights.size / np.diff(edges_of_bins), mean
+
+    def _patches(self, state, cells):
+        """Every patch: centre of area, area, perimeter, force, summits, and the curvature of the highest of them."""
+        contact, h = self.contact, self.contact.spacing
+        grid = contact.space.grid
+        labels, count = labelled(state.cells, grid)
+
+        def sums(weight):
+            return np.bincount(labels, weight, count + 1)[1:]
+
+        area = sums(cells) * h**2
+        of_summit = labels_at(contact.summits.cell, state.cells, labels)
+        order = np.argsort(contact.asperities.height, kind="stable")
+        # A patch whose summits have been left is that of a cap of the surface's mean curvature.
+        radius = np.full(count + 1, 1 / self.surface.rms_curvature)
+        radius[of_summit[order]] = contact.asperities.radius_of_curvature[order]
+        centre = centres(state.cells, grid, labels, count, state.fraction) * h
+        return {
+            "spot_x": centre[:, 0],
+            "spot_y": centre[:, 1],
+            "spot_radius": np.sqrt(area / np.pi),
+            "spot_area": area,
+            "spot_perimeter": np.pi / 4 * sums(edges(state.cells, grid)) * h,
+            "spot_force": sums(state.pressure) * h**2,
+            "spot_curvature_radius": radius[1:],
+            "spot_members": np.bincount(of_summit, minlength=count + 1)[1:],
+        }
+
+
+def contact_of(surface: Surface, material: Material) -> BoundaryElements:
+    """The contact of a surface and a material.
+
+    Raises
+    ------
+    ValueError
+        If the surface is a free square, or adhesion is lost in the rounding of its heights.
+    """
+    surface.require_periodic("a model of boundary elements")
+    law, asperities, h = JKR(material), locate_summits(surface), surface.spacing
+    column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
+    cell = row * surface.grid + column
+    jump_in = law.jump_in_approach(asperities.radius_of_curvature)
+    summits = Summits(
+        cell,
+        (asperities.height - surface.heights.ravel()[cell]) / h,
+        -jump_in / h,
+        law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
+    )
+    front = Front(material.surface_energy / (material.contact_modulus * h))
+    if 0 < COMPLIANCE * front.strength < _LEAST_REACH * np.abs(surface.heights).max() / h:
+        raise ValueError(
+            f"surface_energy: {material.surface_energy:g} J/m^2 cannot be told from none at heights like these; "
+            "needed: none at all, or more"
+        )
+    space = HalfSpace.of(surface.grid)
+    topography = Topography.of(surface.heights / h)
+    return BoundaryElements(surface.heights, h, law, surface.rms_height, asperities, space, topography, front, summits)
+
+
+def resumable(contact: BoundaryElements, folder: pathlib.Path) -> Kept:
+    """The contact with its equilibria kept in a folder, from which a path that was stopped resumes."""
+    programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
+    others = repr((contact.spacing, contact.law.material, programs)).encode()
+    of = hashlib.sha256(contact.heights.tobytes() + others).hexdigest()
+    return Kept(contact, of[:32], folder, packed, unpacked)

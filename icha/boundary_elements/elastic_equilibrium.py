@@ -25,7 +25,7 @@ from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.nearby import Tiles
 from icha.boundary_elements.regions import among, beside, merged, surroundings
-from icha.contact.failures import FullContact, NotConverged
+from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
 # Compliance of the shortest waves, 2/q, h/E*: the least.

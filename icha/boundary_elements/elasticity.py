@@ -8,7 +8,7 @@ import numpy as np
 
 from icha.boundary_elements.kernel import HalfSpace, Nearly, Whole
 from icha.boundary_elements.regions import among, merged
-from icha.contact.failures import NotConverged
+from icha.contact.model import NotConverged
 from icha.support.parallel import blocks, on_cores
 
 # Compliance, h/E*, from which on that of a bond counts in the preconditioner: with it conjugate gradients are quickest.

@@ -9,10 +9,8 @@ import numpy as np
 
 from icha.boundary_elements.newton import FRONT_TOLERANCE
 from icha.boundary_elements.states import CellState
-from icha.contact.events import Events
-from icha.contact.failures import NotConverged
-from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control
-from icha.contact.tolerances import HELD_CELLS, HELD_PART
+from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control, Events, NotConverged
+from icha.contact.models import HELD_CELLS, HELD_PART
 
 # Relative error of a held load or area.
 _HELD = 5e-10

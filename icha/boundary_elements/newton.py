@@ -20,9 +20,8 @@ from icha.boundary_elements.elasticity import NOTHING, Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, adhesive_areas, neighbour_weights
 from icha.boundary_elements.kernel import HalfSpace, Whole
 from icha.boundary_elements.regions import adjacent, merged, region
-from icha.contact.failures import FullContact, NotConverged
-from icha.contact.models import BOUNDARY_ELEMENTS
-from icha.contact.tolerances import STIFFNESS_TOLERANCE
+from icha.contact.model import FullContact, NotConverged
+from icha.contact.models import MODELS, REFERENCE_MODEL
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
 FRONT_TOLERANCE = 1e-9
@@ -43,7 +42,7 @@ _FAR_BELOW, _LEAST_GAIN = 10, 0.5
 # Accuracy of the linear equations: in the last step so many times that of the displacement at rest, over the error of
 # the front; at worst, and at best.
 _LAST = 5
-COARSE, FINE = 1e-1, STIFFNESS_TOLERANCE[BOUNDARY_ELEMENTS]
+COARSE, FINE = 1e-1, MODELS[REFERENCE_MODEL].stiffness_error
 # The rows of the front, in the preconditioner: what is left of a bond beside the half-space.
 _NET = 0.6
 # A deviation of sqrt(G/dgamma) that is mended where it is. Least damping of bonds there: fronts run, and a whole step

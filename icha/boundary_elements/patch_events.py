@@ -8,7 +8,7 @@ import numpy as np
 
 from icha.boundary_elements.patches import centres, labelled, labels_at
 from icha.boundary_elements.states import CellState
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 
 
 def patch_events(

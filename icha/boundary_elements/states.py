@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from icha.contact.events import Events
+from icha.contact.model import Events
 
 
 @dataclass(frozen=True, eq=False)

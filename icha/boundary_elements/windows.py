@@ -20,7 +20,7 @@ from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
 from icha.boundary_elements.patches import labelled
 from icha.boundary_elements.regions import BLOCK, among, blocks_around, merged, surroundings
-from icha.contact.failures import FullContact, NotConverged
+from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
 # Cells a side of windows, half of which may move. What is too wide for them is cut into pieces.

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from icha.checks.findings import IDENTITY_LIMIT, Finding
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
-from icha.contact.tolerances import RESIDUAL_TOLERANCE, STIFFNESS_TOLERANCE
+from icha.contact.models import RESIDUAL_TOLERANCE, model_of
 from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST
 from icha.path.open_work import integration_error, pressure_jump, unresolved_work
 
@@ -73,7 +72,7 @@ def check_loop(run) -> Iterator[Finding]:
         "pull-off pressure against the largest tension of the last unloading, over the largest pressure there",
     )
     # What asperities unite by a rule patches do by themselves, and as they came.
-    united = run.attrs.get("contact_model") != BOUNDARY_ELEMENTS and int(run["coalescence_count"][-1]) > 0
+    united = model_of(run.attrs).unites and int(run["coalescence_count"][-1]) > 0
     if float(run["surface_energy"]) == 0 and not united:
         yield (
             "loop closes",
@@ -87,7 +86,7 @@ def _losses(run, scale):
     """Findings on the loss of a loop and its parts: a passive contact gives back no more work than was put in."""
     unknown = IDENTITY_LIMIT + (_left_open(run) + _error_of_work(run)) / scale
     tolerance = min(unknown, LARGEST_UNKNOWN_WORK)
-    united = run.attrs.get("contact_model") != BOUNDARY_ELEMENTS and int(run["coalescence_count"][-1]) > 0
+    united = model_of(run.attrs).unites and int(run["coalescence_count"][-1]) > 0
     with_unions = max(tolerance, UNION_LIMIT) if united else tolerance
 
     def gain(loss):
@@ -155,7 +154,7 @@ def _error_of_work(run):
     way, stiffness = np.abs(np.diff(run["mean_separation"])), run["contact_stiffness"]
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])
     separation = RESIDUAL_TOLERANCE * float(run["rms_height"])
-    relative = STIFFNESS_TOLERANCE[run.attrs.get("contact_model", ASPERITIES)]
+    relative = model_of(run.attrs).stiffness_error
     return float(np.sum(way * ends * (0.5 * separation + relative * way / 12)))
 
 

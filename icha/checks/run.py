@@ -11,9 +11,8 @@ import xarray as xr
 
 from icha.checks.findings import IDENTITY_LIMIT, Check, Finding, RunArrays, at_most, not_finite
 from icha.checks.loops import check_events, check_loop
-from icha.contact.models import BOUNDARY_ELEMENTS
-from icha.contact.tolerances import HELD_CELLS, HELD_PART, SMALLEST_LOAD
-from icha.datasets.variables.run import PATCHES, RUN
+from icha.contact.models import HELD_CELLS, HELD_PART, SMALLEST_LOAD, model_of
+from icha.datasets.variables.run import OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
 from icha.path.targets import AREA_FRACTION, BETWEEN
 
@@ -75,7 +74,7 @@ def _fronts(run) -> Iterator[Finding]:
         ("gap_residual", "gap", RESIDUAL_LIMIT),
     ):
         if name in run:
-            yield short, np.max(run[name]), limit, PATCHES[name].long_name
+            yield short, np.max(run[name]), limit, OF_MODELS[name].long_name
 
 
 # What the findings on the first loading are made of.
@@ -87,7 +86,7 @@ def _loading(run) -> Iterator[Finding]:
     first = run["leg"] == 0
     loading = {name: run[name][first] for name in _OF_LOADING}
     adhesive, height = float(run["surface_energy"]) > 0, float(run["rms_height"])
-    by_cells = run.attrs.get("contact_model") == BOUNDARY_ELEMENTS
+    by_cells = model_of(run.attrs).by_cells
     # Two targets of different kinds may be one state but for the accuracy to which it is reached.
     yield (
         "area rises",
@@ -168,7 +167,7 @@ def _miss(run):
     target, kinds = run["step_target"], [str(kind) for kind in run["step_kind"]]
     value = np.array([reached[kind][k] for k, kind in enumerate(kinds)])
     miss = np.abs(value - target)
-    if run.attrs.get("contact_model") == BOUNDARY_ELEMENTS and float(run["surface_energy"]) == 0:
+    if model_of(run.attrs).by_cells and float(run["surface_energy"]) == 0:
         of_area = np.array([kind == AREA_FRACTION for kind in kinds])
         cells = np.minimum(HELD_CELLS / float(run["grid"]) ** 2, HELD_PART * np.abs(target))
         miss = np.where(of_area, np.maximum(miss - cells, 0.0), miss)

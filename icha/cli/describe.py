@@ -64,10 +64,10 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
         if plot is not None:
             raise Mistake("--plot: draws measured surfaces; the campaign presses none")
         return
-    from icha.contact.models import BOUNDARY_ELEMENTS
+    from icha.contact.models import MODELS
     from icha.surfaces.measured.resolution import scan_resolution
 
-    by_patches = {case.surface for case in run_cases(campaign) if case.model == BOUNDARY_ELEMENTS}
+    by_patches = {case.surface for case in run_cases(campaign) if MODELS[case.model].least_cells}
     scans = {name: scan_resolution(section.path, section.preparation) for name, section in measured.items()}
     say("")
     for name, scan in scans.items():

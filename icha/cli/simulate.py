@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import FAILED, Mistake
-from icha.contact.models import ASPERITIES, MODELS
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import why_no_result
 from icha.support.input_files import flaw_of_path
 
@@ -71,7 +71,9 @@ def simulate(
         str | None, _unset("Stops p/(E* h'rms), increasing. Left out: 1e-3,3e-3,1e-2,3e-2.", _numbers)
     ] = None,
     areas: Annotated[str | None, _unset("Stops at contact area fractions A/A0 instead, increasing.", _numbers)] = None,
-    model: Annotated[str, typer.Option(help=f"Contact model: {' or '.join(MODELS)}, which are slower.")] = ASPERITIES,
+    model: Annotated[
+        str, typer.Option(help=f"Contact model: {' or '.join(MODELS)}, which are slower.")
+    ] = DEFAULT_MODEL,
     unload: Annotated[bool, typer.Option("--unload", help="Pull the surfaces apart again.")] = False,
     confirmed: Annotated[bool, typer.Option("--confirmed", help="Take unusual values as they are.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
@@ -177,11 +179,11 @@ def _refuse_too_large(grid: int, waves: float, model: str) -> None:
 
     `waves` are the shortest ones along a side: some twenty numbers are held for each wave of the spectrum.
     """
-    from icha.planning.costs import PATCH_ARRAYS, surface_cost
+    from icha.planning.costs import RUN_SIZES, surface_cost
     from icha.planning.needs import memory_of_machine
     from icha.support import in_words
 
-    arrays = 8 * PATCH_ARRAYS * grid**2 if model != ASPERITIES else 0
+    arrays = 8 * RUN_SIZES[model].arrays * grid**2
     needed, there = max(surface_cost(grid).memory, arrays, 8 * 20 * waves**2), memory_of_machine()
     if needed > there:
         raise ValueError(

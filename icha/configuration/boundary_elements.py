@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
 from icha.configuration.studies import MEASURED
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL
 from icha.path.limits import STEP
 from icha.path.states import ReducedPressure
 from icha.support.rules import GRID, REFINEMENT, TOLERANCE
@@ -55,8 +55,8 @@ class BesideStudy(Section):
             yield from self._study_problems(campaign, campaign.studies[self.study])
 
     def _study_problems(self, campaign, study):
-        if ASPERITIES not in study.models:
-            reason = f"has no runs to compare with; allowed: a study with {ASPERITIES!r} among its `models`"
+        if DEFAULT_MODEL not in study.models:
+            reason = f"has no runs to compare with; allowed: a study with {DEFAULT_MODEL!r} among its `models`"
             yield ("study",), self.study, reason
         for key in ("surfaces", "seeds", "rms_slopes", "materials"):
             there = getattr(study, key)

@@ -17,7 +17,7 @@ from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
 from icha.configuration.studies import MEASURED, Study
 from icha.configuration.surfaces import AnySurface, MaterialSection
-from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import MODELS, Model
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections of entries that belong to a study.
@@ -222,29 +222,38 @@ class Campaign(Section):
             yield from _within(("measurements", label), entry.table_problems())
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
-        """Surfaces of a study that boundary elements cannot press."""
-        if BOUNDARY_ELEMENTS not in study.models:
-            return
-        at = ("models", study.models.index(BOUNDARY_ELEMENTS))
-        for name in study.surfaces:
-            surface = self.surfaces[name]
-            if self.is_free(name):
-                reason = f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or "
-                yield at, BOUNDARY_ELEMENTS, reason + "another `boundary`, which makes a surface periodic"
-            if surface.cells_per_short_wave < _LEAST_CELLS * (1 - ROUNDING):
-                cells = f"{surface.cells_per_short_wave:.3g}"
-                reason = (
-                    f"need at least {_LEAST_CELLS} grid cells per shortest wavelength, and {name!r} has {cells}; "
-                    f"allowed: asperities, or a `grid` of {surface.grid_of_cells(_LEAST_CELLS)} or more for {name!r} "
-                    f"(recommended: {surface.grid_of_cells(_ADVISABLE_CELLS)})"
-                )
-                yield at, BOUNDARY_ELEMENTS, reason
+        """Surfaces of a study that its models cannot press."""
+        for index, model in enumerate(study.models):
+            for name in study.surfaces:
+                for reason in self._reasons_against(MODELS[model], name):
+                    yield ("models", index), model, reason
+
+    def _reasons_against(self, model: Model, name: str) -> Iterator[str]:
+        """Reasons why a model cannot press a surface."""
+        surface, least = self.surfaces[name], model.least_cells
+        if model.periodic_only and self.is_free(name):
+            yield (
+                f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or another "
+                "`boundary`, which makes a surface periodic"
+            )
+        if surface.cells_per_short_wave < least * (1 - ROUNDING):
+            yield (
+                f"need at least {least} grid cells per shortest wavelength, and {name!r} has "
+                f"{surface.cells_per_short_wave:.3g}; allowed: asperities, or a `grid` of "
+                f"{surface.grid_of_cells(least)} or more for {name!r} (recommended: "
+                f"{surface.grid_of_cells(_ADVISABLE_CELLS)})"
+            )
 
     def warnings(self) -> list[str]:
         """What is allowed but not advisable."""
         found = []
         studies = self.studies.values()
-        by_patches = {name for each in studies if BOUNDARY_ELEMENTS in each.models for name in each.surfaces}
+        by_cells = {
+            name
+            for each in studies
+            if any(MODELS[model].least_cells for model in each.models)
+            for name in each.surfaces
+        }
         for name in dict.fromkeys(name for study in studies for name in study.surfaces):
             surface, origin = self.surfaces[name], self.origin("surfaces", name)
             variant = "" if origin == name else f" (variant {name})"
@@ -254,7 +263,7 @@ class Campaign(Section):
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
                     f"{variant}; recommended: {_ADVISABLE_CELLS}, at least {_LEAST_CELLS}"
                 )
-            elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_patches:
+            elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_cells:
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
                     f"wavelength{variant}, with which areas are off by a few per cent; recommended: "

@@ -9,7 +9,7 @@ from functools import partial
 from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import MeasuredSurface
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
 
@@ -65,7 +65,7 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
         "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
         "rms_slope": case.rms_slope,
         "seed": case.seed,
-    } | ({} if case.model == ASPERITIES else {"model": case.model})
+    } | ({} if case.model == DEFAULT_MODEL else {"model": case.model})
 
 
 def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:

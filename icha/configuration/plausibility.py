@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SelfAffineSurface
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL
 from icha.support import in_words
 from icha.support.values import Problem, listed, to_number, to_si
 from icha.surfaces.moments import self_affine_full_contact_energy
@@ -162,7 +162,7 @@ def full_contact_energy(campaign: Campaign, surface: str) -> float:
 def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
     """The stickiest run of asperities of every study in which full contact has the lower energy."""
     for name, study in campaign.studies.items():
-        if ASPERITIES not in study.models:
+        if DEFAULT_MODEL not in study.models:
             continue
         ratios = {}
         for contact in campaign.contacts(name):

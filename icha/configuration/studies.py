@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
-from icha.contact.models import ASPERITIES, MODELS
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
 from icha.path.targets import Path
@@ -215,8 +215,8 @@ class Study(Section):
         description="An explicit list of runs instead of all combinations. What a case does not name is taken from the "
         "lists of the study.",
     )
-    models: Annotated[list[Literal[MODELS]], Field(min_length=1), AfterValidator(distinct)] = Field(
-        default=[ASPERITIES],
+    models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = Field(
+        default=[DEFAULT_MODEL],
         description="Contact models by which every run is computed: `asperities`, which are quick, and "
         "`boundary_elements` in the limit of a short range of attraction, which need a periodic surface "
         "and a grid of at least 4 cells (better 8) per shortest wavelength.",

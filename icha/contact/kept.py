@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from icha.contact.failures import FullContact, NotConverged
-from icha.contact.model import ContactModel, Control, S
+from icha.contact.model import ContactModel, Control, FullContact, NotConverged, S
 from icha.support.atomic_files import whole_file
 
 _FAILURES = {kind.__name__: kind for kind in (NotConverged, FullContact)}

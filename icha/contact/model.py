@@ -1,9 +1,15 @@
-"""The interface of a model of contact: what a path needs to know of it to follow it."""
+"""The interface of a contact model: what a path needs to follow it, and what a run keeps of its states."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
-from icha.contact.events import Events
+import numpy as np
+
+from icha.surfaces.summits import Asperities
+from icha.surfaces.surface import Surface
 
 # Quantities that a solve can hold.
 PRESSURE, AREA_FRACTION = "pressure", "area_fraction"
@@ -15,6 +21,48 @@ class Control:
 
     quantity: str
     target: float
+
+
+class NotConverged(Exception):
+    """An equilibrium was not found; the message says what happened."""
+
+
+class FullContact(NotConverged):
+    """The contact spread over the whole surface."""
+
+
+# Kinds of events, and their names.
+JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT = range(4)
+EVENT_KINDS = ("jump_in", "jump_off", "coalescence", "split")
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """Events between two equilibria. Arrays of length k.
+
+    kind: JUMP_IN, JUMP_OFF (a spot, single or united, lets go), COALESCENCE (two spots unite) or SPLIT (a union is
+    undone, and what it was made of stays in contact). position (k, 2), m. members: how many first contacts are united
+    in the spot concerned. energy: J that a jump would set free if the spot were alone; zero for unions and splits.
+    """
+
+    kind: np.ndarray
+    position: np.ndarray
+    members: np.ndarray
+    energy: np.ndarray
+
+    def __len__(self) -> int:
+        """Number of events."""
+        return len(self.kind)
+
+    def count(self, kind: int) -> int:
+        """Number of events of a kind."""
+        return int(np.count_nonzero(self.kind == kind))
+
+    @classmethod
+    def joined(cls, parts) -> Events:
+        """Several, one after the other."""
+        parts = [cls(np.empty(0, np.int8), np.empty((0, 2)), np.empty(0, int), np.empty(0)), *parts]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__match_args__))
 
 
 class State(Protocol):
@@ -97,3 +145,53 @@ class ContactModel(Protocol[S]):
 
     def events_between(self, before: S, after: S) -> Events:
         """The events on the path from one state to a later one."""
+
+    def observables(self, surface: Surface) -> Observables[S]:
+        """What a run keeps of the states on the surface that is pressed."""
+
+
+class Observables(Protocol[S]):
+    """Observables of a contact, by the names of a run's variables (`icha.datasets.variables.run`)."""
+
+    def of_contact(self) -> dict[str, Any]:
+        """What holds for all states."""
+
+    def of_step(self, state: S) -> dict[str, Any]:
+        """What a run keeps of every state."""
+
+    def of_snapshot(self, state: S) -> dict[str, Any]:
+        """Distributions of gap and pressure, and the spots."""
+
+    def reasons_against(self, separations: Iterable[float]) -> list[str]:
+        """Reasons why the model does not stand for the surface at these mean separations (m) of the first loading."""
+
+    @property
+    def largest_tension(self) -> float:
+        """Tension of all summits pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
+
+
+def summit_counts(asperities: Asperities) -> dict[str, int]:
+    """Numbers of the summits of a surface, by the names of their variables."""
+    return {"asperity_count": len(asperities), "unsupported_summit_count": len(asperities.unsupported_height)}
+
+
+# Bins in which gaps and pressures are counted, the same for every model.
+#
+# Of the gap in units of h_rms: one from zero, then 20 per decade. Of the pressure in units of E* h'_rms: linear in the
+# bulk, 20 per decade in the tails. JKR pressures tend to minus infinity at the edge of a spot as |p|^-3, hence the long
+# tail. What lies beyond the last bin is counted in it, so that nothing is lost.
+GAPS_PER_DECADE = 20
+GAP_BINS = np.concatenate([[0.0], np.logspace(-4, 1.5, 111)])
+PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5, 301), 5 * np.logspace(0, 2, 41)[1:]])
+
+
+def gap_bins(surface: Surface) -> np.ndarray:
+    """Edges of the bins of the gap on a surface, m.
+
+    The last bin reaches to the largest gap that there is when the surface just touches, its height from the deepest
+    pit to the highest peak, if that is more than 31.6 h_rms. By Chebyshev's inequality less than 0.2 % of a surface
+    lies so deep, so that this one bin is enough for it.
+    """
+    edges = GAP_BINS * surface.rms_height
+    edges[-1] = max(edges[-1], np.ptp(surface.heights))
+    return edges

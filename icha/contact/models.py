@@ -1,10 +1,146 @@
-"""Names of the models of contact that a run may be computed with."""
+"""The contact models that a run may be computed with: everything that is known of a model without its solver.
 
-ASPERITIES, BOUNDARY_ELEMENTS = "asperities", "boundary_elements"
-# The first is what is meant where none is named.
-MODELS = (ASPERITIES, BOUNDARY_ELEMENTS)
+Nothing here imports a solver, so that what only names models (figures, plans, configurations) does not change with one.
+What a model costs is in `icha.planning.costs`, and how figures draw it in `icha.figures.palette`: a change there must
+not compute runs again.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+# Largest error of an equilibrium of asperities, in units of h_rms.
+RESIDUAL_TOLERANCE = 1e-9
+# Of what a load is made up of, the part below which it counts as none when its error is measured.
+SMALLEST_LOAD = 1e-4
+# Without adhesion a contact counted in cells changes by whole cells: an area that is held is met to so many, and to
+# this part of it.
+HELD_CELLS, HELD_PART = 2.0, 0.1
 
 
-def first_of(models) -> str:
-    """The one of some models that stands for all of them where only one is shown: asperities, or else the first."""
-    return ASPERITIES if ASPERITIES in models else next(iter(models))
+class Paper(NamedTuple):
+    """A paper on arXiv; the authors by given and family names."""
+
+    authors: tuple[tuple[str, str], ...]
+    title: str
+    year: int
+    arxiv: str
+
+    @property
+    def address(self) -> str:
+        """Where the paper is."""
+        return f"https://arxiv.org/abs/{self.arxiv}"
+
+    @property
+    def line(self) -> str:
+        """The paper as it is cited in a text."""
+        authors = " and ".join(f"{given[0]}. {family}" for given, family in self.authors)
+        return f"{authors}, {self.title}, arXiv:{self.arxiv} ({self.year})"
+
+
+# The paper of the asperity model, which whoever uses data of the model builds on. Volume and pages of its printed
+# version could not be verified and are left out.
+MODEL_PAPER = Paper(
+    (("Guido", "Violano"), ("Luciano", "Afferrante")),
+    "Modeling the adhesive contact of rough soft media with an advanced asperity model",
+    2019,
+    "1907.05859",
+)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A contact model.
+
+    Parameters
+    ----------
+    words : its name in sentences and legends, a plural.
+    title : of a run, before the names of surface and material.
+    method : for the summary of a run.
+    references : publications of its methods, separated by "; ".
+    module : name of the module whose `contact_of(surface, material)` makes the contact, a
+        `icha.contact.model.ContactModel`.
+    folder : of its runs, beside those of the default model; ends with a slash unless it is empty.
+    variables : what its runs have besides those of all models: dimensions, unit, long name and type by name.
+    stiffness_error : largest relative error of the contact stiffness.
+    by_summits : whether it stands for a surface by its summits: then a run says where it is not applicable.
+    by_cells : whether contact is counted in cells of the grid: its runs then have a map of the contact.
+    unites : whether spots unite by a rule, which may cost or gain a little energy.
+    periodic_only : whether it cannot press a square with free edges.
+    least_cells : grid cells per shortest wavelength that it needs at least; 0 if it needs none.
+    resumable : whether its equilibria take so long that a run keeps them (`resumable(contact, folder)` of its module).
+    """
+
+    words: str
+    title: str
+    method: str
+    references: str
+    module: str
+    folder: str = ""
+    variables: Mapping[str, tuple[tuple[str, ...], str, str, type]] = field(default_factory=dict)
+    stiffness_error: float = 1e-6
+    by_summits: bool = False
+    by_cells: bool = False
+    unites: bool = False
+    periodic_only: bool = False
+    least_cells: int = 0
+    resumable: bool = False
+
+
+_WU = "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
+_MAP = ("snapshot", "row", "column")
+# The model of runs that name none, and the one that others are compared with.
+DEFAULT_MODEL, REFERENCE_MODEL = "asperities", "boundary_elements"
+# By their names in configurations, in files and in `icha.simulate`.
+MODELS = {
+    DEFAULT_MODEL: Model(
+        words="asperities",
+        title="ICHA model",
+        method="interacting and coalescing asperities with JKR adhesion and jump into contact",
+        references=f"{MODEL_PAPER.line}; "
+        f"L. Afferrante, G. Carbone and G. Demelio, Wear 278-279 (2012) 28-33, doi:10.1016/j.wear.2011.12.013; {_WU}",
+        module="icha.equilibrium.interacting_asperities",
+        by_summits=True,
+        unites=True,
+    ),
+    REFERENCE_MODEL: Model(
+        words="boundary elements",
+        title="boundary elements",
+        method="boundary elements in the limit of a short range of attraction, fronts at Griffith's energy release "
+        "rate",
+        references="A. A. Griffith, Phil. Trans. R. Soc. A 221 (1921) 163-198, doi:10.1098/rsta.1921.0006; "
+        "K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. A 324 (1971) 301-313, doi:10.1098/rspa.1971.0141; "
+        f"{_WU}",
+        module="icha.boundary_elements.contact",
+        folder="boundary_elements/",
+        variables={
+            "front_residual": (
+                ("step",),
+                "1",
+                "largest deviation from 1, along the edges of contact, of sqrt(energy release rate over surface "
+                "energy)",
+                float,
+            ),
+            "gap_residual": (("step",), "1", "largest gap in contact, or overlap out of contact, over h_rms", float),
+            "contact_map": (_MAP, "1", "part of the cell that is in contact", np.float32),
+            "contact_pressure": (_MAP, "Pa", "pressure in the cell, negative in tension", np.float32),
+        },
+        stiffness_error=1e-4,
+        by_cells=True,
+        periodic_only=True,
+        least_cells=4,
+        resumable=True,
+    ),
+}
+
+
+def model_of(attributes: Mapping[str, str]) -> Model:
+    """The model of a run with these global attributes."""
+    return MODELS[attributes.get("contact_model", DEFAULT_MODEL)]
+
+
+def first_of(models: Iterable[str]) -> str:
+    """The one of some models that stands for all of them where only one is shown."""
+    return min(models, key=list(MODELS).index)

@@ -7,11 +7,9 @@ is not among the conventions that a file claims to follow.
 
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
-from typing import NamedTuple
 
 CONVENTIONS = "CF-1.11"
 KEYWORDS = ("contact mechanics", "rough surfaces", "tribology")
-BOUNDARY_ELEMENTS = "boundary elements"
 
 # Processing levels: free text in ACDD, here one for every step from a topography to statistics.
 INPUT, COMPUTED, COLLECTED, DERIVED, THEORY = (
@@ -76,33 +74,3 @@ def collected(title: str, summary: str, level: str, origins: Iterable[Mapping[st
     )
     further = [word for word in keywords if word not in KEYWORDS]
     return discovery(title, summary, level, sources=sources, references="; ".join(references), keywords=further)
-
-
-class Paper(NamedTuple):
-    """A paper on arXiv; the authors by given and family names."""
-
-    authors: tuple[tuple[str, str], ...]
-    title: str
-    year: int
-    arxiv: str
-
-    @property
-    def address(self) -> str:
-        """Where the paper is."""
-        return f"https://arxiv.org/abs/{self.arxiv}"
-
-    @property
-    def line(self) -> str:
-        """The paper as it is cited in a text."""
-        authors = " and ".join(f"{given[0]}. {family}" for given, family in self.authors)
-        return f"{authors}, {self.title}, arXiv:{self.arxiv} ({self.year})"
-
-
-# That of the model: whoever uses data of the model builds on it. Volume and pages of its printed version could not be
-# verified and are left out.
-MODEL_PAPER = Paper(
-    (("Guido", "Violano"), ("Luciano", "Afferrante")),
-    "Modeling the adhesive contact of rough soft media with an advanced asperity model",
-    2019,
-    "1907.05859",
-)

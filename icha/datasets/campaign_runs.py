@@ -24,7 +24,7 @@ from icha.datasets.variables.campaign import (
     RAGGED,
     VARIES_WITH,
 )
-from icha.datasets.variables.run import CELLS, CYCLE, LOOP, PATCHES, RUN
+from icha.datasets.variables.run import CELLS, CYCLE, LOOP, OF_MODELS, RUN
 from icha.support.input_files import text
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 # Dimensions and values of variables by name; texts are characters, along a last dimension without a name.
 Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
-_DIMS = {name: description.dims for name, description in (RUN | PATCHES | CYCLE | LOOP).items()}
+_DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCLE | LOOP).items()}
 # Dimensions stand among the variables in HDF5.
 _DIMENSIONS = {dim for dims in _DIMS.values() for dim in dims}
 _ATTRIBUTES = ("contact_model", "config_sha256", "incomplete", "failed_checks", "applicability")

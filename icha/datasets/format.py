@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import MODELS
 from icha.datasets.files import has_groups, is_refused, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
 from icha.support.input_files import bounded_memory, flaw_of_path, most_memory, refuse_traps, require_room
@@ -142,7 +142,7 @@ def _flaws_of_run(run):
     model, kept = run.attrs.get("contact_model", ""), run.sizes.get("snapshot", 0) > 0
     if model and model not in MODELS:
         yield f"attribute contact_model: {model!r}; allowed: {', '.join(MODELS)}"
-    by_patches = model == BOUNDARY_ELEMENTS
+    by_patches = model in MODELS and MODELS[model].by_cells
     there = {
         "snapshots": kept,
         "a way back to separation": "hysteresis_loss" in run,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL, MODELS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,8 +28,8 @@ _SAME_SLOPE = 1e-9
 
 
 def model_folder(model: str) -> str:
-    """What stands before the name of a run's file: the model in a folder of its own, but for asperities."""
-    return "" if model == ASPERITIES else f"{model}/"
+    """What stands before the name of a run's file: the folder of its model, with a slash, or nothing."""
+    return MODELS[model].folder
 
 
 class RunLabels(NamedTuple):
@@ -85,7 +85,7 @@ class SolutionLabels(NamedTuple):
     @property
     def run(self) -> RunLabels:
         """The run that is compared with it, one of asperities."""
-        return RunLabels(self.study, ASPERITIES, *self[2:6])
+        return RunLabels(self.study, DEFAULT_MODEL, *self[2:6])
 
     @property
     def path(self) -> str:

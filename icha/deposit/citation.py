@@ -7,7 +7,7 @@ from typing import Any
 import yaml
 
 from icha.configuration.publication import Author, Funding, Publication
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import MODEL_PAPER
 from icha.deposit.attributes import acknowledgement
 from icha.deposit.licences import known_licence
 

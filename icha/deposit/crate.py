@@ -21,7 +21,7 @@ from rocrate.model import ContextEntity, Dataset, Entity, File
 from rocrate.rocrate import ROCrate
 
 from icha.configuration.publication import Author, Publication
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
 from icha.deposit.citation import web_address
 from icha.deposit.deposit_files import CRATE, README, SOURCE

@@ -16,7 +16,7 @@ from icha.checks.findings import Check
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Publication
 from icha.configuration.surfaces import SelfAffineSurface
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.contact.model import PRESSURE, Control
-from icha.contact.tolerances import RESIDUAL_TOLERANCE, SMALLEST_LOAD
+from icha.contact.models import RESIDUAL_TOLERANCE, SMALLEST_LOAD
 from icha.equilibrium.control import held_value
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.sites import Sites

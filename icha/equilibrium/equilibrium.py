@@ -14,10 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
-from icha.contact.failures import FullContact, NotConverged
-from icha.contact.model import AREA_FRACTION, Control
-from icha.contact.tolerances import RESIDUAL_TOLERANCE
+from icha.contact.model import AREA_FRACTION, COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Control, FullContact, NotConverged
+from icha.contact.models import RESIDUAL_TOLERANCE
 from icha.equilibrium.control import held_value
 from icha.equilibrium.equations import Equations, Point
 from icha.equilibrium.events.jump_in import jump_in, with_candidates

@@ -1,17 +1,24 @@
 """Interacting asperities: the model of contact of Violano & Afferrante, which a path is followed with."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from icha.contact.events import Events
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control
+from icha.asperity.jkr import JKR
+from icha.asperity.material import Material
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, summit_counts
 from icha.equilibrium.control import derivative, held_value
+from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.energy import stored_energy
 from icha.equilibrium.equilibrium import equilibrium
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.states import ContactState, untouched
 from icha.half_space.free_square import mean_displacement
+from icha.surfaces.summits import SummitCoverage, find_summits
+from icha.surfaces.surface import Surface
 
 # How much of the surface contact may cover: targets are met up to a quarter of it, looked for somewhat beyond.
 _LARGEST_AREA = 1.5 * 0.25
@@ -83,3 +90,71 @@ class InteractingAsperities(Problem):
     def events_between(self, before: ContactState, after: ContactState) -> Events:
         """The events on the path from one state to a later one."""
         return Events.joined(after.history[len(before.history) :])
+
+    def observables(self, surface: Surface) -> AsperityObservables:
+        """What a run keeps of the states on the surface that is pressed."""
+        return AsperityObservables(self, surface)
+
+
+@dataclass(frozen=True, eq=False)
+class AsperityObservables:
+    """Observables of a contact of asperities and of the surface that they are on, beyond those of every model."""
+
+    contact: InteractingAsperities
+    surface: Surface
+
+    def of_contact(self) -> dict:
+        """What holds for all states."""
+        return summit_counts(self.contact.asperities)
+
+    def of_step(self, state: ContactState) -> dict:
+        """Error of the equilibrium, events so far, and how far Wu's formula is known to hold."""
+        law, spots = self.contact.law, state.spots
+        single = spots.members == 1
+        verified = law.is_jump_in_verified(spots.radius_of_curvature[single])
+        outside = np.count_nonzero(~verified) / max(len(verified), 1)
+        return {
+            "residual": state.residual,
+            "jump_in_count": state.jump_ins,
+            "jump_off_count": state.jump_offs,
+            "coalescence_count": state.coalescences,
+            "split_count": state.splits,
+            "pending_count": state.pending,
+            "outside_wu_fraction": outside if self.contact.adhesive else 0.0,
+        }
+
+    def of_snapshot(self, state: ContactState) -> dict:
+        """Distributions of gap and pressure, and the spots."""
+        law, spots = self.contact.law, state.spots
+        gaps = gap_distribution(law, self.surface, state)
+        pressures = pressure_distribution(law, self.surface, spots)
+        return {
+            "overlap_fraction": gaps.overlap_fraction,
+            "area_beyond_edges": gaps.beyond_edges,
+            "gap_density": gaps.density,
+            "pressure_density": pressures.density,
+            "pressure_bin_mean": pressures.mean,
+            "spot_x": spots.position[:, 0],
+            "spot_y": spots.position[:, 1],
+            "spot_radius": spots.contact_radius,
+            "spot_area": np.pi * spots.contact_radius**2,
+            "spot_perimeter": 2 * np.pi * spots.contact_radius,
+            "spot_force": law.force(spots.contact_radius, spots.radius_of_curvature),
+            "spot_curvature_radius": spots.radius_of_curvature,
+            "spot_members": spots.members,
+        }
+
+    def reasons_against(self, separations: Iterable[float]) -> list[str]:
+        """Reasons why asperities do not stand for the surface at these mean separations, m."""
+        return SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
+
+    @property
+    def largest_tension(self) -> float:
+        """Tension of all asperities pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
+        sum_of_radii = float(np.sum(self.contact.asperities.radius_of_curvature))
+        return 1.5 * np.pi * self.contact.law.material.surface_energy * sum_of_radii / self.contact.area
+
+
+def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
+    """The contact of a surface and a material; raises `ValueError` if the surface has no summits."""
+    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from icha.contact.failures import NotConverged
-from icha.contact.models import ASPERITIES
-from icha.contact.tolerances import STIFFNESS_TOLERANCE
+from icha.contact.model import NotConverged
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.equilibrium.control import gradient_by_radius, radius_response
 from icha.equilibrium.equations import Equations, Point
 from icha.equilibrium.sites import CONTACT
 
 _MAX_HALVINGS = 8
+_STIFFNESS_ERROR = MODELS[DEFAULT_MODEL].stiffness_error
 # Relative errors of the linear solves: of most, and of those repeated with the exact operator.
 _LINEAR_TOLERANCE = 3e-3
 _EXACT_TOLERANCE = 1e-6
@@ -57,7 +57,7 @@ def response(equations: Equations, point: Point) -> np.ndarray:
     x = sites.response[part]
     for attempt in range(12):
         defect = -1.0 - x - exact(x)
-        if np.max(np.abs(defect)) <= STIFFNESS_TOLERANCE[ASPERITIES]:
+        if np.max(np.abs(defect)) <= _STIFFNESS_ERROR:
             full[part] = x
             return full
         operator, tolerance = (product, _LINEAR_TOLERANCE) if attempt < 8 else (exact, _EXACT_TOLERANCE)

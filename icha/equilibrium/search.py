@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from icha.contact.events import JUMP_IN, SPLIT, Events
+from icha.contact.model import JUMP_IN, SPLIT, Events
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.sites import CONTACT, Sites
 from icha.equilibrium.states import ContactState

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from icha.contact.events import Events
+from icha.contact.model import Events
 from icha.equilibrium.problem import Problem
 from icha.equilibrium.sites import CONTACT, Sites
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.labels import LABELS
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _missing_runs(study: xr.Dataset, several: str) -> Iterator[str]:
             if checks:
                 parts.append(f"{checks} of {asked} {seeds} of material {material} failed their checks")
             if parts:
-                by = "" if model == ASPERITIES else " by " + model.replace("_", " ")
+                by = "" if model == DEFAULT_MODEL else f" by {MODELS[model].words}"
                 yield f"{' and '.join(parts)}{several}{by}: see Failed runs."
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import ASPERITIES
+from icha.contact.models import MODELS
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
@@ -161,7 +161,7 @@ def contact_of(line: Line) -> tuple[str, str, float]:
 
 def model_name(dataset: xr.Dataset) -> str:
     """By what legends call the `shown_model` of a study."""
-    return ASPERITIES_NAME if shown_model(dataset) == ASPERITIES else SHORT_RANGE
+    return MODELS[shown_model(dataset)].words
 
 
 def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]) -> tuple[list[dict], Looks]:

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 from pydantic import Field
 
-from icha.contact.models import BOUNDARY_ELEMENTS, MODELS, first_of
+from icha.contact.models import MODELS, REFERENCE_MODEL, first_of
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
@@ -142,8 +142,8 @@ class TruthFigure(StudyFigure):
         if beside is None:
             return
         yield from unknown(("boundary_elements",), beside, campaign.studies)
-        if beside in campaign.studies and BOUNDARY_ELEMENTS not in campaign.studies[beside].models:
-            reason = f"has no runs by boundary elements; allowed: a study with {BOUNDARY_ELEMENTS!r} among its `models`"
+        if beside in campaign.studies and REFERENCE_MODEL not in campaign.studies[beside].models:
+            reason = f"has no runs by boundary elements; allowed: a study with {REFERENCE_MODEL!r} among its `models`"
             yield ("boundary_elements",), beside, reason
 
 

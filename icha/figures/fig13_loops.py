@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from icha.contact.models import BOUNDARY_ELEMENTS
+from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
@@ -315,7 +315,7 @@ _CROSSES = {"loading": MODEL_MARKERS, "unloading": WAY_BACK_MARKERS}
 
 def _truth_name(truth):
     """Which boundary elements these are: a run says by which model it is, a solution at a finite range does not."""
-    return SHORT_RANGE if truth.attrs.get("contact_model") == BOUNDARY_ELEMENTS else FINITE_RANGE
+    return SHORT_RANGE if truth.attrs.get("contact_model") == REFERENCE_MODEL else FINITE_RANGE
 
 
 def _truths(study, runs, loops):

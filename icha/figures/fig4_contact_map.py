@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import SolutionLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
@@ -32,8 +32,8 @@ def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -
     """
     run = options.run(campaign)
     found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, run)}
-    if run.model == ASPERITIES and BOUNDARY_ELEMENTS in campaign.studies[options.study].models:
-        return found | {"truth": files.path(results.RUN, run._replace(model=BOUNDARY_ELEMENTS))}
+    if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[options.study].models:
+        return found | {"truth": files.path(results.RUN, run._replace(model=REFERENCE_MODEL))}
     solution = finest_solution(campaign, options)
     return found | ({"solution": files.path(results.SOLUTION, solution)} if solution else {})
 

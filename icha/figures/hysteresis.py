@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.models import MODELS
 from icha.datasets.labels import RunLabels
-from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import UNLOADING
 from icha.figures.ensembles import draw_means
 from icha.figures.looks import Contact, Looks, interfaces_of
@@ -182,9 +181,8 @@ def looks_of(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[C
 
 def say_which_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -> None:
     """Name above a panel the model whose runs of some studies it shows; those by the other one are not there."""
-    names = {ASPERITIES: "interacting asperities", BOUNDARY_ELEMENTS: SHORT_RANGE}
     models = dict.fromkeys(shown_model(campaign[study].to_dataset()) for study in studies)
-    axes.set_title(", ".join(names[model] for model in models), loc="right")
+    axes.set_title(", ".join(MODELS[model].words for model in models), loc="right")
 
 
 def several(name: str, studies: Sequence[str]) -> list[str]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.contact.models import MODELS
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.style import (
     BLACK,
@@ -45,7 +46,7 @@ MATERIAL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 MATERIAL_COLOURS += ("#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
 PLACE_MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
-ASPERITIES_NAME = "asperities"
+ASPERITIES_NAME = MODELS["asperities"].words
 # By what legends call the models. Boundary elements have another cross in unloading.
 MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
 WAY_BACK_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import BOUNDARY_ELEMENTS, first_of
+from icha.contact.models import REFERENCE_MODEL, first_of
 from icha.datasets.labels import LABELS, RunLabels, place_of, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.style import number, slope_label
@@ -60,7 +60,7 @@ def runs_by_boundary_elements(
 ) -> list[tuple[RunLabels, xr.Dataset]]:
     """All complete runs of a study by boundary elements, if any, without patches and events if not `ragged`."""
     try:
-        return study_runs(campaign, study, ragged=ragged, model=BOUNDARY_ELEMENTS)
+        return study_runs(campaign, study, ragged=ragged, model=REFERENCE_MODEL)
     except NothingToDraw:
         return []
 
@@ -219,9 +219,9 @@ def same_snapshots_by_boundary_elements(campaign: xr.DataTree, lines: Sequence[S
     """For every line by asperities the same snapshot by boundary elements, of those seeds that keep it, if any."""
     from icha.datasets.campaign import find_snapshot
 
-    found = [line._replace(labels=line.labels._replace(model=BOUNDARY_ELEMENTS), members=[]) for line in lines]
+    found = [line._replace(labels=line.labels._replace(model=REFERENCE_MODEL), members=[]) for line in lines]
     first = lines[0].labels
-    if first.model == BOUNDARY_ELEMENTS:
+    if first.model == REFERENCE_MODEL:
         return found
     truths = runs_by_boundary_elements(campaign, first.study, ragged=True)
     for line, beside in zip(lines, found, strict=True):

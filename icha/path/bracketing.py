@@ -3,8 +3,7 @@
 from collections.abc import Iterable
 from contextlib import suppress
 
-from icha.contact.failures import NotConverged
-from icha.contact.model import State
+from icha.contact.model import NotConverged, State
 from icha.path.stops import SAME_EXCESS, Stop
 
 # Two separations closer than this (in h_rms) bracket a jump, not a root.

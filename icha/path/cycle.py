@@ -11,8 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from icha.contact.failures import NotConverged
-from icha.contact.model import ContactModel, State
+from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.bracketing import SAME_SEPARATION, InsideJump, first_passed
 from icha.path.course import Course, halved
 from icha.path.energy_balance import Step

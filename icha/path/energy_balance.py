@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
-from icha.contact.model import ContactModel, State
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State
 from icha.path.open_work import integration_error, pressure_jump, unresolved_work
 
 # Of the work of a step, the part from which on its loss is that of its jumps, and not what is not reciprocal.

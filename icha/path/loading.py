@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from icha.contact.failures import NotConverged
-from icha.contact.model import ContactModel, State
+from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.bracketing import SAME_SEPARATION, InsideJump, first_passed
 from icha.path.course import Course, halved
 from icha.path.stops import SAME_EXCESS, Queue, Stop

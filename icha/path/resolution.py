@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from icha.contact.failures import NotConverged
-from icha.contact.model import ContactModel, State
+from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.bracketing import CLOSE_TO_A_JUMP
 from icha.path.course import halved
 from icha.path.energy_balance import Step

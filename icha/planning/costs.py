@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from icha.contact.models import ASPERITIES
 from icha.datasets.results import COMPRESSED_SIZES, LEFT_IN_FILE
 from icha.path.limits import DEFAULT_STEP
 from icha.support.parallel import LARGE_GRID
@@ -146,9 +145,28 @@ def spots(summits: float, load: float) -> float:
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 
-# Arrays of the grid that boundary elements hold at a time; bytes of a cell that a snapshot's maps take, compressed.
-PATCH_ARRAYS = 20
-_MAPS = 1.5
+@dataclass(frozen=True)
+class RunSize:
+    """Memory and disk of the runs of a model.
+
+    Parameters
+    ----------
+    arrays : arrays of the grid that a run holds at a time.
+    summit : bytes that a run holds for every summit.
+    maps : bytes in the file for every cell and snapshot, compressed.
+    minutes : after which a run is taken for stuck: of a loading, of a cycle, of one that gets several cores.
+    """
+
+    arrays: int
+    summit: int = 0
+    maps: float = 0.0
+    minutes: tuple[int, int, int] = (30, 120, 240)
+
+
+RUN_SIZES = {
+    "asperities": RunSize(arrays=1, summit=9 * 1024),
+    "boundary_elements": RunSize(arrays=20, maps=1.5, minutes=(240, 960, 1440)),
+}
 
 
 def run_cost(
@@ -187,11 +205,9 @@ def run_cost(
     kept = snapshots + bool(legs)
     disk = 60e3 + 57 * most * max(kept, 1) + 160 * steps + 20e3 * bool(legs)
     memory = _memory_before(grid) + 9 * MiB * (1 + bool(legs))
-    if model == ASPERITIES:
-        memory += _DOUBLE * nodes + 9 * 1024 * summits
-    else:
-        memory += PATCH_ARRAYS * _DOUBLE * nodes
-        disk += _MAPS * nodes * kept
+    size = RUN_SIZES[model]
+    memory += size.arrays * _DOUBLE * nodes + size.summit * summits
+    disk += size.maps * nodes * kept
     return Cost(seconds, memory, disk, Recorded(steps, kept, most * kept))
 
 
@@ -214,7 +230,7 @@ def theories_cost() -> Cost:
     return Cost(LAWS["theories"].seconds(), WORKFLOW.forked, 35e3)
 
 
-# Edges of the bins of `icha.contact.bins`, whose imports `icha describe` would wait for.
+# Edges of the bins of `icha.contact.model`, whose imports `icha describe` would wait for.
 GAP_EDGES, PRESSURE_EDGES = 112, 501
 # Arrays along the steps and the spots of runs; texts count for several.
 _STEP_ARRAYS, _SPOT_ARRAYS = 30, 11

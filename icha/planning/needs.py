@@ -9,9 +9,8 @@ from pathlib import Path
 
 from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
-from icha.contact.models import ASPERITIES
 from icha.datasets.labels import RunLabels
-from icha.planning.costs import MAP_ARRAYS, PATCH_ARRAYS, job_threads
+from icha.planning.costs import MAP_ARRAYS, RUN_SIZES, job_threads
 from icha.planning.plan import Item, memory_on
 from icha.support import in_words
 from icha.support.in_words import counted
@@ -57,7 +56,7 @@ def surface_memory(campaign: Campaign, surface: str) -> int:
 
 def run_memory(campaign: Campaign, case: RunLabels) -> int:
     """Megabytes for a run."""
-    arrays = 4 if case.model == ASPERITIES else 1.25 * PATCH_ARRAYS
+    arrays = max(4, 1.25 * RUN_SIZES[case.model].arrays)
     return _megabytes(600, arrays, campaign.grid(case.surface))
 
 
@@ -74,11 +73,11 @@ def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
 
 def run_minutes(campaign: Campaign, case: RunLabels) -> int:
     """Minutes after which a run is taken for stuck: many times what such runs have taken."""
+    loading, cycle, several_cores = RUN_SIZES[case.model].minutes
     if surface_threads(campaign, case.surface) > 1:
-        return 240 if case.model == ASPERITIES else 1440
+        return several_cores
     asked = campaign.studies[case.study]
-    minutes = 120 if asked.unload or asked.turning_points else 30
-    return minutes if case.model == ASPERITIES else 8 * minutes
+    return cycle if asked.unload or asked.turning_points else loading
 
 
 def memory_of_machine() -> int:

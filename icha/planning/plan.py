@@ -10,7 +10,7 @@ from pathlib import Path
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_settings, run_sha256
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
 from icha.datasets.labels import count_cells
@@ -103,7 +103,7 @@ def _computed(campaign, results, files) -> Iterator[Item]:
         grid = campaign.grid(case.surface)
         sweep = _sweep_of(run_settings(campaign, case), case.rms_slope)
         cost = run_cost(case.model, grid, summits(case.surface), **sweep)
-        part = f"study {case.study}" + (", boundary elements" if case.model != ASPERITIES else "")
+        part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
         yield Item(part, path, state, cost, costs.job_threads(grid), reason)
     for path in files.theories:
         yield Item("theories", path, _state(results, path), costs.theories_cost())

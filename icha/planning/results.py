@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import loop_cases, run_cases, solution_cases, surface_cases
-from icha.contact.models import BOUNDARY_ELEMENTS
+from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
@@ -70,7 +70,7 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
     compared = {
         file: case
         for file, case in runs.items()
-        if case.model == BOUNDARY_ELEMENTS and campaign.compares_models(case.study)
+        if case.model == REFERENCE_MODEL and campaign.compares_models(case.study)
     }
     solutions = each(results.SOLUTION, solution_cases(campaign))
     return CampaignFiles(

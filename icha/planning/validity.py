@@ -12,7 +12,7 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.plausibility import full_contact_energy
 from icha.configuration.surfaces import MeasuredSurface, SelfAffineSurface
-from icha.contact.models import ASPERITIES
+from icha.contact.models import MODELS
 from icha.surfaces.moments import (
     SpectralMoments,
     cells_per_short_wave,
@@ -123,9 +123,9 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         energy = full_contact_energy(campaign, case.surface) * case.rms_slope**2
         ratio = full_contact_energy_ratio(energy, section.contact_modulus, section.surface_energy)
         # Only of asperities it matters how far a surface is from those of the validation.
-        own = facts(case.surface) if case.model == ASPERITIES else {}
+        own = facts(case.surface) if MODELS[case.model].by_summits else {}
         cases.append(Case(case.model, case.surface, case.material, {**own, "full_contact_energy_ratio": ratio}))
-        if case.model == ASPERITIES and section.surface_energy > 0:
+        if MODELS[case.model].by_summits and section.surface_energy > 0:
             material = Material(section.contact_modulus, section.surface_energy, section.interaction_range)
             curved = curvature(case.surface) * case.rms_slope
             tabor_parameter = float(material.tabor_parameter(_SUMMIT_RADIUS / curved))

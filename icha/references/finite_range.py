@@ -30,8 +30,8 @@ import xarray as xr
 from icha.asperity.cohesive_zone import longest_spacing, resolution_problem, strength_number
 from icha.asperity.material import Material
 from icha.boundary_elements.patches import BEYOND_EDGES
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
-from icha.datasets.attributes import BOUNDARY_ELEMENTS, COMPUTED, discovery
+from icha.contact.model import GAP_BINS, PRESSURE_BINS, gap_bins
+from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.build import bin_values, build, of
 from icha.datasets.variables.boundary_elements import SOLUTION
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
@@ -456,5 +456,5 @@ def attributes(material: Material, title: str, summary: str) -> dict[str, str]:
         COMPUTED,
         programs=("tamaas",),
         references=REFERENCES,
-        keywords=[BOUNDARY_ELEMENTS],
+        keywords=["boundary elements"],
     )

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import MODELS, model_of
 from icha.datasets import results
 from icha.datasets.attributes import why_no_result
 from icha.datasets.campaign import find_snapshot, reduced_gap, run_labels, select_run, spots_of
@@ -161,7 +161,7 @@ def _maps(folder, labels, run):
     Maps are in the file of the run only, which may have its snapshots in another order than the campaign.
     """
     file = folder / results.RUN.format(**parts(labels))
-    if labels.model != BOUNDARY_ELEMENTS or not file.is_file():
+    if not MODELS[labels.model].by_cells or not file.is_file():
         return None
     with readable(file), xr.open_dataset(file, engine="netcdf4") as own:
         states = zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True)
@@ -272,7 +272,7 @@ def _snapshot(run, at, maps):
     }
     if maps is not None:
         return found | {"map": maps[at]}
-    if run.attrs["contact_model"] != ASPERITIES:
+    if model_of(run.attrs).by_cells:
         return found
     spots = spots_of(run, at)
     return found | {"circles": [floats(spots[f"spot_{name}"]) for name in ("x", "y", "radius")]}
@@ -286,7 +286,7 @@ def _points(curve):
 
 def _pressures(run, at):
     """Points of the density of the pressure, without its thinnest tail; bins of few nodes are joined."""
-    densities = pressure_densities if run.attrs["contact_model"] == ASPERITIES else joined_pressure_densities
+    densities = joined_pressure_densities if model_of(run.attrs).by_cells else pressure_densities
     pressure, (density,) = densities([(run, at)])
     shown = density > LEAST_DENSITY * density.max(initial=0)
     return [floats(pressure[shown]), floats(density[shown])]

@@ -19,7 +19,7 @@ import xarray as xr
 from icha.analysis.checks import worst
 from icha.analysis.validity import of_dataset
 from icha.checks.findings import Check
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import EXPLORER
 from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number

@@ -17,7 +17,7 @@ from icha.analysis.model_error import (
     shared,
     state_of,
 )
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS
+from icha.contact.model import GAP_BINS, PRESSURE_BINS
 from icha.datasets.campaign import campaign_tree, find_snapshot
 from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.labels import RunLabels, SolutionLabels

@@ -11,7 +11,7 @@ from icha.asperity.full_contact import full_contact_energy_ratio
 from icha.datasets.campaign import campaign_tree, select_run
 from icha.datasets.files import read_run, write_dataset
 from icha.datasets.format import RUN, flaws
-from icha.models.applicability import asperity_applicability
+from icha.simulation import asperity_applicability
 from icha.surfaces.moments import self_affine_full_contact_energy
 
 L, A = 3e-6, 1e-8

@@ -6,7 +6,7 @@ import pytest
 from icha import Material, Path, Surface, simulate
 from icha.boundary_elements.contact import BoundaryElements
 from icha.checks.run import check_run
-from icha.contact.models import BOUNDARY_ELEMENTS
+from icha.contact.models import REFERENCE_MODEL
 
 PERIOD, HEIGHT, CELLS = 100e-6, 1e-6, 16
 
@@ -26,6 +26,6 @@ def test_a_loop_whose_front_hops_takes_few_equilibria(energy, monkeypatch):
     wave = np.cos(2 * np.pi * np.arange(CELLS) / CELLS)
     surface = Surface(HEIGHT * (wave[:, None] + wave), PERIOD, "periodic")
     path = Path(area_fractions=[0.2], unload=True, snapshots=[])
-    run = simulate(surface, Material(1e6, energy, 300e-9), path, model=BOUNDARY_ELEMENTS)
+    run = simulate(surface, Material(1e6, energy, 300e-9), path, model=REFERENCE_MODEL)
     assert count < 600
     assert not [check for check in check_run(run) if not check.passed]

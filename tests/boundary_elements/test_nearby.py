@@ -5,7 +5,7 @@ import pytest
 
 from icha import Material, SelfAffineSpectrum
 from icha.boundary_elements import nearby
-from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.nearby import REACH, TILE, Tiles
 from icha.contact.model import PRESSURE
@@ -66,7 +66,7 @@ def test_contacts_are_the_same_with_tiles_and_without(adhesion, monkeypatch):
     monkeypatch.setattr(Tiles, "of", lambda *given: used.append(of(*given)) or used[-1])
     for part in (nearby._LARGE_PART, 0.0):
         monkeypatch.setattr(nearby, "_LARGE_PART", part)
-        contact = BoundaryElements.of(surface, material)
+        contact = contact_of(surface, material)
         state = contact.untouched()
         for closer in (0.1, 0.3, 0.45):
             state = contact.equilibrium(state, contact.untouched().separation - closer * surface.rms_height)

@@ -12,13 +12,13 @@ from conftest import REPOSITORY
 
 import icha
 from icha.boundary_elements import adhesive
-from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.elasticity import pressures_for
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import Linearised
 from icha.checks.run import check_run
-from icha.contact.failures import NotConverged
-from icha.contact.tolerances import HELD_CELLS
+from icha.contact.model import NotConverged
+from icha.contact.models import HELD_CELLS
 from validation.rough_contacts import (
     HARD,
     SOFT,
@@ -88,13 +88,13 @@ BY_THREADS = """
 import sys
 from threadpoolctl import threadpool_limits
 from icha.boundary_elements import transforms
-from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.contact import BoundaryElements, contact_of
 from icha.support import parallel
 from validation.rough_contacts import SOFT, followed, rough
 
 transforms.CACHE, parallel.LARGE_GRID = 1000, 0
 with threadpool_limits(1):
-    (state,) = followed(BoundaryElements.of(rough(64, waves=8), SOFT), [2.2])
+    (state,) = followed(contact_of(rough(64, waves=8), SOFT), [2.2])
 for part in (state.cells, state.fraction, state.pressure, state.around):
     sys.stdout.buffer.write(part.tobytes())
 """
@@ -177,7 +177,7 @@ def test_as_many_rounds_of_new_contacts_as_there_are_cells_are_not_waited_for(mo
 
 
 def test_a_state_that_is_no_number_is_not_gone_on_from():
-    contact = BoundaryElements.of(rough(48, 6), SOFT)
+    contact = contact_of(rough(48, 6), SOFT)
     state = contact.equilibrium(contact.untouched(), 2.0 * contact.rms_height)
     unknown = np.full(len(state.cells), np.nan)
     cells = (state.cells, state.fraction, state.around)

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import maximum_filter
 
 from icha.boundary_elements import windows as module
-from icha.boundary_elements.contact import BoundaryElements
+from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.elastic_equilibrium import held
 from icha.boundary_elements.elasticity import Contact
 from icha.boundary_elements.front import COMPLIANCE, neighbour_weights, neighbours
@@ -64,7 +64,7 @@ def test_weights_between_cells_are_those_of_the_stencil(shape):
 
 
 def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_moves():
-    contact = BoundaryElements.of(rough(GRID, waves=GRID // 8), SOFT)
+    contact = contact_of(rough(GRID, waves=GRID // 8), SOFT)
     separation = 2.0 * contact.rms_height
     state = contact.equilibrium(contact.untouched(), separation)
     reach, u = COMPLIANCE * contact.front.strength, separation / contact.spacing

@@ -6,7 +6,7 @@ from demo_configuration import REPOSITORY
 
 from icha.configuration.cases import run_cases, run_settings, solution_cases, surface_cases
 from icha.configuration.load import load_configuration
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.planning.needs import further_software
 from icha.planning.results import campaign_files
 from icha.references.literature import literature
@@ -27,7 +27,7 @@ def test_the_papers_campaign():
     campaign = load_configuration(REPOSITORY / "config/config.yaml").campaign
     assert campaign.name == "paper"
     cases = run_cases(campaign)
-    assert len([case for case in cases if case.model == ASPERITIES]) == 2 + 9
+    assert len([case for case in cases if case.model == DEFAULT_MODEL]) == 2 + 9
     assert len({case.path for case in cases}) == len(cases)
     assert surface_cases(campaign) == [("challenge", 1), ("mcghee", 1)]
     challenge, mcghee = campaign.surfaces["challenge"], campaign.surfaces["mcghee"]
@@ -46,14 +46,14 @@ def test_boundary_elements_stand_beside_the_papers_runs():
     assert {(each.surface_energy, each.interaction_range) for each in materials} == {(0.05, 2.071e-9), (0.0, 2.071e-9)}
     for case in compared:
         own, truth = (
-            run_settings(campaign, case._replace(model=model))["path"] for model in (ASPERITIES, BOUNDARY_ELEMENTS)
+            run_settings(campaign, case._replace(model=model))["path"] for model in (DEFAULT_MODEL, REFERENCE_MODEL)
         )
         assert own == truth
         assert own["snapshots"] == [("reduced_pressure", p) for p in own["reduced_pressures"]]
     beside = [case for case in run_cases(campaign) if case.study == campaign.figures.fig5_multi_slope.boundary_elements]
     assert {case.rms_slope for case in beside} == set(campaign.studies["multi_slope"].rms_slopes)
     assert {case.material for case in beside} <= set(campaign.studies["multi_slope"].materials)
-    assert {case.model for case in beside} == {BOUNDARY_ELEMENTS}
+    assert {case.model for case in beside} == {REFERENCE_MODEL}
 
 
 def test_the_validation_varies_what_makes_a_surface():

@@ -4,9 +4,9 @@ import pytest
 from xarray.testing import assert_identical
 
 from icha import Material, Path, SelfAffineSpectrum, simulate
+from icha.boundary_elements import contact
 from icha.boundary_elements.contact import BoundaryElements
 from icha.contact.kept import prepared
-from icha.models import boundary_elements
 from icha.simulation import ConvergenceError
 
 SURFACE = SelfAffineSpectrum(1e-6, 1e-6, 0.5e-6, 0.8).realise(16, 1).scaled_to_rms_slope(0.3)
@@ -100,7 +100,7 @@ def test_of_another_contact_or_path_nothing_is_found_but_what_both_share(monkeyp
 def test_of_other_programs_nothing_is_found(monkeypatch, tmp_path):
     folder = tmp_path / "kept"
     _, needed = followed(monkeypatch, "areas", folder, None)
-    monkeypatch.setattr(boundary_elements, "version", lambda name: "0.0")
+    monkeypatch.setattr(contact, "version", lambda name: "0.0")
     _, computed = followed(monkeypatch, "areas", folder, None)
     assert computed == needed
 

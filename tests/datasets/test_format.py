@@ -37,7 +37,7 @@ def test_a_campaign_lacks_only_what_the_workflow_adds(files):
 
 def test_the_vocabulary_keeps_what_is_promised():
     """Names, dimensions and units that users rely on: a change of them is one of the format."""
-    tables = {RUN: of_run.RUN | of_run.PATCHES | of_run.CYCLE | of_run.LOOP, SURFACE: of_surface.SURFACE}
+    tables = {RUN: of_run.RUN | of_run.OF_MODELS | of_run.CYCLE | of_run.LOOP, SURFACE: of_surface.SURFACE}
     for kind, promised in PROMISED.items():
         for name, dims, units, _ in promised:
             assert (tables[kind][name].dims, tables[kind][name].units) == (dims, units)

@@ -10,9 +10,8 @@ from outside_validators import sealed, validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import RELATIONS, RESOURCES, RelatedIdentifier
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import DEFAULT_MODEL, MODEL_PAPER, MODELS
 from icha.deposit.citation import citation_cff, datacite_metadata, web_address, zenodo_metadata
-from icha.models import asperities
 
 
 def written(folder, publication):
@@ -108,8 +107,8 @@ def test_the_paper_of_the_model_is_cited_as_the_program_and_every_run_cite_it(pu
     paper = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))["preferred-citation"]
     names = [(author["given-names"], author["family-names"]) for author in paper["authors"]]
     assert yaml.safe_load(citation_cff(publication, COMMIT))["references"] == [paper]
-    assert asperities.MODEL.references.startswith(f"{MODEL_PAPER.line}; ")
-    assert zenodo_metadata(publication)["references"] == [asperities.MODEL.references.split("; ")[0]]
+    assert MODELS[DEFAULT_MODEL].references.startswith(f"{MODEL_PAPER.line}; ")
+    assert zenodo_metadata(publication)["references"] == [MODELS[DEFAULT_MODEL].references.split("; ")[0]]
     (item,) = datacite_metadata(publication)["relatedItems"]
     assert item["titles"] == [{"title": paper["title"]}] and item["publicationYear"] == str(paper["year"])
     assert web_address(item["relatedItemIdentifier"]["relatedItemIdentifier"]) == paper["url"]

@@ -14,7 +14,7 @@ from outside_validators import sealed, validated
 from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 
 from icha.configuration.publication import Author
-from icha.datasets.attributes import MODEL_PAPER
+from icha.contact.models import MODEL_PAPER
 from icha.deposit.crate import Job, write_crate
 from icha.deposit.deposit_files import CRATE
 

@@ -11,7 +11,7 @@ from half_space import periodic_displacement
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS, gap_bins
+from icha.contact.model import GAP_BINS, PRESSURE_BINS, gap_bins
 from icha.equilibrium.distributions import _gap_bin, contact_cover, gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.states import Spots

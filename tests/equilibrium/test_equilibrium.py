@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 import icha.equilibrium.equilibrium
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
-from icha.contact.failures import NotConverged
-from icha.contact.model import Control
-from icha.contact.tolerances import RESIDUAL_TOLERANCE
+from icha.contact.model import Control, NotConverged
+from icha.contact.models import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.ewald import HalfSpace
 from icha.half_space.interaction import Interaction, displacement_at

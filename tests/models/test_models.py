@@ -1,5 +1,7 @@
 """The model as a choice: what a run by boundary elements is to a path, a file, a campaign and its checks."""
 
+import importlib
+
 import netCDF4
 import numpy as np
 import patches
@@ -11,14 +13,16 @@ import icha
 from icha.analysis.checks import check_campaign
 from icha.analysis.common_loads import compare_runs
 from icha.checks.run import check_run
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, read_run, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, flaws, kind_of
 from icha.datasets.labels import LABELS, RunLabels
-from icha.datasets.variables.run import FURTHER, PATCHES
+from icha.datasets.variables.run import FURTHER, OF_MODELS
+from icha.figures.looks import MODEL_MARKERS
 from icha.figures.select import pick_run, study_runs
+from icha.planning.costs import LAWS, RUN_SIZES
 
 PATH = icha.Path(reduced_pressures=[1e-3, 1e-2], snapshots=[("reduced_pressure", 1e-3), ("reduced_pressure", 1e-2)])
 BACK = icha.Path(reduced_pressures=[1e-3], unload=True)
@@ -37,7 +41,7 @@ def runs(monkeypatch):
     """Both models of one material, and asperities alone of the other."""
     patches.stand_in(monkeypatch)
     found = {labels(model): run(model) for model in MODELS}
-    return found | {labels(ASPERITIES, "hertz"): run(ASPERITIES, material="hertz")}
+    return found | {labels(DEFAULT_MODEL, "hertz"): run(DEFAULT_MODEL, material="hertz")}
 
 
 @pytest.mark.parametrize("model", ["asperity", "", None, ["asperities"], "boundary elements"])
@@ -48,14 +52,14 @@ def test_other_models_are_refused_by_name(model):
 
 def test_asperities_are_what_is_meant_where_no_model_is_named(runs):
     plain = icha.simulate(small.surface(), small.MATERIALS["soft"], PATH, seed=1)
-    xr.testing.assert_identical(plain, runs[labels(ASPERITIES)])
+    xr.testing.assert_identical(plain, runs[labels(DEFAULT_MODEL)])
 
 
 def test_a_run_says_by_which_model_it_is(runs, tmp_path):
-    asperities, patched = runs[labels(ASPERITIES)], runs[labels(BOUNDARY_ELEMENTS)]
-    assert set(patched.variables) - set(asperities.variables) == set(PATCHES)
+    asperities, patched = runs[labels(DEFAULT_MODEL)], runs[labels(REFERENCE_MODEL)]
+    assert set(patched.variables) - set(asperities.variables) == set(OF_MODELS)
     assert patched["contact_map"].shape == (2, 32, 32) and patched["contact_map"].dtype == np.float32
-    assert asperities.attrs["contact_model"] == ASPERITIES and patched.attrs["contact_model"] == BOUNDARY_ELEMENTS
+    assert asperities.attrs["contact_model"] == DEFAULT_MODEL and patched.attrs["contact_model"] == REFERENCE_MODEL
     for name in ("title", "summary", "references"):
         assert asperities.attrs[name] != patched.attrs[name]
     assert "boundary elements" in patched.attrs["title"] and "Griffith" in patched.attrs["references"]
@@ -74,7 +78,7 @@ def test_a_run_says_by_which_model_it_is(runs, tmp_path):
 
 
 def test_areas_of_spots_are_those_of_their_circles(runs):
-    one = runs[labels(ASPERITIES)]
+    one = runs[labels(DEFAULT_MODEL)]
     np.testing.assert_allclose(one["spot_area"], np.pi * one["spot_radius"] ** 2)
     np.testing.assert_allclose(one["spot_perimeter"] ** 2, 4 * np.pi * one["spot_area"])
 
@@ -84,21 +88,21 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     tree = small.tree()
     for study in tree.children.values():
         assert study["contact_area_fraction"].dims == (*LABELS, "step") and study["model"].values.tolist() == [
-            ASPERITIES
+            DEFAULT_MODEL
         ]
     write_campaign(runs.items(), tmp_path / "both.nc", attrs={"campaign": "both", "license": "CC0-1.0"})
     tree = read_campaign(tmp_path / "both.nc")
     study = tree["one"].to_dataset()
-    assert study["model"].values.tolist() == [ASPERITIES, BOUNDARY_ELEMENTS]
+    assert study["model"].values.tolist() == [DEFAULT_MODEL, REFERENCE_MODEL]
     assert study["status"].values.ravel().tolist() == [0, 0, 0, 3]
     # Maps stay in the files of the runs; what asperities do not have is missing.
     assert not {"contact_map", "contact_pressure", "row", "column"} & {*study.variables, *study.dims}
     front = study["front_residual"]
-    assert np.isnan(front.sel(model=ASPERITIES)).all() and front.attrs["missing"] == "of runs by asperities"
-    assert (front.sel(model=BOUNDARY_ELEMENTS, material="soft") == 1e-9).all()
+    assert np.isnan(front.sel(model=DEFAULT_MODEL)).all() and front.attrs["missing"] == "of runs by asperities"
+    assert (front.sel(model=REFERENCE_MODEL, material="soft") == 1e-9).all()
     assert set(np.unique(study["spot_model"])) == {0, 1}
     assert [flaw for flaw in flaws(CAMPAIGN, tree) if "attribute" not in flaw] == []
-    assert run_labels(tree) == [labels(ASPERITIES), labels(ASPERITIES, "hertz"), labels(BOUNDARY_ELEMENTS)]
+    assert run_labels(tree) == [labels(DEFAULT_MODEL), labels(DEFAULT_MODEL, "hertz"), labels(REFERENCE_MODEL)]
     assert "Griffith" in tree.attrs["references"] and "Violano" in tree.attrs["references"]
 
 
@@ -123,16 +127,16 @@ def test_the_same_bytes_from_files_and_in_another_order(runs, tmp_path):
     write_campaign(runs.items(), tmp_path / "memory.nc", design=runs)
     write_campaign(reversed(files.items()), tmp_path / "files.nc", design=runs)
     assert (tmp_path / "memory.nc").read_bytes() == (tmp_path / "files.nc").read_bytes()
-    assert read_run(files[labels(BOUNDARY_ELEMENTS)])["contact_map"].sum() > 0
+    assert read_run(files[labels(REFERENCE_MODEL)])["contact_map"].sum() > 0
 
 
 def test_a_run_under_the_name_of_another_model_is_refused(runs):
     with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/boundary_elements/soft: the dataset's model is asp"):
-        campaign_tree([(labels(BOUNDARY_ELEMENTS), runs[labels(ASPERITIES)])])
+        campaign_tree([(labels(REFERENCE_MODEL), runs[labels(DEFAULT_MODEL)])])
 
 
 def test_a_failed_run_of_boundary_elements_leaves_the_others_whole(runs):
-    broken = labels(BOUNDARY_ELEMENTS)
+    broken = labels(REFERENCE_MODEL)
     whole = runs[broken]
     nothing = {"step": slice(0, 0), "snapshot": slice(0, 0), "spot": slice(0, 0)}
     for part in (nothing, {"step": slice(0, 1), "snapshot": slice(0, 0), "spot": slice(0, 0)}):
@@ -142,14 +146,16 @@ def test_a_failed_run_of_boundary_elements_leaves_the_others_whole(runs):
         failed = [check for check in check_campaign(tree) if not check.passed]
         assert [(check.subject, check.name) for check in failed] == [(str(broken), "completed")]
         np.testing.assert_array_equal(
-            select_run(tree, labels(ASPERITIES))["spot_x"], runs[labels(ASPERITIES)]["spot_x"]
+            select_run(tree, labels(DEFAULT_MODEL))["spot_x"], runs[labels(DEFAULT_MODEL)]["spot_x"]
         )
 
 
 def test_fronts_are_checked(runs):
-    patched = runs[labels(BOUNDARY_ELEMENTS)]
+    patched = runs[labels(REFERENCE_MODEL)]
     assert all(check.passed for check in check_run(patched))
-    names = {check.name for check in check_run(patched)} - {check.name for check in check_run(runs[labels(ASPERITIES)])}
+    names = {check.name for check in check_run(patched)} - {
+        check.name for check in check_run(runs[labels(DEFAULT_MODEL)])
+    }
     assert names == {"front", "gap"}
     for name, value in (("front_residual", 0.5), ("gap_residual", 0.1)):
         worse = patched.assign({name: patched[name] * 0 + value})
@@ -158,23 +164,23 @@ def test_fronts_are_checked(runs):
 
 def test_figures_show_asperities_or_else_what_there_is(runs):
     tree = campaign_tree(runs.items())
-    assert {each.model for each, _ in study_runs(tree, "one")} == {ASPERITIES}
-    assert pick_run(tree, "one", material="soft")[0] == labels(ASPERITIES)
-    alone = campaign_tree([(labels(BOUNDARY_ELEMENTS), runs[labels(BOUNDARY_ELEMENTS)])])
-    assert pick_run(alone, "one")[0] == labels(BOUNDARY_ELEMENTS)
+    assert {each.model for each, _ in study_runs(tree, "one")} == {DEFAULT_MODEL}
+    assert pick_run(tree, "one", material="soft")[0] == labels(DEFAULT_MODEL)
+    alone = campaign_tree([(labels(REFERENCE_MODEL), runs[labels(REFERENCE_MODEL)])])
+    assert pick_run(alone, "one")[0] == labels(REFERENCE_MODEL)
     assert len(study_runs(alone, "one")) == 1
 
 
 def test_models_are_compared_side_by_side(runs):
     comparison = compare_runs(campaign_tree(runs.items())["one"].to_dataset())
     areas = comparison["contact_area_fraction"].sel(material="soft")
-    np.testing.assert_array_equal(areas.sel(model=ASPERITIES), areas.sel(model=BOUNDARY_ELEMENTS))
+    np.testing.assert_array_equal(areas.sel(model=DEFAULT_MODEL), areas.sel(model=REFERENCE_MODEL))
     assert comparison["seed_count"].dims == ("model", "surface", "rms_slope", "material")
 
 
-def test_every_model_has_its_further_variables_and_its_module():
-    import importlib
-
-    assert set(FURTHER) == set(MODELS)
-    for name in MODELS:
-        assert importlib.import_module(f"icha.models.{name}").MODEL.references
+def test_all_that_is_known_by_model_is_there_of_every_model():
+    assert set(FURTHER) == set(RUN_SIZES) == set(MODELS)
+    for name, model in MODELS.items():
+        assert model.references and model.words in MODEL_MARKERS
+        assert all(", ".join([name, *what]) in LAWS for what in ([], ["adhesion"], ["adhesion", "cycle"]))
+        assert callable(importlib.import_module(model.module).contact_of)

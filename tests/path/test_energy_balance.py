@@ -37,7 +37,7 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.events import JUMP_IN, JUMP_OFF, Events
+from icha.contact.model import JUMP_IN, JUMP_OFF, Events
 from icha.path import resolution
 from icha.path.energy_balance import EnergyBalance, Step
 from icha.path.limits import DEFAULT_STEP

@@ -6,7 +6,7 @@ from few_asperities import HEIGHT, contact_of
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.checks.run import check_run
-from icha.contact.failures import NotConverged
+from icha.contact.model import NotConverged
 from icha.path import course
 from icha.path.course import Course
 from icha.path.follow import follow

@@ -6,8 +6,8 @@ import pytest
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.asperity.jkr import JKR
 from icha.checks.run import check_run
-from icha.contact.failures import NotConverged
-from icha.contact.tolerances import RESIDUAL_TOLERANCE
+from icha.contact.model import NotConverged
+from icha.contact.models import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.path.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE

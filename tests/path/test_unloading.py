@@ -40,8 +40,7 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.events import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT
-from icha.contact.failures import NotConverged
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, NotConverged
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.path.limits import MAX_REDUCED_PRESSURE

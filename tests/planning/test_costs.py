@@ -7,8 +7,8 @@ import numpy as np
 import own_slopes_campaign as crops
 import pytest
 
-from icha.contact.bins import GAP_BINS, PRESSURE_BINS
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.model import GAP_BINS, PRESSURE_BINS
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import count_cells
 from icha.planning import costs
@@ -51,7 +51,7 @@ def test_summits_are_counted_as_on_real_surfaces(hurst, rolloff, short):
     assert near == pytest.approx(moments, rel=1e-4)
 
 
-@pytest.mark.parametrize("model", [ASPERITIES, BOUNDARY_ELEMENTS])
+@pytest.mark.parametrize("model", [DEFAULT_MODEL, REFERENCE_MODEL])
 def test_costs_grow_with_what_is_asked_for(model):
     def cost(grid=512, summits=500, **changes):
         return costs.run_cost(model, grid, summits, **(SWEEP | changes))

@@ -196,7 +196,7 @@ def test_whatever_the_data_raise_is_a_failed_run(sweep, monkeypatch, error):
 
 
 def test_values_that_are_not_finite_end_a_run_and_leave_what_came_before(sweep, dataset, monkeypatch):
-    from icha.equilibrium.observables import AsperityObservables
+    from icha.equilibrium.interacting_asperities import AsperityObservables
 
     of_step, count = AsperityObservables.of_step, iter(range(9))
     monkeypatch.setattr(

@@ -161,7 +161,7 @@ def fingerprint(monkeypatch):
 
 def test_scripts_whose_fingerprint_a_module_is_part_of(fingerprint):
     # A run imports its model by name.
-    told = {"run_sweep": [f"icha.models.{name}" for name in MODELS]}
+    told = {"run_sweep": [model.module for model in MODELS.values()]}
     files = {
         file.stem: fingerprint.files_of(file, *told.get(file.stem, ()))
         for file in (REPOSITORY / "workflow/scripts").glob("*.py")
@@ -183,7 +183,7 @@ def test_scripts_whose_fingerprint_a_module_is_part_of(fingerprint):
 
 def test_models_of_contact_know_nothing_of_each_other_and_nobody_of_what_surrounds_scripts(fingerprint):
     script = REPOSITORY / "workflow/scripts/run_sweep.py"
-    asperities, patches = (set(fingerprint.files_of(script, f"icha.models.{name}")) for name in MODELS)
+    asperities, patches = (set(fingerprint.files_of(script, model.module)) for model in MODELS.values())
     assert any("/equilibrium/" in name for name in asperities - patches)
     assert "icha/boundary_elements/contact.py" in patches - asperities
     assert not any("/equilibrium/" in name for name in patches - asperities)

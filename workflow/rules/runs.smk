@@ -1,7 +1,7 @@
 # One sweep each, by asperities or by another model of contact, whose runs are in a folder of its name.
 
 from icha.configuration.cases import run_settings
-from icha.contact.models import BOUNDARY_ELEMENTS, MODELS
+from icha.contact.models import MODELS
 from icha.datasets.labels import model_folder
 from icha.planning.needs import run_memory, run_minutes, surface_threads
 
@@ -13,8 +13,8 @@ wildcard_constraints:
 # Asked for more than once of each of what may be ten thousand runs.
 SETTINGS_OF_RUN = cache(lambda case: run_settings(CAMPAIGN, case))
 
-# By model, which the script imports by its name.
-CODE_OF_RUN = {model: code_of("run_sweep.py", f"icha.models.{model}") for model in MODELS}
+# By model, whose module the script imports by its name.
+CODE_OF_RUN = {name: code_of("run_sweep.py", model.module) for name, model in MODELS.items()}
 
 
 rule run:
@@ -27,7 +27,7 @@ rule run:
     benchmark:
         "<benchmarks>/runs/<run>.jsonl"
     # The long ones first, or the last of them would keep one core busy at the end.
-    priority: by_case(lambda case: int(case.model == BOUNDARY_ELEMENTS))
+    priority: by_case(lambda case: int(MODELS[case.model].resumable))
     conda:
         "../envs/icha.yaml"
     threads: by_case(lambda case: surface_threads(CAMPAIGN, case.surface))
@@ -43,7 +43,7 @@ rule run:
         },
         code=by_case(lambda case: CODE_OF_RUN[case.model]),
         # What takes hours can be gone on with.
-        keeps=by_case(lambda case: case.model == BOUNDARY_ELEMENTS and surface_threads(CAMPAIGN, case.surface) > 1),
+        keeps=by_case(lambda case: MODELS[case.model].resumable and surface_threads(CAMPAIGN, case.surface) > 1),
     message:
         "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
         "{wildcards.model_folder}{wildcards.material}"

@@ -21,7 +21,7 @@ def _failures_of_solvers():
     """How solvers say that they did not converge. Most jobs do without them, so nothing is imported for this."""
     names = {
         "icha.simulation": "ConvergenceError",
-        "icha.contact.failures": "NotConverged",
+        "icha.contact.model": "NotConverged",
         "icha.references.failures": "NotSolved",
     }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]

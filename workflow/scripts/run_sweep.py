@@ -10,7 +10,7 @@ from job import attributes, guarded
 
 from icha.asperity.material import Material
 from icha.contact.kept import prepared
-from icha.contact.models import ASPERITIES
+from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
@@ -20,7 +20,9 @@ from icha.simulation import ConvergenceError, simulate, unfollowed
 OF_THE_MACHINE = (OSError, MemoryError, ImportError)
 
 
-def run_sweep(surface, output, *, rms_slope, seed, material, path, attributes, progress, model=ASPERITIES, kept=None):
+def run_sweep(
+    surface, output, *, rms_slope, seed, material, path, attributes, progress, model=DEFAULT_MODEL, kept=None
+):
     """Load the surface of the file `surface`, scaled to `rms_slope`, and write the run dataset to `output`.
 
     Of a run that fails the file holds the stops that were reached, and says why there are no more: the campaign goes

@@ -3,11 +3,12 @@
 In the limit of a short range contact has an edge beyond which nothing acts: all areas of boundary elements are one.
 """
 
+from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.build import bin_table
 from icha.datasets.variables.terms import Variable
 
 # What the model is compared with: the attribute `truth` of an entry.
-SHORT_RANGE, FINITE_RANGE = "boundary elements", "boundary elements at finite range"
+SHORT_RANGE, FINITE_RANGE = MODELS[REFERENCE_MODEL].words, "boundary elements at finite range"
 
 ASKED = Variable(("reduced_pressure",), "1", "reduced pressure asked for, p/(E* h'rms)", coordinate=True)
 _UNKEPT = {"missing": "where the runs keep no snapshot"}

@@ -3,8 +3,8 @@
 import numpy as np
 
 from icha.asperity.full_contact import MEANING
-from icha.contact.events import EVENT_KINDS
-from icha.contact.models import ASPERITIES, BOUNDARY_ELEMENTS
+from icha.contact.model import EVENT_KINDS
+from icha.contact.models import MODELS
 from icha.datasets.build import bin_table
 from icha.datasets.variables.terms import INFINITE, MATERIAL, ROUGHNESS, Variable, term, terms
 
@@ -125,19 +125,12 @@ RUN = {
     "control": Variable((), "1", "what is imposed: separation or load", str),
 }
 
-# Besides, those of boundary elements ...
-PATCHES = {
-    "front_residual": Variable(
-        _STEP,
-        "1",
-        "largest deviation from 1, along the edges of contact, of sqrt(energy release rate over surface energy)",
-    ),
-    "gap_residual": Variable(_STEP, "1", "largest gap in contact, or overlap out of contact, over h_rms"),
-    "contact_map": Variable((*_SNAPSHOT, *CELLS), "1", "part of the cell that is in contact", np.float32),
-    "contact_pressure": Variable((*_SNAPSHOT, *CELLS), "Pa", "pressure in the cell, negative in tension", np.float32),
+# Besides, what the runs of a model have ...
+FURTHER = {
+    name: {key: Variable(*description) for key, description in model.variables.items()}
+    for name, model in MODELS.items()
 }
-# By model: what its runs have besides those of all models.
-FURTHER = {ASPERITIES: {}, BOUNDARY_ELEMENTS: PATCHES}
+OF_MODELS = {key: description for table in FURTHER.values() for key, description in table.items()}
 
 # ... those of a path that goes on after the first loading ...
 CYCLE = {

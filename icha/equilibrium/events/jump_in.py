@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from icha.asperity.coalescence import covering_spot
-from icha.contact.events import JUMP_IN, SPLIT
+from icha.contact.model import JUMP_IN, SPLIT
 from icha.equilibrium.equations import Point
 from icha.equilibrium.search import Search
 from icha.equilibrium.sites import CONTACT, TRIAL

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from icha.contact.events import JUMP_OFF
+from icha.contact.model import JUMP_OFF
 from icha.equilibrium.equations import Point
 from icha.equilibrium.search import Search
 from icha.equilibrium.sites import CONTACT

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from icha.contact.events import SPLIT
+from icha.contact.model import SPLIT
 from icha.equilibrium.equations import Point
 from icha.equilibrium.search import Search
 from icha.equilibrium.sites import CONTACT

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from icha.asperity.coalescence import disjoint_pairs, equivalent_spots, overlapping_pairs
-from icha.contact.events import COALESCENCE, JUMP_IN
+from icha.contact.model import COALESCENCE, JUMP_IN
 from icha.equilibrium.equations import Point
 from icha.equilibrium.search import Search
 from icha.equilibrium.sites import CONTACT, TRIAL, Union
