@@ -114,6 +114,7 @@ lint: tamaas
 	ruff check .
 	ruff format --check .
 	lint-imports
+	mypy
 	snakefmt --check Snakefile workflow
 	codespell
 	snakemake --lint

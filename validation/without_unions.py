@@ -8,10 +8,10 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.asperity.coalescence import covering_spot
 from icha.asperity.jkr import JKR
+from icha.contact.model import NotConverged
 from icha.equilibrium.distributions import contact_cover
 from icha.half_space.ewald import HalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
-from icha.references.failures import NotSolved
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import Surface
 
@@ -81,7 +81,7 @@ def discs_apart(
 
     Raises
     ------
-    NotSolved
+    NotConverged
         If no equilibrium was found.
     """
     start = independent_discs(summits, law, pressure)
@@ -105,7 +105,7 @@ def discs_apart(
             part, approach, half_space = part[free], approach[free], None
             continue
         if error > _TOLERANCE:
-            raise NotSolved(f"without unions: error {error:.2g} with {len(touching)} spots at {pressure:.4g} Pa")
+            raise NotConverged(f"without unions: error {error:.2g} with {len(touching)} spots at {pressure:.4g} Pa")
         discs = Discs(there, radius, R[part][touching], separation)
         if not field_shape:
             return discs
@@ -116,7 +116,7 @@ def discs_apart(
         # Averaged with the last one when the iteration has not ended at once, since spots may come and go.
         share = 1.0 if turn < 5 else 0.5
         lift, R = lift + share * (new_lift - lift), R + share * (new_R - R)
-    raise NotSolved(f"without unions: no end of the iteration at {pressure:.4g} Pa")
+    raise NotConverged(f"without unions: no end of the iteration at {pressure:.4g} Pa")
 
 
 def _reshaped(summits, law, touching, discs):

@@ -10,7 +10,7 @@ from typing import Any
 from snakemake_records import record_of
 
 from icha.deposit.crate import Job
-from icha.deposit.deposit_files import SOURCE
+from icha.deposit.verify import SOURCE
 
 SCRIPTS = "workflow/scripts"
 

@@ -4,9 +4,8 @@ from pathlib import Path
 
 from icha.configuration.load import Configuration
 from icha.configuration.publication import needed
-from icha.deposit.environment import refuse_other_environment, refuse_results_of_another_environment
-from icha.deposit.licences import licence_problem
-from icha.deposit.source import Source, program_source
+from icha.deposit.metadata import licence_problem
+from icha.deposit.program import Source, program_source, refuse_other_environment
 
 
 def publishable_source(configuration: Configuration, project: str, results: str) -> Source:
@@ -24,8 +23,7 @@ def publishable_source(configuration: Configuration, project: str, results: str)
     except ValueError as error:
         wrong.append(str(error))
     try:
-        refuse_other_environment(Path(project))
-        refuse_results_of_another_environment(Path(results), Path(project))
+        refuse_other_environment(Path(project), Path(results))
     except ValueError as error:
         wrong.append(str(error))
     if wrong:

@@ -38,6 +38,7 @@ def pressed(
         If the contact does not settle.
     """
     heights, exact = topography.double, _EXACT * topography.largest
+    separation = separation or 0.0
     cells, pressure, rough = contact.cells, contact.pressure, True
     if not len(cells):
         cells = np.flatnonzero(heights > separation)
@@ -53,7 +54,7 @@ def pressed(
         pressure, left = pressures_for(
             space,
             cells,
-            height - (separation or 0.0),
+            height - separation,
             pressure,
             topography.rounding if rough else exact,
             np.float32 if rough else float,

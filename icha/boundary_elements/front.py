@@ -57,7 +57,7 @@ def _neighbour_modes(grid: int, kind: np.dtype) -> np.ndarray:
 def neighbours(space: HalfSpace, cells: np.ndarray, fraction: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
     """w*f: mean fraction of contact around cells (m,), rising, or around all; of fractions on cells (k,), rising."""
     near = space.nearly(at) if at is not None and space.is_large else None
-    if isinstance(near, Tiles):
+    if at is not None and isinstance(near, Tiles):
         everywhere = np.zeros(len(at), fraction.dtype)
         everywhere[np.searchsorted(at, cells)] = fraction
         return near.sums(everywhere, _neighbour_modes(TILE, fraction.dtype))

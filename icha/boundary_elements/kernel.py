@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 import scipy.fft
+from numpy.typing import DTypeLike
 
 from icha.boundary_elements import transforms
 from icha.boundary_elements.nearby import Tiles
@@ -99,20 +100,19 @@ class HalfSpace:
             return field if at is None else field.ravel()[at]
         return transforms.filtered(self.grid, cells, values, factor, at, out)
 
-    def on_grid(self, cells: np.ndarray, values: np.ndarray | float, kind: type = float) -> np.ndarray:
+    def on_grid(self, cells: np.ndarray, values: np.ndarray | float, kind: DTypeLike = float) -> np.ndarray:
         """A field of given values on cells (k,), counted through, and zero elsewhere."""
-        field = np.zeros(self.shape, kind)
+        field: np.ndarray = np.zeros(self.shape, kind)
         field.ravel()[cells] = values
         return field
 
 
 class Nearly(Protocol):
-    """The half-space for some of its cells, (k,), in single precision.
+    """The half-space for some of its cells, (k,), in single precision."""
 
-    error: of displacements, at most, over the largest displacement.
-    """
-
-    error: float
+    @property
+    def error(self) -> float:
+        """Of displacements, at most, over the largest displacement."""
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
         """What pressures in E* displace the cells, (k,), in cells."""

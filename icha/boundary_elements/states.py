@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -47,8 +48,8 @@ def packed(state: CellState, before: CellState) -> dict[str, np.ndarray]:
 
 def unpacked(arrays: dict[str, np.ndarray], before: CellState) -> CellState:
     """The state that is `packed` in arrays and followed from another one."""
-    own = {each.name: arrays[each.name] for each in fields(CellState) if each.name in arrays}
-    own = {name: value if value.ndim else value.item() for name, value in own.items()}
+    found = {each.name: arrays[each.name] for each in fields(CellState) if each.name in arrays}
+    own: dict[str, Any] = {name: value if value.ndim else value.item() for name, value in found.items()}
     rates = (arrays["rates_0"], arrays["rates_1"]) if "rates_0" in arrays else None
     events = Events(*(arrays[f"event_{name}"] for name in Events.__match_args__))
     return CellState(**own, rates=rates, history=(*before.history, events) if len(events) else before.history)

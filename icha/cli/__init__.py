@@ -5,16 +5,14 @@ from typing import Annotated
 import typer
 
 from icha.cli.check import check
+from icha.cli.deposits import reproduce, upload, verify
 from icha.cli.describe import describe
 from icha.cli.explore import explore
 from icha.cli.new import new
 from icha.cli.project import say, told
-from icha.cli.reproduce import reproduce
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
-from icha.cli.upload import upload
-from icha.cli.verify import verify
 
 app = typer.Typer(
     no_args_is_help=True,

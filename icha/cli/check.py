@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import FAILED, WRONG, say
-from icha.deposit.deposit_files import CHECKSUMS
+from icha.deposit.verify import CHECKSUMS
 from icha.support.in_words import counted, printable
 
 

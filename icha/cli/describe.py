@@ -67,11 +67,13 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
     from icha.contact.models import MODELS
     from icha.surfaces.measured.resolution import scan_resolution
 
-    by_patches = {case.surface for case in run_cases(campaign) if MODELS[case.model].least_cells}
+    models: dict[str, list] = {}
+    for case in run_cases(campaign):
+        models.setdefault(case.surface, []).append(MODELS[case.model])
     scans = {name: scan_resolution(section.path, section.preparation) for name, section in measured.items()}
     say("")
     for name, scan in scans.items():
-        for line in about_scan(name, scan, by_patches=name in by_patches):
+        for line in about_scan(name, scan, models=models[name]):
             say(line)
     if plot is not None:
         draw_scans(scans, plot)
@@ -93,7 +95,7 @@ def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: 
     """
     from rich.console import Console
 
-    from icha.deposit.licences import licence_problem
+    from icha.deposit.metadata import licence_problem
     from icha.planning.belonging import belongs_to_another
     from icha.planning.needs import missing_software, wanting
     from icha.planning.plan import plan
@@ -101,27 +103,30 @@ def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: 
     from icha.support.checksums import damaged
 
     results = home / "results" / campaign.name
-    items, spoilt = plan(campaign, results), damaged(results)
-    console = Console(width=None if sys.stdout.isatty() else 120)
-    console.print(f"[bold]{campaign.name}[/]: {markup(campaign.title)}", highlight=False)
-    console.print(f"configuration: {markup(shown(path))}\n", highlight=False)
+    items = plan(campaign, results)
+    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    console.print(f"[bold]{campaign.name}[/]: {markup(campaign.title)}")
+    console.print(f"configuration: {markup(shown(path))}\n")
     if runs:
         _list(console, items)
-    _summary(console, items, spoilt, cores)
+    _summary(console, items, damaged(results), cores)
     for statement in expected_validity(campaign):
-        console.print(f"[bold]{statement.about}:[/] {markup(statement.text)}", highlight=False, soft_wrap=True)
-    if reason := belongs_to_another(shown(results), campaign.name, path, workflow):
-        console.print(f"[red]not to be run:[/] {markup(reason)}", highlight=False, soft_wrap=True)
-    if problem := licence_problem(campaign):
-        console.print(
-            f"[red]not to be published:[/] {markup(shown(path))}: {markup(': '.join(problem))}",
-            highlight=False,
-            soft_wrap=True,
-        )
-    if missing := missing_software(campaign):
-        console.print(f"[red]missing:[/] {markup(missing)}", highlight=False, soft_wrap=True)
+        _line(console, "bold", statement.about, statement.text)
+    problem = licence_problem(campaign)
+    obstacles = {
+        "not to be run": belongs_to_another(shown(results), campaign.name, path, workflow),
+        "not to be published": problem and f"{shown(path)}: {': '.join(problem)}",
+        "missing": missing_software(campaign),
+    }
+    for about, reason in obstacles.items():
+        if reason:
+            _line(console, "red", about, reason)
     for lack in wanting(items, cores, results, profile_settings(profile or workflow / "profiles/default")):
-        console.print(f"[red]not enough:[/] {markup(lack)}", highlight=False, soft_wrap=True)
+        _line(console, "red", "not enough", lack)
+
+
+def _line(console, style: str, about: str, text: str) -> None:
+    console.print(f"[{style}]{about}:[/] {markup(text)}", soft_wrap=True)
 
 
 def _summary(console, items, damaged, cores) -> None:
@@ -152,17 +157,10 @@ def _summary(console, items, damaged, cores) -> None:
         )
     for part, members in parts.items():
         sums = total(members)
-        table.add_row(
-            part,
-            str(sums.count),
-            str(sums.done or ""),
-            str(sums.failed or ""),
-            str(sums.to_do or ""),
-            in_words.duration(sums.typical),
-            in_words.duration(sums.work) if sums.to_do else "",
-            in_words.size(sums.memory),
-            in_words.size(sums.disk),
-        )
+        counts = (str(count or "") for count in (sums.count, sums.done, sums.failed, sums.to_do))
+        work = in_words.duration(sums.work) if sums.to_do else ""
+        sizes = in_words.size(sums.memory), in_words.size(sums.disk)
+        table.add_row(part, *counts, in_words.duration(sums.typical), work, *sizes)
     if around:
         table.add_row("starting and scheduling", "", "", "", "", "", in_words.duration(around))
     console.print(table)
@@ -170,21 +168,20 @@ def _summary(console, items, damaged, cores) -> None:
     changed = sum(item.state == "changed" for item in runs)
     console.print()
     if not every.to_do and not damaged:
-        console.print(f"{counted(len(runs), 'run')}; everything is there.", highlight=False)
+        console.print(f"{counted(len(runs), 'run')}; everything is there.")
     else:
         time, memory = in_words.duration(time_on(items, cores)), in_words.size(memory_on(items, cores))
         console.print(
             f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and {memory}"
-            f" of memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk when all is there.",
-            highlight=False,
+            f" of memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk when all is there."
         )
     for path in damaged:
-        console.print(f"[red]damaged:[/] {markup(path)}: to do again.", highlight=False, soft_wrap=True)
+        _line(console, "red", "damaged", f"{path}: to do again.")
     if changed:
-        console.print(f"{counted(changed, 'run')} there, but with other settings: to do again.", highlight=False)
+        console.print(f"{counted(changed, 'run')} there, but with other settings: to do again.")
     for item in runs:
         if item.reason:
-            console.print(f"[red]failed:[/] {item.path}: {markup(item.reason)}", highlight=False)
+            console.print(f"[red]failed:[/] {item.path}: {markup(item.reason)}")
 
 
 def _list(console, items) -> None:
@@ -194,9 +191,7 @@ def _list(console, items) -> None:
     for heading in ("file", "state", "time", "memory", "disk"):
         table.add_column(heading, justify="left" if heading in ("file", "state") else "right", overflow="fold")
     for item in items:
-        cost = item.cost
-        table.add_row(
-            item.path, item.state, in_words.duration(cost.seconds), in_words.size(cost.memory), in_words.size(cost.disk)
-        )
+        time, memory = in_words.duration(item.cost.seconds), in_words.size(item.cost.memory)
+        table.add_row(item.path, item.state, time, memory, in_words.size(item.cost.disk))
     console.print(table)
     console.print()

@@ -34,7 +34,7 @@ def explore(
     file and needs no network. What does not fit into it is left out and counted.
     """
     from icha.datasets.results import EXPLORER
-    from icha.deposit.deposit_files import CHECKSUMS
+    from icha.deposit.verify import CHECKSUMS
     from icha.report.explorer import NothingToExplore, write_explorer
 
     if not results.is_dir():

@@ -7,77 +7,33 @@ import datetime
 import re
 import unicodedata
 from collections.abc import Callable, Iterator
-from functools import lru_cache
-from itertools import combinations
 from typing import Annotated, Any, Literal
-from urllib.parse import quote
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
 from icha.datasets.labels import RunLabels
 from icha.support.values import Problem, Section, Text, distinct
 
-# How a deposit may stand to something else: the relation types of DataCite 4.5 that Zenodo knows, too.
-RELATIONS = (
-    "IsCitedBy",
-    "Cites",
-    "IsSupplementTo",
-    "IsSupplementedBy",
-    "IsContinuedBy",
-    "Continues",
-    "IsDescribedBy",
-    "Describes",
-    "HasMetadata",
-    "IsMetadataFor",
-    "IsNewVersionOf",
-    "IsPreviousVersionOf",
-    "IsPartOf",
-    "HasPart",
-    "IsReferencedBy",
-    "References",
-    "IsDocumentedBy",
-    "Documents",
-    "IsCompiledBy",
-    "Compiles",
-    "IsVariantFormOf",
-    "IsOriginalFormOf",
-    "IsIdenticalTo",
-    "IsReviewedBy",
-    "Reviews",
-    "IsDerivedFrom",
-    "IsSourceOf",
-    "IsRequiredBy",
-    "Requires",
-    "Obsoletes",
-    "IsObsoletedBy",
+# Relations of a deposit to other works: the types of DataCite 4.5 that Zenodo knows, too.
+RELATIONS = tuple(
+    "IsCitedBy Cites IsSupplementTo IsSupplementedBy IsContinuedBy Continues IsDescribedBy Describes HasMetadata "
+    "IsMetadataFor IsNewVersionOf IsPreviousVersionOf IsPartOf HasPart IsReferencedBy References IsDocumentedBy "
+    "Documents IsCompiledBy Compiles IsVariantFormOf IsOriginalFormOf IsIdenticalTo IsReviewedBy Reviews IsDerivedFrom "
+    "IsSourceOf IsRequiredBy Requires Obsoletes IsObsoletedBy".split()
 )
-# Kinds of what is related, by DataCite's names.
-RESOURCES = (
-    "Book",
-    "BookChapter",
-    "ConferencePaper",
-    "Dataset",
-    "Dissertation",
-    "Image",
-    "JournalArticle",
-    "Other",
-    "Preprint",
-    "Report",
-    "Software",
-    "Text",
-    "Workflow",
+# Kinds of related works, by DataCite's names.
+RESOURCES = tuple(
+    "Book BookChapter ConferencePaper Dataset Dissertation Image JournalArticle Other Preprint Report Software Text "
+    "Workflow".split()
 )
-_DOI = re.compile(r"10\.[0-9]{4,9}/.+", re.DOTALL)
+# Characters of a web address (RFC 3986).
+_ADDRESS = r"[^\s<>\"{}|\\^`\x00-\x1f\u200b-\u200f]+"
+_DOI = re.compile(rf"10\.[0-9]{{4,9}}/{_ADDRESS}")
 _ARXIV = re.compile(r"arXiv:([0-9]{4}\.[0-9]{4,5}|[a-z-]+(\.[A-Z]{2})?/[0-9]{7})(v[0-9]+)?")
-_URL = re.compile(r"https?://[^\s/]+\..+", re.DOTALL)
-_DOI_SITE = re.compile(r"https?://(dx\.)?doi\.org/", re.IGNORECASE)
-_ROR_SITE = re.compile(r"https?://ror\.org/", re.IGNORECASE)
+_URL = re.compile(rf"https?://[^\s/]+\.{_ADDRESS}")
 # The digits of Crockford's base 32.
 _BASE_32 = "0123456789abcdefghjkmnpqrstvwxyz"
-_ROR = re.compile(rf"0([{_BASE_32}]{{6}})([0-9]{{2}})")
-# Entries of a list of which each is compared with all others.
-_MOST_ENTRIES = 1000
-_FIRST_DAY, _LAST_DAY = "1900-01-01", "2199-12-31"
+_ROR = re.compile(rf"(https?://ror\.org/)?0([{_BASE_32}]{{6}})([0-9]{{2}})")
 
 
 def _readable(value: Any, breaks: str, allowed: str) -> Any:
@@ -102,134 +58,95 @@ def _prose(value: Any) -> Any:
     return _readable(value, "\n", "text, with or without line breaks")
 
 
-def _once(what: str, same: Callable[[Any, Any], bool], shown: Callable[[Any], str]) -> AfterValidator:
-    """Refuse a list with two entries that mean the same."""
+def _once(what: str, key: Callable[[Any], tuple], shown: Callable[[Any], str]) -> AfterValidator:
+    """Refuse a list with two entries that have the same key, whatever their capitals and spaces."""
 
     def check(entries):
-        if len(entries) > _MOST_ENTRIES:
-            raise ValueError(f"has {len(entries)} entries; allowed: {_MOST_ENTRIES} at most")
-        for entry, other in combinations(entries, 2):
-            if same(entry, other):
-                raise ValueError(f"{shown(other)!r} is given twice; allowed: every {what} once")
+        seen = set()
+        for entry in entries:
+            same = tuple(" ".join(str(part or "").split()).casefold() for part in key(entry))
+            if same in seen:
+                raise ValueError(f"{shown(entry)!r} is given twice; allowed: every {what} once")
+            seen.add(same)
         return entries
 
     return AfterValidator(check)
 
 
-@lru_cache(maxsize=2 * _MOST_ENTRIES)
-def _alike(*names: str | None) -> tuple[str, ...]:
-    """Names as they are compared: capitals, spaces and the encoding of accents make no other name."""
-    return tuple(" ".join(unicodedata.normalize("NFC", name or "").split()).casefold() for name in names)
-
-
 def _orcid(value: str) -> str:
-    """Refuse an ORCID of the wrong form or with a wrong check digit (ISO 7064 mod 11-2); an address is taken for it."""
-    plain = re.sub(r"^https?://orcid\.org/", "", value) if isinstance(value, str) else value
-    example = "allowed: four groups of four digits of which the last is a check digit, such as '0000-0002-1825-0097'"
-    if not isinstance(plain, str) or not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain):
-        raise ValueError(f"is no ORCID; {example}")
-    digits = plain.replace("-", "")
+    """Refuse an ORCID of the wrong form or with a wrong check digit (ISO 7064 mod 11-2); its address is accepted."""
+    plain = re.sub(r"^https?://orcid\.org/", "", str(value))
     total = 0
-    for digit in digits[:-1]:
-        total = (total + int(digit)) * 2
-    check = (12 - total % 11) % 11
-    if digits[-1] != ("X" if check == 10 else str(check)):
-        raise ValueError(f"is no ORCID: its check digit is wrong; {example}")
+    for digit in plain.replace("-", "")[:-1]:
+        total = (total + int(digit)) * 2 if digit.isdecimal() else 0
+    check = "0123456789X"[(12 - total % 11) % 11]
+    if not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain) or plain[-1] != check:
+        raise ValueError("is no ORCID, or its check digit is wrong; allowed: such as '0000-0002-1825-0097'")
     return plain
 
 
 def _ror(value: Any) -> str:
     """Refuse what is no identifier of the Research Organization Registry, by its check digits (ISO 7064 mod 97-10)."""
-    plain = _ROR_SITE.sub("", value).lower() if isinstance(value, str) else ""
-    example = "allowed: one of https://ror.org, such as 'https://ror.org/03yrm5c26'"
-    found = _ROR.fullmatch(plain)
-    if not found:
-        raise ValueError(f"is no ROR identifier; {example}")
-    number = 0
-    for digit in found[1]:
+    found, number = _ROR.fullmatch(str(value).lower()), 0
+    for digit in found[2] if found else "":
         number = 32 * number + _BASE_32.index(digit)
-    if int(found[2]) != 98 - number * 100 % 97:
-        raise ValueError(f"is no ROR identifier: its check digits are wrong; {example}")
-    return f"https://ror.org/{plain}"
-
-
-def _addressable(value: str) -> str:
-    """Refuse characters that a web address cannot have (RFC 3986)."""
-    for char in value:
-        if char in ' <>"{}|\\^`':
-            raise ValueError(f"holds {char!r}, which no web address can; allowed: none, or {quote(char)!r} for it")
-        if char.isspace() or not char.isprintable():
-            raise ValueError(f"holds {char!r}, which no web address can; allowed: visible characters")
-    return value
+    if not found or int(found[3]) != 98 - number * 100 % 97:
+        raise ValueError(
+            "is no ROR identifier, or its check digits are wrong; allowed: one of https://ror.org, such as "
+            "'https://ror.org/03yrm5c26'"
+        )
+    return f"https://ror.org/0{found[2]}{found[3]}"
 
 
 def _plain_doi(value: Any) -> str | None:
-    plain = re.sub(r"^doi:", "", _DOI_SITE.sub("", value)) if isinstance(value, str) else ""
-    return _addressable(plain) if _DOI.fullmatch(plain) else None
+    """Return the DOI that a text or an address of doi.org is; None if it is none."""
+    plain = re.sub(r"(?i)^(https?://(dx\.)?doi\.org/|doi:)", "", str(value))
+    return plain if _DOI.fullmatch(plain) else None
 
 
 def _doi(value: Any) -> str:
-    """Refuse what is no DOI; take its address for itself."""
-    plain = _plain_doi(value)
-    if plain is None:
-        raise ValueError("is no DOI; allowed: a DOI such as '10.1007/s11249-017-0900-2'")
-    return plain
+    if doi := _plain_doi(value):
+        return doi
+    raise ValueError("is no DOI; allowed: a DOI such as '10.1007/s11249-017-0900-2'")
 
 
 def _identifier(value: Any) -> str:
-    """Refuse what is neither a DOI nor an arXiv identifier nor a web address; take a DOI's address for itself."""
-    plain = _plain_doi(value)
-    if plain is not None:
-        return plain
+    if doi := _plain_doi(value):
+        return doi
     if isinstance(value, str) and (_ARXIV.fullmatch(value) or _URL.fullmatch(value)):
-        return _addressable(value)
+        return value
     raise ValueError(
         "is no identifier; allowed: a DOI such as '10.1007/s11249-017-0900-2', 'arXiv:1234.56789', or a web address"
     )
 
 
 def _funder(value: Any) -> str:
-    """Refuse what is neither a ROR identifier nor a DOI; take a DOI's address for itself."""
-    if isinstance(value, str) and (_ROR_SITE.match(value) or _ROR.fullmatch(value.lower())):
-        return _ror(value)
-    plain = _plain_doi(value)
-    if plain is None:
-        raise ValueError(
-            "is neither a ROR identifier nor a DOI; allowed: one of them, such as 'https://ror.org/00k4n6c32' or "
-            "'10.13039/501100000780'"
-        )
-    return plain
+    """Refuse what is neither a DOI nor a ROR identifier."""
+    return _plain_doi(value) or _ror(value)
 
 
 def _community(value: Any) -> str:
-    """Refuse what cannot name a community of Zenodo."""
-    if not isinstance(value, str) or not re.fullmatch(r"[a-z0-9_-]+", value):
+    if not re.fullmatch(r"[a-z0-9_-]+", str(value)):
         raise ValueError(
             "is no community of Zenodo; allowed: what its address ends with: lower-case letters, digits, - and _"
         )
     return value
 
 
-def _day_as_text(value: Any) -> Any:
-    """The text of a day, or of a time, that YAML has made one."""
-    return value.isoformat() if isinstance(value, datetime.date) else value
-
-
 def _date(value: Any) -> str:
-    """Refuse what is not a day of the calendar, or one of another age."""
+    """Refuse what is not a day of the calendar, or one of another age; YAML makes a date of its text."""
+    value = value.isoformat() if isinstance(value, datetime.date) else str(value)
     try:
-        if not isinstance(value, str) or not re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", value):
+        if not re.fullmatch(r"(19|20|21)[0-9]{2}-[0-9]{2}-[0-9]{2}", value):
             raise ValueError
         datetime.date.fromisoformat(value)
     except ValueError:
-        raise ValueError("is no date; allowed: year, month and day, such as 2026-01-31") from None
-    if not _FIRST_DAY <= value <= _LAST_DAY:
-        raise ValueError(f"is no day of a publication; allowed: from {_FIRST_DAY} to {_LAST_DAY}")
+        raise ValueError("is no date; allowed: year, month and day from 1900 to 2199, such as 2026-01-31") from None
     return value
 
 
 def _version(value: Any) -> str:
-    """Refuse a version that cannot be part of a folder's name; a number is refused, for 1.10 would become 1.1."""
+    """Refuse a version that cannot be part of a folder's name; a number is refused, since 1.10 would become 1.1."""
     if not isinstance(value, str) or not re.fullmatch(r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?", value):
         raise ValueError(
             "is no version; allowed: letters, digits and . + - _ between them, in quotes if it looks like a number, "
@@ -238,31 +155,19 @@ def _version(value: Any) -> str:
     return value
 
 
-def _text(pattern: str, example: str):
-    return WithJsonSchema({"type": "string", "pattern": pattern, "examples": [example]})
+def _example(check: Callable[[Any], str], example: str):
+    """Type of a text that is checked, with an example for the schema."""
+    return Annotated[str, BeforeValidator(check), WithJsonSchema({"type": "string", "examples": [example]})]
 
 
-Orcid = Annotated[
-    str, BeforeValidator(_orcid), _text(r"^(https://orcid\.org/)?\d{4}-\d{4}-\d{4}-\d{3}[\dX]$", "0000-0002-1825-0097")
-]
-Ror = Annotated[
-    str, BeforeValidator(_ror), _text(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$", "https://ror.org/03yrm5c26")
-]
-Doi = Annotated[str, BeforeValidator(_doi), _text(r"10\.\d{4,9}/", "10.1007/s11249-017-0900-2")]
-Identifier = Annotated[str, BeforeValidator(_identifier), _text(r"^\S+$", "10.1007/s11249-017-0900-2")]
-FunderId = Annotated[
-    str,
-    BeforeValidator(_funder),
-    _text(r"^(https?://ror\.org/)?0[A-Za-z0-9]{6}\d{2}$|10\.\d{4,9}/", "https://ror.org/00k4n6c32"),
-]
-Community = Annotated[str, BeforeValidator(_community), _text(r"^[a-z0-9_-]+$", "contact-mechanics")]
-# Of validators before, the last one comes first.
-Date = Annotated[
-    str, BeforeValidator(_date), BeforeValidator(_day_as_text), _text(r"^\d{4}-\d{2}-\d{2}$", "2026-01-31")
-]
-Version = Annotated[str, BeforeValidator(_version), _text(r"^[0-9A-Za-z][0-9A-Za-z.+_-]*$", "1.0.0")]
-
-
+Orcid = _example(_orcid, "0000-0002-1825-0097")
+Ror = _example(_ror, "https://ror.org/03yrm5c26")
+Doi = _example(_doi, "10.1007/s11249-017-0900-2")
+Identifier = _example(_identifier, "10.1007/s11249-017-0900-2")
+FunderId = _example(_funder, "https://ror.org/00k4n6c32")
+Community = _example(_community, "contact-mechanics")
+Date = _example(_date, "2026-01-31")
+Version = _example(_version, "1.0.0")
 Line = Annotated[Text, BeforeValidator(_line)]
 Prose = Annotated[Text, BeforeValidator(_prose)]
 
@@ -287,10 +192,8 @@ class Author(Section):
                 f"{self.model_dump(exclude_none=True)} is neither a person nor an organisation; allowed: family_names "
                 "and given_names of a person, or name of an organisation"
             )
-        if not person and self.orcid is not None:
-            raise ValueError("an organisation has no ORCID; allowed: orcid beside family_names and given_names")
-        if person and self.ror is not None and self.affiliation is None:
-            raise ValueError("a person has no ROR; allowed: ror beside affiliation, the institution that it identifies")
+        if (self.orcid and not person) or (self.ror and person and not self.affiliation):
+            raise ValueError("allowed: orcid of a person; ror of an organisation, or beside a person's affiliation")
         return self
 
     @property
@@ -347,49 +250,27 @@ class KnownFailure(Section):
     )
 
 
-def _same_author(one: Author, other: Author) -> bool:
-    """Whether two entries are one: the same ORCID, or the same name and no ORCIDs that tell them apart."""
-    if one.orcid and other.orcid:
-        return one.orcid == other.orcid
-    return _alike(one.family_names, one.given_names, one.name) == _alike(
-        other.family_names, other.given_names, other.name
-    )
-
-
-def _same_funding(one: Funding, other: Funding) -> bool:
-    """Whether two entries are one: the same award of the same funder."""
-    if one.funder_id and other.funder_id:
-        same_funder = one.funder_id.lower() == other.funder_id.lower()
-    else:
-        same_funder = _alike(one.funder) == _alike(other.funder)
-    if one.award_number and other.award_number:
-        return same_funder and _alike(one.award_number) == _alike(other.award_number)
-    return same_funder and _award(one) == _award(other)
-
-
-def _award(funding: Funding) -> tuple[str, ...]:
-    return _alike(funding.award_number, funding.award_title, funding.award_url)
-
-
-def _same_relation(one: RelatedIdentifier, other: RelatedIdentifier) -> bool:
-    """Whether two entries say the same of the same thing; capitals make no other DOI or arXiv identifier."""
-
-    def said(related):
-        identifier = related.identifier
-        return related.relation, identifier if _URL.fullmatch(identifier) else identifier.lower()
-
-    return said(one) == said(other)
-
-
-Authors = Annotated[list[Author], _once("author", _same_author, lambda author: author.full_name)]
-Fundings = Annotated[list[Funding], _once("award of a funder", _same_funding, lambda funding: funding.funder)]
+Authors = Annotated[
+    list[Author],
+    _once("author", lambda each: (each.orcid or each.full_name,), lambda each: each.full_name),
+]
+Fundings = Annotated[
+    list[Funding],
+    _once(
+        "award of a funder",
+        lambda each: (each.funder_id or each.funder, each.award_number or (each.award_title, each.award_url)),
+        lambda each: each.funder,
+    ),
+]
 Related = Annotated[
     list[RelatedIdentifier],
-    _once("relation to an identifier", _same_relation, lambda related: f"{related.relation} {related.identifier}"),
+    _once(
+        "relation to an identifier",
+        lambda each: (each.relation, each.identifier),
+        lambda each: f"{each.relation} {each.identifier}",
+    ),
 ]
-Failures = Annotated[
-    list[KnownFailure], _once("run", lambda one, other: one.run == other.run, lambda failure: failure.run)
-]
+Failures = Annotated[list[KnownFailure], _once("run", lambda each: (each.run,), lambda each: each.run)]
 
 
 class Publication(Section):

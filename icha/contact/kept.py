@@ -13,7 +13,7 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 
@@ -26,7 +26,7 @@ _OF = "of.txt"
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class Kept(Generic[S]):
     """A `ContactModel` that looks for an equilibrium only if its folder does not have it yet.
 
     contact : the model. of : what tells it apart from all others of its kind. folder : of equilibria, one file each.

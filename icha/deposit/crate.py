@@ -9,11 +9,10 @@ made.
 
 import hashlib
 import json
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from graphlib import CycleError, TopologicalSorter
+from graphlib import TopologicalSorter
 from importlib.metadata import version
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
@@ -23,9 +22,8 @@ from rocrate.rocrate import ROCrate
 from icha.configuration.publication import Author, Publication
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.citation import web_address
-from icha.deposit.deposit_files import CRATE, README, SOURCE
-from icha.deposit.licences import known_licence
+from icha.deposit.metadata import known_licence, web_address
+from icha.deposit.verify import CRATE, README, SOURCE
 from icha.support.atomic_files import whole_file
 
 _PROGRAM = f"{SOURCE}/"
@@ -50,33 +48,16 @@ _FORMATS = {
     ".csv": "text/csv",
     ".html": "text/html",
     ".json": "application/json",
-    ".jsonl": "application/jsonl",
     ".lock": "application/toml",
     ".md": "text/markdown",
     ".nc": "application/netcdf",
     ".pdf": "application/pdf",
     ".png": "image/png",
     ".py": "text/x-python",
-    ".smk": "text/plain",
-    ".svg": "image/svg+xml",
-    ".toml": "application/toml",
-    ".tsv": "text/tab-separated-values",
     ".txt": "text/plain",
     ".yaml": "application/yaml",
-    ".yml": "application/yaml",
     "": "text/plain",
 }
-# Publications are cited; what is not one is used or mentioned.
-_PUBLICATIONS = (
-    "Book",
-    "BookChapter",
-    "ConferencePaper",
-    "Dissertation",
-    "JournalArticle",
-    "Preprint",
-    "Report",
-    "Text",
-)
 
 
 class Job(NamedTuple):
@@ -113,7 +94,7 @@ def write_crate(
     Parameters
     ----------
     folder : the deposit; all files of `checksums` are there.
-    publication : what the deposit says of itself; complete.
+    publication : metadata of the deposit; complete.
     jobs : those that made the results, in any order.
     campaign : its name.
     revision : the state of the program, the source of which is in `source/`.
@@ -122,95 +103,41 @@ def write_crate(
     Raises
     ------
     ValueError
-        If a job names a file that is not in the deposit, if two jobs made the same file, or if files are made from
-        each other.
+        If a job names a file that is not in the deposit.
     """
-    sizes = {path: (Path(folder) / path).stat().st_size for path in checksums}
-    metadata = crate_metadata(publication, jobs, campaign=campaign, revision=revision, checksums=checksums, sizes=sizes)
-    with whole_file(Path(folder) / CRATE) as part:
-        part.write_text(json.dumps(metadata, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-
-
-def crate_metadata(
-    publication: Publication,
-    jobs: Iterable[Job],
-    *,
-    campaign: str,
-    revision: str,
-    checksums: Mapping[str, str],
-    sizes: Mapping[str, int],
-) -> dict[str, Any]:
-    """The content of `ro-crate-metadata.json`; arguments and errors as of `write_crate`, `sizes` in bytes."""
     jobs = sorted(jobs, key=lambda job: job.outputs)
-    steps = _steps(jobs, checksums)
+    for job in jobs:
+        if missing := {*job.inputs, *job.outputs, job.script} - set(checksums):
+            raise ValueError(f"{min(missing)}: a file of rule {job.rule} ({job.outputs[0]}) is not in the deposit")
     crate = ROCrate()
     crate.metadata.extra_terms.update(_TERMS)
     crate.metadata["conformsTo"] = [{"@id": crate.metadata.PROFILE}, {"@id": _WORKFLOW_PROFILE}]
     _describe(crate, publication, campaign)
-
     shown = {path for path in checksums if not path.startswith(_PROGRAM)}
-    shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in steps)} & set(checksums)
-    files = {path: _add_file(crate, path, sizes[path], checksums[path]) for path in sorted(shown)}
+    shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in jobs)} & set(checksums)
+    files = {path: _add_file(crate, path, Path(folder, path), checksums[path]) for path in sorted(shown)}
     _add_source(crate, files, revision)
     engine = _engine(crate)
-    workflow = _describe_workflow(crate, files, engine, revision, steps)
-    made = {path for job in jobs for path in job.outputs}
-    given = sorted({path for job in jobs for path in job.inputs} - made | {CONFIGURATION})
-    run = _add(
-        crate,
-        "#campaign",
-        "CreateAction",
-        name=f"Campaign {campaign}",
-        description=publication.title,
-        instrument=workflow,
-        object=[files[path] for path in given],
-        result=[files[path] for path in sorted(made)],
-        actionStatus=_COMPLETED,
-    )
-    actions, controls = [], []
-    for job in jobs:
-        action, control = _add_job(crate, job, files)
-        actions.append(action)
-        controls.append(control)
-    _add(
-        crate,
-        "#organised",
-        "OrganizeAction",
-        name=f"Campaign {campaign}, organised by {engine['name']}",
-        instrument=engine,
-        object=controls,
-        result=run,
-        actionStatus=_COMPLETED,
-    )
+    workflow = _describe_workflow(crate, files, engine, revision, _steps(jobs))
+    _add_jobs(crate, jobs, files, workflow, engine, f"Campaign {campaign}", publication.title)
     _set(crate.root_dataset, mainEntity=workflow)
-    crate.root_dataset.append_to("mentions", [run, *actions])
     if README in files:
         _set(files[README], about=crate.root_dataset)
-    return crate.metadata.generate()
+    with whole_file(Path(folder) / CRATE) as part:
+        part.write_text(json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    Path(folder, CRATE).chmod(0o644)
 
 
-def _steps(jobs: Sequence[Job], checksums: Mapping[str, str]) -> list[Job]:
-    """A job of every rule, in an order in which they can be run, after a look at whether the jobs make sense."""
-    if not jobs:
-        raise ValueError("no job: the deposit has no results whose origin could be told")
-    named = [(path, job) for job in jobs for path in (*job.inputs, *job.outputs, job.script)]
-    for path, job in [*named, (CONFIGURATION, jobs[0])]:
-        if path not in checksums:
-            raise ValueError(f"{path}: a file of rule {job.rule} ({job.outputs[0]}) is not in the deposit")
-    twice = [path for path, times in Counter(path for job in jobs for path in job.outputs).items() if times > 1]
-    if twice:
-        raise ValueError(f"{twice[0]}: is made by more than one job")
+def _steps(jobs: Sequence[Job]) -> list[Job]:
+    """Return one job of every rule, in an order in which the rules can run."""
     maker = {path: job for job in jobs for path in job.outputs}
     before = {job.outputs[0]: {maker[path].outputs[0] for path in job.inputs if path in maker} for job in jobs}
     depth: dict[str, int] = {}
+    for output in TopologicalSorter(before).static_order():
+        depth[output] = 1 + max((depth[earlier] for earlier in before[output]), default=0)
     latest: dict[str, int] = {}
-    try:
-        for output in TopologicalSorter(before).static_order():
-            depth[output] = 1 + max((depth[earlier] for earlier in before[output]), default=0)
-            rule = maker[output].rule
-            latest[rule] = max(latest.get(rule, 0), depth[output])
-    except CycleError as error:
-        raise ValueError(f"{error.args[1][0]}: is made from itself") from error
+    for job in jobs:
+        latest[job.rule] = max(latest.get(job.rule, 0), depth[job.outputs[0]])
     first = {job.rule: job for job in reversed(jobs)}
     return [first[rule] for rule in sorted(latest, key=lambda rule: (latest[rule], rule))]
 
@@ -223,7 +150,6 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
         for address, (name, number) in _RUN_PROFILES.items()
     ]
     profiles.append(_add(crate, _WORKFLOW_PROFILE, "CreativeWork", name="Workflow RO-Crate", version="1.0"))
-    funders, grants = _funding(crate, publication)
     _set(
         crate.root_dataset,
         name=publication.title,
@@ -236,18 +162,8 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
         conformsTo=profiles,
         keywords=publication.keywords,
         identifier=publication.doi and web_address(publication.doi),
-        funder=funders,
-        funding=grants,
+        citation=_add_paper(crate),
     )
-    related: dict[str, list[Entity]] = {"citation": [_add_paper(crate)]}
-    for each in publication.related_identifiers:
-        cited = each.resource is None or each.resource in _PUBLICATIONS
-        key = "isBasedOn" if each.relation == "IsDerivedFrom" else "citation" if cited else "mentions"
-        # A dataset, too, is no more than a work here: what is called a Dataset is part of the crate.
-        kind = "ScholarlyArticle" if each.resource in _PUBLICATIONS else "CreativeWork"
-        address = web_address(each.identifier)
-        related.setdefault(key, []).append(_add(crate, address, kind, name=each.identifier, identifier=address))
-    _set(crate.root_dataset, **related)
 
 
 def _add_author(crate: ROCrate, author: Author) -> Entity:
@@ -282,29 +198,10 @@ def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
     return _add(crate, address or f"#organisation/{quote(name)}", "Organization", name=name, url=address)
 
 
-def _funding(crate: ROCrate, publication: Publication) -> tuple[list[Entity], list[Entity]]:
-    """Funders, and their grants where they are named."""
-    funders, grants = {}, {}
-    for each in publication.funding:
-        funder = _add_organisation(crate, each.funder, each.funder_id and web_address(each.funder_id))
-        funders[funder.id] = funder
-        award = each.award_number or each.award_title
-        if award:
-            grant = _add(
-                crate,
-                web_address(each.award_url) if each.award_url else f"#grant/{quote(each.funder)}/{quote(award)}",
-                "Grant",
-                name=each.award_title or award,
-                identifier=award,
-                funder=funder,
-            )
-            grants[grant.id] = grant
-    return list(funders.values()), list(grants.values())
-
-
-def _add_file(crate: ROCrate, path: str, size: int, sha256: str) -> File:
-    known = _FORMATS.get(PurePosixPath(path).suffix, "application/octet-stream")
-    properties = {"name": path, "contentSize": str(size), "sha256": sha256, "encodingFormat": known}
+def _add_file(crate: ROCrate, path: str, file: Path, sha256: str) -> File:
+    known = _FORMATS.get(file.suffix, "application/octet-stream")
+    size = str(file.stat().st_size)
+    properties = {"name": path, "contentSize": size, "sha256": sha256, "encodingFormat": known}
     return crate.add(File(crate, dest_path=path, properties=properties))
 
 
@@ -337,7 +234,15 @@ def _describe_workflow(
     crate: ROCrate, files: Mapping[str, File], engine: Entity, revision: str, steps: Sequence[Job]
 ) -> Entity:
     """What the workflow's file is besides a file: a program, with tools and steps."""
-    configuration = _add_parameter(crate, "#configuration", "File", valueRequired=True)
+    configuration = _add(
+        crate,
+        "#configuration",
+        "FormalParameter",
+        name="configuration",
+        additionalType="File",
+        conformsTo=_add(crate, f"{_BIOSCHEMAS}/FormalParameter/1.0-RELEASE", "CreativeWork"),
+        valueRequired=True,
+    )
     _set(files[CONFIGURATION], exampleOfWork=configuration)
     tools = {job.script: files[job.script] for job in steps}
     for job in steps:
@@ -375,30 +280,65 @@ def _describe_workflow(
     return workflow
 
 
-def _add_job(crate: ROCrate, job: Job, files: Mapping[str, File]) -> tuple[Entity, Entity]:
-    """What a job did, and the step of the workflow that had it done."""
-    name = quote(job.outputs[0])
-    action = _add(
+def _add_jobs(
+    crate: ROCrate,
+    jobs: Sequence[Job],
+    files: Mapping[str, File],
+    workflow: Entity,
+    engine: Entity,
+    campaign: str,
+    title: str,
+) -> None:
+    """Add the run of the workflow, every job in it, and the step of the workflow that started each job."""
+    made = {path for job in jobs for path in job.outputs}
+    given = sorted({path for job in jobs for path in job.inputs} - made | {CONFIGURATION})
+    run = _add(
         crate,
-        f"#job/{name}",
+        "#campaign",
         "CreateAction",
-        name=f"{job.rule}: {job.outputs[0]}",
-        description=job.description,
-        instrument=files[job.script],
-        object=[*(files[path] for path in job.inputs), *(_add_value(crate, job, *each) for each in job.parameters)],
-        result=[files[path] for path in job.outputs],
+        name=campaign,
+        description=title,
+        instrument=workflow,
+        object=[files[path] for path in given],
+        result=[files[path] for path in sorted(made)],
         actionStatus=_COMPLETED,
     )
-    control = _add(
+    actions, controls = [], []
+    for job in jobs:
+        name = quote(job.outputs[0])
+        action = _add(
+            crate,
+            f"#job/{name}",
+            "CreateAction",
+            name=f"{job.rule}: {job.outputs[0]}",
+            description=job.description,
+            instrument=files[job.script],
+            object=[*(files[path] for path in job.inputs), *(_add_value(crate, job, *each) for each in job.parameters)],
+            result=[files[path] for path in job.outputs],
+            actionStatus=_COMPLETED,
+        )
+        actions.append(action)
+        control = _add(
+            crate,
+            f"#control/{name}",
+            "ControlAction",
+            name=f"step {job.rule}: {job.outputs[0]}",
+            instrument={"@id": f"{WORKFLOW}#{job.rule}"},
+            object=action,
+            actionStatus=_COMPLETED,
+        )
+        controls.append(control)
+    _add(
         crate,
-        f"#control/{name}",
-        "ControlAction",
-        name=f"step {job.rule}: {job.outputs[0]}",
-        instrument={"@id": f"{WORKFLOW}#{job.rule}"},
-        object=action,
+        "#organised",
+        "OrganizeAction",
+        name=f"{campaign}, organised by {engine['name']}",
+        instrument=engine,
+        object=controls,
+        result=run,
         actionStatus=_COMPLETED,
     )
-    return action, control
+    crate.root_dataset.append_to("mentions", [run, *actions])
 
 
 def _add_value(crate: ROCrate, job: Job, name: str, value: str) -> Entity:
@@ -406,13 +346,6 @@ def _add_value(crate: ROCrate, job: Job, name: str, value: str) -> Entity:
     digest = hashlib.sha256(value.encode()).hexdigest()[:16]
     key = f"#{job.rule}/{quote(name)}/{digest}"
     return crate.dereference(key) or _add(crate, key, "PropertyValue", name=name, value=value)
-
-
-def _add_parameter(crate: ROCrate, key: str, kind: str, **properties: Any) -> Entity:
-    """A parameter of the workflow."""
-    profile = _add(crate, f"{_BIOSCHEMAS}/FormalParameter/1.0-RELEASE", "CreativeWork")
-    name = key.removeprefix("#")
-    return _add(crate, key, "FormalParameter", name=name, additionalType=kind, conformsTo=profile, **properties)
 
 
 def _add(crate: ROCrate, key: str, kind: str | list[str], **properties: Any) -> Entity:

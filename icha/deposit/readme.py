@@ -1,13 +1,18 @@
-"""README.md of a deposit: what it is, what is in it, how far it can be trusted, and how to open and rerun it."""
+"""What a deposit holds, for readers: README.md, and data_dictionary.csv with every variable of every netCDF file."""
 
+import csv
+import io
+import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 from urllib.parse import quote
 
 import jinja2
+import netCDF4
 import numpy as np
 import xarray as xr
 
@@ -19,17 +24,26 @@ from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
+from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
-from icha.deposit.attributes import acknowledgement
-from icha.deposit.citation import paragraphs, web_address
-from icha.deposit.deposit_files import COMPUTED
-from icha.deposit.dictionary import Entry
-from icha.deposit.licences import Licence
+from icha.deposit.metadata import acknowledgement, known_licence, paragraphs, web_address
+from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.needs import further_software
 from icha.support import in_words
 
 _TEMPLATE = "README.md.jinja"
+# Placeholders for what differs between files of one kind.
+_PLACEHOLDERS = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
+_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "model_folder": ""}
+# Kinds of files by the beginning of a path and the number of its parts.
+_KINDS = {
+    (pattern.partition("/{")[0], len(PurePosixPath(kind).parts)): kind
+    for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
+    for kind in {pattern.format(**_PLACEHOLDERS | {"model_folder": folder}) for folder in ("", "<model>/")}
+}
+# Numbers of a variable that are read at once.
+_BLOCK = 2**22
 # What lies in a deposit, in the order of interest: only what is there is listed.
 _PARTS = {
     "dataset": "all runs in one file, a group per study",
@@ -56,58 +70,117 @@ _SPECIAL = re.compile(r"[\\`*\[\]<>|~$#]|(?<![^\W_])_|_(?![^\W_])|&(?=[#\w])")
 _SPECIAL_FIRST = re.compile(r"^(\d*)((?<!\d)[-+]|(?<=\d)[.)])(?!\w)")
 
 
-class Part(NamedTuple):
-    """What lies under a path of a deposit; `size` in bytes."""
+class Entry(NamedTuple):
+    """A variable of all files of one kind.
 
-    path: str
-    content: str
+    Attributes
+    ----------
+    file : path of the files, with placeholders for what differs.
+    group, variable, dimensions, type, units, long_name, flags, missing, comment : as in the files.
+    files : number of files with the variable.
+    smallest, largest : over all values that are not missing; None for text.
+    """
+
+    file: str
+    group: str
+    variable: str
+    dimensions: str
+    type: str
+    units: str
+    long_name: str
+    flags: str
+    missing: str
+    comment: str
     files: int
-    size: int
+    smallest: float | int | None
+    largest: float | int | None
 
 
-class StudyDesign(NamedTuple):
-    """The cells of a study, and what has become of them."""
+def data_dictionary(folder: Path, files: Iterable[str]) -> list[Entry]:
+    """Describe the variables of netCDF files; variables that agree in all files of one kind have one entry.
 
-    name: str
-    models: tuple[str, ...]
-    surfaces: tuple[str, ...]
-    seeds: tuple[int, ...]
-    rms_slopes: tuple[float, ...]
-    materials: tuple[str, ...]
-    status: Mapping[str, int]
-
-    @property
-    def runs(self) -> int:
-        """Number of the runs that were asked for."""
-        return sum(self.status.values()) - self.status[STATUS_MEANINGS[NOT_IN_DESIGN]]
-
-
-class IncompleteRun(NamedTuple):
-    """A run that did not reach the end of its path: the steps that it reached, why no more, and why it is published."""
-
-    labels: RunLabels
-    steps: int
-    failure: str
-    reason: str
+    Parameters
+    ----------
+    folder : the folder of the files.
+    files : their paths from there; files that are not netCDF are skipped.
+    """
+    found: dict[tuple, list] = {}
+    for name in sorted(files):
+        if not name.endswith(".nc"):
+            continue
+        with netCDF4.Dataset(folder / name) as file:
+            file.set_auto_scale(False)
+            for group in _groups(file):
+                for variable in group.variables.values():
+                    found.setdefault((kind_of(name), group.path, *_described(variable)), []).append(_range(variable))
+    entries = []
+    for key, ranges in found.items():
+        smallest, largest = ([value for value in values if value is not None] for values in zip(*ranges, strict=True))
+        entries.append(Entry(*key, len(ranges), min(smallest, default=None), max(largest, default=None)))
+    return entries
 
 
-class ModelError(NamedTuple):
-    """Errors of the model against boundary elements, smallest and largest over loads, surfaces and slopes."""
+def dictionary_csv(entries: Iterable[Entry]) -> str:
+    """Write the dictionary as a table with headings, commas and quotes (RFC 4180 except for its line ends)."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(Entry._fields)
+    table.writerows(["" if value is None else value for value in entry] for entry in entries)
+    return text.getvalue()
 
-    entry: str
-    study: str
-    material: str
-    loads: tuple[float, float]
-    area: tuple[float, float]
-    separation: tuple[float, float]
-    overlap: tuple[float, float]
+
+def kind_of(path: str) -> str:
+    """Return the path with placeholders for what differs between files of its kind."""
+    parts = PurePosixPath(path).parts
+    kinds = (_KINDS.get((beginning, len(parts))) for beginning in ("/".join(parts[:2]), parts[0]))
+    return next(filter(None, kinds), path)
+
+
+def _groups(group) -> Iterator[netCDF4.Dataset]:
+    yield group
+    for inner in group.groups.values():
+        yield from _groups(inner)
+
+
+def _described(variable) -> tuple[str, ...]:
+    """Name, dimensions, type, units, long name, flags, meaning of missing values, and comment of a variable."""
+    attributes = {name: variable.getncattr(name) for name in variable.ncattrs()}
+    dimensions, kind = variable.dimensions, np.dtype(variable.dtype)
+    if kind == np.dtype("S1"):  # text, kept as characters along a last dimension
+        dimensions = dimensions[:-1]
+    values = np.atleast_1d(attributes.get("flag_values", []))
+    meanings = str(attributes.get("flag_meanings", "")).split()
+    missing = str(attributes.get("missing", ""))
+    if "_FillValue" in attributes:
+        missing = f"{attributes['_FillValue']!s}: {missing or 'no value, see status and step_count'}"
+    return (
+        variable.name,
+        " ".join(dimensions),
+        "text" if kind == np.dtype("S1") or kind.kind in "OU" else kind.name,
+        *(str(attributes.get(name, "")) for name in ("units", "long_name")),
+        ", ".join(f"{value}: {meaning}" for value, meaning in zip(values, meanings, strict=False)),
+        missing,
+        str(attributes.get("comment", "")),
+    )
+
+
+def _range(variable) -> tuple[float | int | None, float | int | None]:
+    """Return the smallest and the largest value of a variable of numbers, read block by block."""
+    if np.dtype(variable.dtype).kind not in "fiu":
+        return None, None
+    rows = max(1, _BLOCK // max(1, math.prod(variable.shape[1:])))
+    smallest, largest = [], []
+    for begin in range(0, variable.shape[0] if variable.shape else 1, rows):
+        block = np.ma.masked_invalid(variable[begin : begin + rows] if variable.shape else variable[...])
+        if block.count():
+            smallest.append(block.min().item())
+            largest.append(block.max().item())
+    return min(smallest, default=None), max(largest, default=None)
 
 
 def readme(
-    publication: Publication,
-    *,
     campaign: Campaign,
-    licence: Licence,
+    *,
     revision: str,
     dataset: xr.DataTree,
     checks: Sequence[Check],
@@ -116,31 +189,34 @@ def readme(
     sizes: Mapping[str, int],
     cost: Cost,
 ) -> str:
-    """The page, in Markdown.
+    """Write the page, in Markdown.
 
     Parameters
     ----------
-    publication : what the deposit says of itself, with version, date, authors, title, summary and licence.
-    campaign, dataset, checks, model_error : what was asked for, and what came of it.
-    licence : that of the data.
+    campaign, dataset, checks, model_error : what was asked for, with complete metadata, and its results.
     revision : that of the source.
     dictionary : the variables of all files.
     sizes : bytes of every file, by its path in the deposit.
     cost : what computing the whole campaign is expected to take.
     """
+    publication = campaign.published()
     text = _template().render(
         publication=publication,
-        citation=citation(publication),
+        citation=_citation(publication),
         paper=MODEL_PAPER,
         summary=paragraphs(publication.summary),
-        licence=licence,
+        licence=known_licence(publication.license),
         revision=revision,
         variables=_short_dictionary(dictionary, campaign.name),
         cost=cost,
         addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
+        parts=_parts(sizes),
+        files=len(sizes),
+        size=sum(sizes.values()),
+        computed=sum(size for path, size in sizes.items() if path.split("/")[0] in COMPUTED),
+        errors=_model_errors(model_error) if model_error is not None else [],
         **_asked(campaign),
-        **_outcome(publication, dataset, checks, model_error),
-        **_content(sizes),
+        **_outcome(publication, dataset, checks),
     )
     return text.rstrip() + "\n"
 
@@ -169,12 +245,15 @@ def _template() -> jinja2.Template:
 
 
 def _asked(campaign: Campaign) -> dict:
-    """The campaign as its author wrote it."""
-    surfaces = _written(campaign, "surfaces")
+    """The campaign as its author wrote it, without the variants that studies made of surfaces and materials."""
+    surfaces, materials = (
+        {name: each for name, each in getattr(campaign, section).items() if campaign.origin(section, name) == name}
+        for section in ("surfaces", "materials")
+    )
     return {
         "campaign": campaign,
         "surfaces": surfaces,
-        "materials": _written(campaign, "materials"),
+        "materials": materials,
         "self_affine": any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
         "sides": _known_of(surfaces, campaign.period, "{:.4g}".format),
         "grids": _known_of(surfaces, campaign.grid, str),
@@ -185,68 +264,76 @@ def _asked(campaign: Campaign) -> dict:
     }
 
 
-def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check], model_error) -> dict:
-    """Runs that are complete and that are not, and how far both can be trusted."""
-    designs = study_designs(dataset)
-    complete = _runs_of_status(dataset, COMPLETE)
-    incomplete = [*_runs_of_status(dataset, INCOMPLETE), *_runs_of_status(dataset, FAILED_CHECKS)]
+def _known_of(surfaces: Iterable[str], ask, form) -> dict[str, str]:
+    """Properties of surfaces; empty for files that have not been read."""
+    found = {}
+    for name in surfaces:
+        try:
+            found[name] = form(ask(name))
+        except AttributeError:
+            found[name] = ""
+    return found
+
+
+def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
+    """Complete and incomplete runs, and their checks."""
+    designs = _study_designs(dataset)
     known = {failure.run: failure.reason for failure in publication.known_failures}
-    example = (complete or incomplete)[0][0]
+    complete = _runs_of_status(dataset, COMPLETE)
+    incomplete = _runs_of_status(dataset, INCOMPLETE) | _runs_of_status(dataset, FAILED_CHECKS)
+    example = next(iter(complete or incomplete))
     study = dataset[example.study].to_dataset()
-    incomplete = [IncompleteRun(*run, known.get(str(run[0]), "")) for run in incomplete]
+    meaning = "0 if the run reached the end of its path, else 1"
     return {
         "designs": designs,
-        "partial": [study.name for study in designs if study.status[STATUS_MEANINGS[NOT_IN_DESIGN]]],
-        "incomplete": incomplete,
+        "partial": [study["name"] for study in designs if study["status"][STATUS_MEANINGS[NOT_IN_DESIGN]]],
+        "incomplete": [
+            {"labels": labels, "steps": steps, "failure": failure, "reason": known.get(str(labels), "")}
+            for labels, (steps, failure) in incomplete.items()
+        ],
         "example": example,
         # Where surfaces have slopes of their own, these have no index by which to select.
         "slope_place": run_place(study, example)["rms_slope"] if study["rms_slope"].ndim == 2 else None,
-        "checks": [_meant(check) for check in worst(checks)],
+        "checks": [replace(each, description=meaning) if each.name == COMPLETED else each for each in worst(checks)],
         "failed": [check for check in checks if not check.passed and check.name != COMPLETED],
         "known": known,
-        "count": _count_by_name(checks),
+        "count": Counter(check.name for check in checks),
         "passed": sum(check.passed for check in checks),
         "total": len(checks),
-        "errors": model_errors(model_error) if model_error is not None else [],
     }
 
 
-def _content(sizes: Mapping[str, int]) -> dict:
-    """The files and their bytes."""
-    return {
-        "parts": _parts(sizes),
-        "files": len(sizes),
-        "size": sum(sizes.values()),
-        "computed": sum(size for path, size in sizes.items() if path.split("/")[0] in COMPUTED),
-    }
-
-
-def citation(publication: Publication) -> str:
-    """How to cite a deposit, in a line, but for its DOI."""
+def _citation(publication: Publication) -> str:
     authors = "; ".join(author.sorted_name for author in publication.authors)
     return f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set."
 
 
-def study_designs(dataset: xr.DataTree) -> list[StudyDesign]:
-    """The design of every study in a campaign dataset."""
-    found = []
+def _study_designs(dataset: xr.DataTree) -> list[dict]:
+    """Labels of every study, and the number of its cells with each status."""
+    designs = []
     for name, study in dataset.children.items():
-        status = study["status"].values
-        found.append(
-            StudyDesign(
-                name,
-                *(
-                    tuple(slopes_of(study) if label == "rms_slope" else study[label].values.tolist())
-                    for label in LABELS
-                ),
-                {meaning: int(np.count_nonzero(status == k)) for k, meaning in enumerate(STATUS_MEANINGS)},
-            )
-        )
+        counts = Counter(study["status"].values.ravel().tolist())
+        status = {text: counts[k] for k, text in enumerate(STATUS_MEANINGS)}
+        runs = sum(counts.values()) - counts[NOT_IN_DESIGN]
+        labels = {each: slopes_of(study) if each == "rms_slope" else study[each].values.tolist() for each in LABELS}
+        designs.append({"name": name, "status": status, "runs": runs, **labels})
+    return designs
+
+
+def _runs_of_status(dataset: xr.DataTree, status: int) -> dict[RunLabels, tuple[int, str]]:
+    """Runs of a status in a campaign dataset: number of steps, and the reason for a failure."""
+    found = {}
+    for name, node in dataset.children.items():
+        study = node.to_dataset()
+        for labels in runs_of_status(study, name, (status,)):
+            place = run_place(study, labels)
+            steps, failure = (study[each].isel(place) for each in ("step_count", "failure"))
+            found[labels] = int(steps), str(failure.values)
     return found
 
 
-def model_errors(tree: xr.DataTree) -> list[ModelError]:
-    """The errors of the model for every entry of boundary elements and every material."""
+def _model_errors(tree: xr.DataTree) -> list[dict]:
+    """Smallest and largest errors of the model over loads, surfaces and slopes, for every entry and material."""
     found = []
     for entry, node in tree.children.items():
         data = node.to_dataset()
@@ -255,43 +342,14 @@ def model_errors(tree: xr.DataTree) -> list[ModelError]:
             there = np.isfinite(own["area_error_mean"])
             if not bool(there.any()):
                 continue
-            loads = own["reduced_pressure"].broadcast_like(there).where(there)
-            ranges = [
-                (float(values.min()), float(values.max()))
-                for values in (
-                    loads,
-                    *(own[name] for name in ("area_error_mean", "separation_error_mean", "jaccard_mean")),
-                )
-            ]
-            found.append(ModelError(entry, str(data.attrs["study"]), material, *ranges))
-    return found
-
-
-def _runs_of_status(dataset: xr.DataTree, asked: int) -> list[tuple[RunLabels, int, str]]:
-    """The runs of a status in a campaign dataset: number of steps, and the reason why they failed, if they did."""
-    found = []
-    for name, node in dataset.children.items():
-        study = node.to_dataset()
-        for labels in runs_of_status(study, name, (asked,)):
-            place = run_place(study, labels)
-            steps, failure = (study[each].isel(place) for each in ("step_count", "failure"))
-            found.append((labels, int(steps), str(failure.values)))
-    return found
-
-
-def _meant(check: Check) -> Check:
-    """The check with words for what it is in general: where a run failed, it has those of that run."""
-    return (
-        replace(check, description="0 if the run reached the end of its path, else 1")
-        if check.name == COMPLETED
-        else check
-    )
-
-
-def _count_by_name(checks: Iterable[Check]) -> dict[str, int]:
-    found: dict[str, int] = {}
-    for check in checks:
-        found[check.name] = found.get(check.name, 0) + 1
+            values = {
+                "loads": own["reduced_pressure"].broadcast_like(there).where(there),
+                "area": own["area_error_mean"],
+                "separation": own["separation_error_mean"],
+                "overlap": own["jaccard_mean"],
+            }
+            ranges = {name: (float(each.min()), float(each.max())) for name, each in values.items()}
+            found.append({"entry": entry, "study": str(data.attrs["study"]), "material": material, **ranges})
     return found
 
 
@@ -299,38 +357,23 @@ def _short_dictionary(dictionary: Sequence[Entry], campaign: str) -> list[Entry]
     """The variables of the campaign dataset along the path, and those that tell runs apart, each once."""
     found = {}
     for entry in dictionary:
-        axes = entry.dimensions.split()
-        if entry.file == f"dataset/{campaign}.nc" and "spot" not in axes and "event" not in axes:
+        if entry.file == f"dataset/{campaign}.nc" and not {"spot", "event"} & set(entry.dimensions.split()):
             found.setdefault(entry.variable, entry)
     return list(found.values())
 
 
-def _parts(sizes: Mapping[str, int]) -> list[Part]:
+def _parts(sizes: Mapping[str, int]) -> list[dict]:
+    """The parts of the deposit: path, content, number of files and bytes."""
     found = []
     for part, content in _PARTS.items():
         own = [size for path, size in sizes.items() if path == part or path.startswith(f"{part}/")]
         if own:
-            folder = part not in sizes
-            found.append(Part(f"{part}/" if folder else part, content, len(own), sum(own)))
+            path = part if part in sizes else f"{part}/"
+            found.append({"path": path, "content": content, "files": len(own), "size": sum(own)})
     rest = {path: size for path, size in sizes.items() if path.split("/")[0] not in _PARTS}
-    found.append(Part(", ".join(sorted(rest)), _METADATA, len(rest), sum(rest.values())))
-    return found
-
-
-def _written(campaign: Campaign, section: str) -> dict:
-    """The entries of a section that its author wrote, without the variants that studies made of them."""
-    entries = getattr(campaign, section)
-    return {name: each for name, each in entries.items() if campaign.origin(section, name) == name}
-
-
-def _known_of(surfaces: Iterable[str], ask, form) -> dict[str, str]:
-    """What a campaign knows of its surfaces; nothing of files that nobody has read."""
-    found = {}
-    for name in surfaces:
-        try:
-            found[name] = form(ask(name))
-        except AttributeError:
-            found[name] = ""
+    found.append(
+        {"path": ", ".join(sorted(rest)), "content": _METADATA, "files": len(rest), "size": sum(rest.values())}
+    )
     return found
 
 

@@ -64,8 +64,8 @@ class Equations:
         part, R = sites.present, sites.radius_of_curvature
         a = np.zeros(len(sites))
         a[part] = law.contact_radius(approach[part], R[part])
-        outdated = interaction is None or interaction.half_space is not sites.half_space
-        if outdated or np.any(a > interaction.pairs.largest_radius):
+        reusable = interaction is not None and interaction.half_space is sites.half_space
+        if interaction is None or not reusable or np.any(a > interaction.pairs.largest_radius):
             ahead = np.where(part, approach + _APPROACH_AHEAD * problem.rms_height, 0.0)
             largest = np.where(part, _RADIUS_AHEAD * law.contact_radius(ahead, R), 0.0)
             interaction = Interaction.between(law, sites.half_space, R, largest)

@@ -63,7 +63,8 @@ def equilibrium(
     if spots_let_go:
         search = let_go(search, separation, spots_let_go)
     point = Equations(problem, search.sites, control).at(search.sites.approach, separation)
-    steps, exact_steps, rounds, quiet, visited = 0, 0, 0, False, Counter()
+    steps, exact_steps, rounds, quiet = 0, 0, 0, False
+    visited: Counter = Counter()
     while True:
         search, point = _without_swallowed(search, point, control)
         equations = Equations(problem, search.sites, control)

@@ -88,7 +88,7 @@ def first_passed(waiting: Iterable[Stop], before: State, beyond: State, directio
 
     direction : of the separation: -1 on loading, 1 on unloading.
     """
-    first = None, beyond
+    first: tuple[Stop | None, State] = None, beyond
     for stop in waiting:
         if abs(stop.excess(beyond)) <= SAME_EXCESS and first[0] is None:
             first = stop, beyond

@@ -25,6 +25,7 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
     """
     state = first_contact = contact.untouched()
     waiting, step, missed, found = Queue(stops, -1), longest, 0, 0
+    stop: Stop | None
     while waiting:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
             state = first_contact  # nothing happens on the way there
@@ -69,7 +70,7 @@ def first_loading(contact: ContactModel, stops: list[Stop], longest: float, cour
 def _nearest(waiting: list[Stop], state: State) -> tuple[Stop, float]:
     """The stop that seems to come next, and the separation at which it is expected, m."""
     expected = {stop: stop.expected_separation(state) for stop in waiting}
-    stop = max(expected, key=expected.get)
+    stop = max(expected, key=expected.__getitem__)
     return stop, expected[stop]
 
 

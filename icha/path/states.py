@@ -12,11 +12,15 @@ AreaFraction = number(STATES["area_fraction"])
 class Snapshot(Section):
     """A state whose spots and distributions of gap and pressure are kept: exactly one of the four keys."""
 
-    reduced_pressure: ReducedPressure | None = Field(default=None, description="At this p/(E* h'rms).")
+    reduced_pressure: ReducedPressure | None = Field(  # type: ignore[valid-type]
+        default=None, description="At this p/(E* h'rms)."
+    )
     relative_load: Positive | None = Field(
         default=None, description="At this p/E* = F/(E* A0), the same load for surfaces of different slope."
     )
-    area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
+    area_fraction: AreaFraction | None = Field(  # type: ignore[valid-type]
+        default=None, description="At this contact area fraction A/A0."
+    )
     mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
 
     _check = model_validator(mode="after")(exactly_one)

@@ -46,9 +46,10 @@ class Stop:
 
     def expected_separation(self, state: State) -> float:
         """The separation at which the target may be met: load and area grow about exponentially; -inf if unknown."""
-        if self.target.kind == MEAN_SEPARATION:
+        control = self.control
+        if control is None:
             return self.target.value
-        value, slope = 1 + self.excess(state), self.contact.slope(self.control.quantity, state) / self.control.target
+        value, slope = 1 + self.excess(state), self.contact.slope(control.quantity, state) / control.target
         return state.separation - np.log(value) / (slope / value) if value > 0 and slope < 0 else -np.inf
 
     def meet(self, state: State, separation: float) -> State:

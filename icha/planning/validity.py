@@ -49,11 +49,18 @@ def self_affine_moments(
     return SpectralMoments(moment(0), moment(2) / 2, 3 / 8 * moment(4))
 
 
+def _moments(section) -> SpectralMoments:
+    """Moments of a surface; of a random one but for a common factor."""
+    if isinstance(section, SelfAffineSurface):
+        return self_affine_moments(*section.lengths_and_hurst)
+    return spectral_moments(_read(section))
+
+
 def expected_summits(campaign: Campaign, name: str) -> float:
     """Number of summits of a random surface by its spectrum; those of a surface from a file are counted."""
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
-        moments = self_affine_moments(*section.lengths_and_hurst)
+        moments = _moments(section)
         return section.period**2 * summit_density(moments.m2, moments.m4)
     from icha.surfaces.summits import count_summits
 
@@ -62,12 +69,7 @@ def expected_summits(campaign: Campaign, name: str) -> float:
 
 def rms_curvature(campaign: Campaign, name: str) -> float:
     """Rms curvature of a profile of a surface at rms slope 1, 1/m."""
-    section = campaign.surfaces[name]
-    moments = (
-        self_affine_moments(*section.lengths_and_hurst)
-        if isinstance(section, SelfAffineSurface)
-        else spectral_moments(_read(section))
-    )
+    moments = _moments(campaign.surfaces[name])
     return math.sqrt(moments.m4 / (2 * moments.m2))
 
 
@@ -78,7 +80,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
-        moments, grid, unsupported = self_affine_moments(*section.lengths_and_hurst), section.grid, 0
+        moments, grid, unsupported = _moments(section), section.grid, 0
         skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, False
         summits = expected_summits(campaign, name)
     else:

@@ -35,7 +35,6 @@ from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.build import bin_values, build, of
 from icha.datasets.variables.boundary_elements import SOLUTION
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
-from icha.references.failures import NotSolved
 from icha.support.rules import LENGTH, POSITIVE, REFINEMENT, TOLERANCE
 from icha.surfaces.surface import Surface
 
@@ -58,6 +57,10 @@ REFERENCES = (
     "V. A. Yastrebov, G. Anciaux and J.-F. Molinari, Tribol. Int. 114 (2017) 161-171, "
     "doi:10.1016/j.triboint.2017.04.023"
 )
+
+
+class NotSolved(RuntimeError):
+    """Boundary elements at a finite range did not converge; the message says which."""
 
 
 @dataclass(frozen=True, eq=False)

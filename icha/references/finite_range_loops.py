@@ -17,10 +17,10 @@ import xarray as xr
 from icha.asperity.material import Material
 from icha.datasets.build import build
 from icha.datasets.variables.boundary_elements import LOOP
-from icha.references.failures import NotSolved
 from icha.references.finite_range import (
     DEFAULT_TOLERANCE,
     GapContact,
+    NotSolved,
     asked_for,
     attributes,
     perimeter_correction,

@@ -1,6 +1,8 @@
 """Theory curves and published points as one dataset, for the figures of one surface."""
 
+import json
 from collections.abc import Mapping
+from importlib.resources import files
 
 import numpy as np
 import xarray as xr
@@ -9,12 +11,20 @@ from icha.asperity.material import Material
 from icha.datasets.attributes import THEORY, discovery
 from icha.datasets.variables.terms import term
 from icha.references import persson, summit_theories
-from icha.references.literature import literature
 from icha.surfaces.moments import SpectralMoments
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 REDUCED_PRESSURES = np.geomspace(1e-5, 1.0, 101)
 SUMMIT_AREAS = np.geomspace(1e-5, summit_theories.SEPARATE_SUMMITS_AREA_LIMIT, 81)
+
+
+def literature(name: str) -> dict:
+    """Published numbers: one entry of `literature.json`, with title, description, citation, DOIs and units.
+
+    There are `gfmd_area`, `area_slope` and `contact_mechanics_challenge`. Lists of an entry belong together, point by
+    point.
+    """
+    return json.loads(files("icha.references").joinpath("literature.json").read_text(encoding="utf-8"))[name]
 
 
 def reference_dataset(

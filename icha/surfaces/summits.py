@@ -380,8 +380,8 @@ class SummitCoverage:
 
     def unsupported_share(self, separation: float) -> float:
         """Share of the summits above the plane of separation (m) that their nodes do not support."""
-        unsupported = np.count_nonzero(self.unsupported_height > separation)
-        return unsupported / max(unsupported + np.count_nonzero(self.summit_height > separation), 1)
+        unsupported = int(np.count_nonzero(self.unsupported_height > separation))
+        return unsupported / max(unsupported + int(np.count_nonzero(self.summit_height > separation)), 1)
 
     def reasons_against(self, separations: Iterable[float]) -> list[str]:
         """Reasons why asperities do not stand for the surface at these mean separations (m); none if they do."""

@@ -3,197 +3,80 @@
 import datetime
 
 import pytest
-from demo_configuration import (
-    CARBERRY,
-    GOOD_RUN,
-    ORCID,
-)
+from demo_configuration import CARBERRY, GOOD_RUN, ORCID
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.publication import needed
 
+DOI = "10.1007/s11249-017-0900-2"
+# Key and value that are refused, and the beginning of what is said of them.
 BAD = {
-    # key, value, what the message must say of it
-    "no ORCID": (
-        "publication",
-        {"authors": [CARBERRY | {"orcid": "1"}]},
-        "publication.authors[0].orcid: '1' is no ORCID",
-    ),
-    "check digit of an ORCID": (
-        "publication",
-        {"authors": [CARBERRY | {"orcid": "0000-0002-1825-0098"}]},
-        "publication.authors[0].orcid: '0000-0002-1825-0098' is no ORCID: its check digit is wrong; allowed: four",
-    ),
-    "ORCID of an organisation": (
-        "publication",
-        {"authors": [{"name": "A", "orcid": "0000-0002-1825-0097"}]},
-        "publication.authors[0]: an organisation has no ORCID; allowed: orcid beside family_names",
-    ),
-    "half an author": (
-        "publication",
-        {"authors": [{"family_names": "Carberry"}]},
-        "publication.authors[0]: {'family_names': 'Carberry'} is neither a person nor an organisation; allowed: family",
-    ),
-    "ROR": ("publication", {"authors": [CARBERRY | {"ror": "x"}]}, "authors[0].ror: 'x' is no ROR identifier; allowed"),
-    "version that YAML takes for a number": (
-        "publication",
-        {"version": 1.10},
-        "publication.version: 1.1 is no version; allowed: letters, digits and . + - _ between them, in quotes",
-    ),
-    "version that is a path": (
-        "publication",
-        {"version": "../1"},
-        "publication.version: '../1' is no version; allowed",
-    ),
-    "no day": ("publication", {"date": "2026-02-30"}, "publication.date: '2026-02-30' is no date; allowed: year"),
-    "no identifier": (
-        "publication",
-        {"related_identifiers": [{"identifier": "the paper", "relation": "Cites"}]},
-        "publication.related_identifiers[0].identifier: 'the paper' is no identifier; allowed: a DOI such as",
-    ),
-    "no relation": (
-        "publication",
-        {"related_identifiers": [{"identifier": "10.1007/s11249-017-0900-2", "relation": "Quotes"}]},
-        "publication.related_identifiers[0].relation: 'Quotes' is not a choice; allowed: 'IsCitedBy'",
-    ),
-    "no DOI": ("publication", {"doi": "reserved"}, "publication.doi: 'reserved' is no DOI; allowed: a DOI such as"),
-    "funding without a funder": ("publication", {"funding": [{}]}, "publication.funding[0].funder: the key is missing"),
-    "unknown key of a publication": (
-        "publication",
-        {"keyword": ["x"]},
-        "publication.keyword: unknown key (did you mean 'keywords'?)",
-    ),
-    "author with the same ORCID twice": (
-        "publication",
-        {"authors": [CARBERRY | {"orcid": ORCID}, {"family_names": "C.", "given_names": "J.", "orcid": ORCID}]},
-        "'J. C.' is given twice; allowed: every author once",
-    ),
-    "author with the same name twice": (
-        "publication",
-        {"authors": [CARBERRY | {"orcid": ORCID}, {"family_names": "carberry", "given_names": "Josiah "}]},
-        "'Josiah  carberry' is given twice; allowed: every author once",
-    ),
-    "organisation twice": (
-        "publication",
-        {"authors": [{"name": "The team"}, CARBERRY, {"name": "The team"}]},
-        "'The team' is given twice; allowed: every author once",
-    ),
-    "related identifier twice": (
-        "publication",
-        {
-            "related_identifiers": [
-                {"identifier": "10.1000/ABC", "relation": "Cites", "resource": "Text"},
-                {"identifier": "https://doi.org/10.1000/abc", "relation": "Cites"},
-            ]
-        },
-        "'Cites 10.1000/abc' is given twice; allowed: every relation to an identifier once",
-    ),
-    "known failure twice": (
-        "publication",
-        {"known_failures": [{"run": GOOD_RUN, "reason": "why"}, {"run": GOOD_RUN, "reason": "because"}]},
-        f"'{GOOD_RUN}' is given twice; allowed: every run once",
-    ),
-    "funding twice": (
-        "publication",
-        {"funding": [{"funder": "A", "award_number": "1"}, {"funder": "a", "award_number": "1", "award_title": "T"}]},
-        "'a' is given twice; allowed: every award of a funder once",
-    ),
-    "funding without an award twice": (
-        "publication",
-        {
-            "funding": [
-                {"funder": "A", "funder_id": "https://ror.org/00k4n6c32"},
-                {"funder": "B", "funder_id": "00K4N6C32"},
-            ]
-        },
-        "'B' is given twice; allowed: every award of a funder once",
-    ),
-    "control character in a name": (
-        "publication",
-        {"authors": [CARBERRY | {"affiliation": "Brown\x07 University"}]},
-        "authors[0].affiliation: 'Brown\\x07 University' holds the control character '\\x07'; allowed: text of",
-    ),
-    "tab in a summary": (
-        "publication",
-        {"summary": "One\n\ttwo"},
-        "publication.summary: 'One\\n\\ttwo' holds the control character '\\t'; allowed: text, with or without",
-    ),
-    "line break in a title": (
-        "publication",
-        {"title": "A title\n"},
-        "publication.title: 'A title\\n' holds a line break; allowed: text of one line; in YAML, >-",
-    ),
-    "half a character": ("publication", {"title": "A\ud800"}, "holds the control character '\\ud800'; allowed: text"),
-    "blank title": ("publication", {"title": " "}, "publication.title: ' ' is blank; allowed: text of one line"),
-    "blank reason": (
-        "publication",
-        {"known_failures": [{"run": GOOD_RUN, "reason": "\n"}]},
-        "publication.known_failures[0].reason: '\\n' is blank; allowed: text, with or without line breaks",
-    ),
-    "keyword without anything visible": (
-        "publication",
-        {"keywords": ["a", "\u200b"]},
-        "keywords[1]: '\\u200b' is blank",
-    ),
-    "empty funder": ("publication", {"funding": [{"funder": ""}]}, "publication.funding[0].funder: '' is blank"),
-    "check digits of a ROR": (
-        "publication",
-        {"authors": [{"name": "A", "ror": "https://ror.org/03yrm5c27"}]},
-        "authors[0].ror: 'https://ror.org/03yrm5c27' is no ROR identifier: its check digits are wrong; allowed: one of",
-    ),
-    "ROR of a person without an affiliation": (
-        "publication",
-        {"authors": [CARBERRY | {"ror": "https://ror.org/05gq02987"}]},
-        "publication.authors[0]: a person has no ROR; allowed: ror beside affiliation",
-    ),
-    "funder without a registry": (
-        "publication",
-        {"funding": [{"funder": "A", "funder_id": "https://example.org"}]},
-        "funding[0].funder_id: 'https://example.org' is neither a ROR identifier nor a DOI; allowed: one of them, such",
-    ),
-    "check digits of a funder": (
-        "publication",
-        {"funding": [{"funder": "A", "funder_id": "00k4n6c33"}]},
-        "funding[0].funder_id: '00k4n6c33' is no ROR identifier: its check digits are wrong",
-    ),
-    "bracket in a DOI": (
-        "publication",
-        {"doi": "10.1000/<1"},
-        "publication.doi: '10.1000/<1' holds '<', which no web address can; allowed: none, or '%3C' for it",
-    ),
-    "space in an address": (
-        "publication",
-        {"related_identifiers": [{"identifier": "https://a.org/b c", "relation": "Cites"}]},
-        "identifier: 'https://a.org/b c' holds ' ', which no web address can; allowed: none, or '%20' for it",
-    ),
-    "invisible character in an address": (
-        "publication",
-        {"funding": [{"funder": "A", "award_url": "https://a.org/\u200b"}]},
-        "award_url: 'https://a.org/\\u200b' holds '\\u200b', which no web address can; allowed: visible characters",
-    ),
-    "community by its title": (
-        "publication",
-        {"communities": ["Contact Mechanics"]},
-        "publication.communities[0]: 'Contact Mechanics' is no community of Zenodo; allowed: what its address ends",
-    ),
-    "day of another age": (
-        "publication",
-        {"date": "0026-01-31"},
-        "publication.date: '0026-01-31' is no day of a publication; allowed: from 1900-01-01 to 2199-12-31",
-    ),
-    "day too late": ("publication", {"date": "2200-01-01"}, "'2200-01-01' is no day of a publication; allowed: from"),
-    "time of day": ("publication", {"date": "2026-01-31 12:00:00"}, "'2026-01-31 12:00:00' is no date; allowed: year"),
-    "failure of no run": (
-        "publication",
-        {"known_failures": [{"run": "one", "reason": "why"}]},
-        "publication.known_failures[0].run: 'one' is not a run; allowed: a run of the campaign, such as one/",
-    ),
+    "authors[0].orcid: '1' is no ORCID": {"authors": [CARBERRY | {"orcid": "1"}]},
+    "authors[0].orcid: '0000-0002-1825-0098' is no": {"authors": [CARBERRY | {"orcid": "0000-0002-1825-0098"}]},
+    "authors[0]: allowed: orcid of a person": {"authors": [{"name": "A", "orcid": ORCID}]},
+    "authors[0]: {'family_names': 'Carberry'} is neither": {"authors": [{"family_names": "Carberry"}]},
+    "authors[0].ror: 'x' is no ROR": {"authors": [CARBERRY | {"ror": "x"}]},
+    "authors[0].ror: 'https://ror.org/03yrm5c27' is no": {
+        "authors": [{"name": "A", "ror": "https://ror.org/03yrm5c27"}]
+    },
+    "authors[0]: allowed: orcid of a person; ror of an": {"authors": [CARBERRY | {"ror": "https://ror.org/05gq02987"}]},
+    "'C. C.' is given twice": {
+        "authors": [{"family_names": "C.", "given_names": given, "orcid": ORCID} for given in ("J.", "C.")]
+    },
+    "'the team' is given twice": {"authors": [{"name": "The  team"}, CARBERRY, {"name": "the team"}]},
+    "authors[0].affiliation: 'Brown\\x07 University' holds": {
+        "authors": [CARBERRY | {"affiliation": "Brown\x07 University"}]
+    },
+    "version: 1.1 is no version": {"version": 1.10},
+    "version: '../1' is no version": {"version": "../1"},
+    "date: '2026-02-30' is no date": {"date": "2026-02-30"},
+    "date: '0026-01-31' is no date": {"date": "0026-01-31"},
+    "date: '2200-01-01' is no date": {"date": "2200-01-01"},
+    "date: '2026-01-31 12:00:00' is no date": {"date": "2026-01-31 12:00:00"},
+    "related_identifiers[0].identifier: 'the paper' is no": {
+        "related_identifiers": [{"identifier": "the paper", "relation": "Cites"}]
+    },
+    "related_identifiers[0].identifier: 'https://a.org/b c' is no": {
+        "related_identifiers": [{"identifier": "https://a.org/b c", "relation": "Cites"}]
+    },
+    "related_identifiers[0].relation: 'Quotes' is not a choice": {
+        "related_identifiers": [{"identifier": DOI, "relation": "Quotes"}]
+    },
+    "'Cites 10.1000/abc' is given twice": {
+        "related_identifiers": [
+            {"identifier": "10.1000/ABC", "relation": "Cites", "resource": "Text"},
+            {"identifier": "https://doi.org/10.1000/abc", "relation": "Cites"},
+        ]
+    },
+    "doi: 'reserved' is no DOI": {"doi": "reserved"},
+    "doi: '10.1000/<1' is no DOI": {"doi": "10.1000/<1"},
+    "funding[0].funder: the key is missing": {"funding": [{}]},
+    "funding[0].funder: '' is blank": {"funding": [{"funder": ""}]},
+    "funding[0].funder_id: 'https://example.org' is no": {
+        "funding": [{"funder": "A", "funder_id": "https://example.org"}]
+    },
+    "funding[0].award_url: 'https://a.org/\\u200b' is no": {
+        "funding": [{"funder": "A", "award_url": "https://a.org/\u200b"}]
+    },
+    "'a' is given twice": {"funding": [{"funder": each, "award_number": "1"} for each in "Aa"]},
+    f"'{GOOD_RUN}' is given twice": {
+        "known_failures": [{"run": GOOD_RUN, "reason": each} for each in ("why", "because")]
+    },
+    "known_failures[0].run: 'one' is not a run": {"known_failures": [{"run": "one", "reason": "why"}]},
+    "known_failures[0].reason: '\\n' is blank": {"known_failures": [{"run": GOOD_RUN, "reason": "\n"}]},
+    "summary: 'One\\n\\ttwo' holds the control character": {"summary": "One\n\ttwo"},
+    "title: 'A title\\n' holds a line break": {"title": "A title\n"},
+    "holds the control character '\\ud800'": {"title": "A\ud800"},
+    "title: ' ' is blank": {"title": " "},
+    "keywords[1]: '\\u200b' is blank": {"keywords": ["a", "\u200b"]},
+    "communities[0]: 'Contact Mechanics' is no community": {"communities": ["Contact Mechanics"]},
+    "keyword: unknown key": {"keyword": ["x"]},
 }
 
 
-@pytest.mark.parametrize("case", BAD, ids=lambda case: case.replace(" ", "_"))
-def test_mistakes_are_named(case, refused):
-    refused(*BAD[case])
+@pytest.mark.parametrize("message", BAD)
+def test_mistakes_are_named(message, refused):
+    refused("publication", BAD[message], message)
 
 
 @pytest.mark.parametrize("ror", ["03yrm5c26", "05gq02987", "00k4n6c32", "01bj3aw27", "02mhbdp94"])
@@ -224,7 +107,7 @@ def test_what_differs_may_stand_side_by_side(load):
 def test_days_of_the_command_line(load):
     day = datetime.date(2026, 1, 31)
     assert load(overrides={"publication": {"date": day}}).campaign.publication.date == "2026-01-31"
-    with pytest.raises(ConfigurationError, match=r"publication\.date: '2026-01-31T12:00:00' is no date; allowed: "):
+    with pytest.raises(ConfigurationError, match=r"publication\.date: .* is no date; allowed: "):
         load(overrides={"publication": {"date": datetime.datetime(2026, 1, 31, 12)}})
 
 

@@ -151,7 +151,6 @@ WRONG = {
         None,
         "defaults.studies: would be 2003000 values, written out in all studies; allowed: 500000 at most",
     ),
-    "authors": ("publication", {"authors": [{"name": f"a{i}"} for i in range(1001)]}, "allowed: 1000 at most"),
     "grid": (
         {"surfaces.rough": measured_surface(grid=32768), "studies.one.seeds": [1]},
         None,
@@ -181,22 +180,6 @@ def test_values_to_vary_make_names_that_files_can_have(refused):
         "studies.one.vary": varied,
     }
     refused(None, changes, "which files cannot have; allowed: 200 at most")
-
-
-@pytest.mark.parametrize(
-    ("label", "message"),
-    [
-        (r"glass $\frac{1$", "label: 'glass $\\\\frac{1$' holds a formula that cannot be drawn ("),
-        (r"$\nosuchthing$", "holds a formula that cannot be drawn ("),
-        ("$" + "{" * 90 + "$", "holds a formula that cannot be drawn ("),
-        ("x" * 201, "is too long; allowed: at most 200 characters"),
-        ("glass\x1b[2J", "label: 'glass\\x1b[2J' holds the control character '\\x1b'; allowed: text"),
-    ],
-)
-def test_labels_that_no_figure_can_draw(label, message, refused):
-    columns = {"load": {"column": "a", "unit": "1"}, "area": {"column": "b", "unit": "1"}}
-    entry = {"path": "x.csv", "label": label, "citation": "b", "study": "one"} | columns
-    refused("measurements", {"m": entry}, f"{message}")
 
 
 def test_formulas_and_dollars_that_can_be_drawn(load, tmp_path):

@@ -1,9 +1,10 @@
 """Section `studies`."""
 
-from demo_configuration import LONG_RANGE, TRUTH
+import numpy as np
+from demo_configuration import LONG_RANGE, TRUTH, file_surface
 
 import icha
-from icha.configuration.cases import campaign_sha256, run_cases, run_settings
+from icha.configuration.cases import campaign_sha256, run_cases, run_settings, run_sha256
 
 
 def test_a_study_is_a_product_of_its_lists(load):
@@ -51,3 +52,28 @@ def test_the_way_back_is_part_of_the_path(load):
     assert path["unload"] is True and path["control"] == "separation"
     assert path["turning_points"] == [("reduced_pressure", -1e-3), ("area_fraction", 0.03)]
     assert icha.Path(**path).turning_points[1].value == 0.03
+
+
+def test_settings_depend_on_values_not_on_how_they_are_written(load):
+    def checksum(campaign):
+        return run_sha256(campaign, run_cases(campaign)[0]), campaign_sha256(campaign)
+
+    first = checksum(load().campaign)
+    assert checksum(load({"materials.soft.contact_modulus": "25000 kPa", "title": "Other"}).campaign) == first
+    assert checksum(load({"materials.soft.contact_modulus": "26 MPa"}).campaign) != first
+    assert checksum(load({"studies.one.seeds": [1, 3]}).campaign)[0] == first[0]
+    assert checksum(load({"studies.one.seeds": [1, 3]}).campaign)[1] != first[1]
+
+
+def test_another_file_of_the_same_name_is_another_run(load, tmp_path):
+    def checksum():
+        campaign = load({"surfaces.rough": file_surface("own.npy")}).campaign
+        return run_sha256(campaign, run_cases(campaign)[0])
+
+    heights = np.random.default_rng(1).random((16, 16))
+    np.save(tmp_path / "own.npy", heights)
+    first = checksum()
+    np.save(tmp_path / "own.npy", heights)
+    assert checksum() == first
+    np.save(tmp_path / "own.npy", heights + 1)
+    assert checksum() != first

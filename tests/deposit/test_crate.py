@@ -4,8 +4,6 @@ import hashlib
 import json
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -16,7 +14,7 @@ from publications import ALL, COMMIT, LEAST, ORCID, PUBLICATIONS
 from icha.configuration.publication import Author
 from icha.contact.models import MODEL_PAPER
 from icha.deposit.crate import Job, write_crate
-from icha.deposit.deposit_files import CRATE
+from icha.deposit.verify import CRATE
 
 SCRIPTS = "source/workflow/scripts"
 SCAN = "inputs/scan 1 µm.npy"
@@ -134,33 +132,6 @@ def test_every_job_has_an_action_with_its_files_and_settings(entities):
     assert found == {(job.script, tuple(sorted(job.inputs)), job.outputs, job.parameters) for job in JOBS}
 
 
-def test_data_flow_from_the_files_given_to_the_last_result_and_never_back(entities):
-    actions = tool_actions(entities)
-    made = [name for action in actions for name in references(action["result"])]
-    assert len(made) == len(set(made))
-    there = {"config.used.yaml", "inputs/scan%201%20%C2%B5m.npy"}
-    assert there == set(references(entities["#campaign"]["object"]))
-    pending = list(actions)
-    while pending:
-        ready = [
-            action
-            for action in pending
-            if {name for name in references(action["object"]) if not name.startswith("#")} <= there
-        ]
-        assert ready, "files are made from each other"
-        there |= {name for action in ready for name in references(action["result"])}
-        pending = [action for action in pending if action not in ready]
-    assert (
-        set(made)
-        == set(references(entities["#campaign"]["result"]))
-        == there
-        - {
-            "config.used.yaml",
-            "inputs/scan%201%20%C2%B5m.npy",
-        }
-    )
-
-
 def test_steps_stand_in_the_order_of_the_data(entities):
     workflow = entities["source/Snakefile"]
     steps = sorted((entities[name] for name in references(workflow["step"])), key=lambda step: int(step["position"]))
@@ -174,7 +145,7 @@ def test_steps_stand_in_the_order_of_the_data(entities):
         assert step["workExample"] == action["instrument"]
 
 
-def test_who_made_it_under_which_licence_and_who_paid(entities):
+def test_who_made_it_under_which_licence_and_of_which_model(entities, tmp_path):
     root = entities["./"]
     people = [entities[name] for name in references(root["author"])]
     assert [person["@type"] for person in people] == ["Person", "Organization", "Person"]
@@ -184,17 +155,16 @@ def test_who_made_it_under_which_licence_and_who_paid(entities):
     assert root["datePublished"] == "2026-01-31" and root["version"] == "1.0.0-rc.1"
     assert root["identifier"] == "https://doi.org/10.5281/zenodo.1234567"
     assert root["keywords"] == ["adhesion", "rough surfaces, soft"]
-    assert references(root["funder"])[0] == "https://doi.org/10.13039/501100000780"
-    assert {entities[name]["identifier"] for name in references(root["funding"])} == {"284382", "7 b"}
-    cited = [
-        MODEL_PAPER.address,
-        "https://doi.org/10.1007/s11249-017-0900-2",
-        "https://arxiv.org/abs/1606.03166",
-        "https://example.org/page",
-    ]
-    assert references(root["citation"]) == cited
-    assert references(root["isBasedOn"]) == ["https://doi.org/10.5281/zenodo.5171937"]
-    assert "https://snakemake.github.io" in references(root["mentions"])
+    paper = entities[root["citation"]["@id"]]
+    assert paper["@id"] == MODEL_PAPER.address and paper["name"] == MODEL_PAPER.title
+    authors = [entities[name] for name in references(paper["author"])]
+    assert [(author["givenName"], author["familyName"]) for author in authors] == list(MODEL_PAPER.authors)
+    # Whoever wrote it and made the data is the same person, with all that is said of them.
+    given, family = MODEL_PAPER.authors[0]
+    own = LEAST.model_copy(update={"authors": [Author(family_names=family, given_names=given, affiliation="Here")]})
+    graph = json.loads((written(tmp_path, own) / CRATE).read_bytes())["@graph"]
+    (person,) = (entity for entity in graph if entity.get("familyName") == family)
+    assert person["affiliation"] == {"@id": "#organisation/Here"}
 
 
 def test_no_time_no_name_made_at_random_and_no_place_of_this_machine(deposit):
@@ -206,42 +176,13 @@ def test_no_time_no_name_made_at_random_and_no_place_of_this_machine(deposit):
     assert str(Path.home()) not in text and str(deposit) not in text
 
 
-def test_the_paper_of_the_model_is_cited_beside_what_the_publication_names(entities, tmp_path):
-    cited = [entities[name] for name in references(entities["./"]["citation"])]
-    (paper,) = (each for each in cited if each["name"] == MODEL_PAPER.title)
-    assert paper["@type"] == "ScholarlyArticle" and len(cited) > 1
-    assert paper["@id"] == MODEL_PAPER.address and paper["datePublished"] == str(MODEL_PAPER.year)
-    authors = [entities[name] for name in references(paper["author"])]
-    assert [(author["givenName"], author["familyName"]) for author in authors] == list(MODEL_PAPER.authors)
-    # Whoever wrote it and made the data is the same person, with all that is said of them.
-    given, family = MODEL_PAPER.authors[0]
-    own = LEAST.model_copy(update={"authors": [Author(family_names=family, given_names=given, affiliation="Here")]})
-    graph = json.loads((written(tmp_path, own) / CRATE).read_bytes())["@graph"]
-    (person,) = (entity for entity in graph if entity.get("familyName") == family)
-    assert person["affiliation"] == {"@id": "#organisation/Here"}
+def test_the_same_deposit_has_the_same_bytes_whatever_the_order_of_jobs(deposit, tmp_path):
+    assert (written(tmp_path, ALL, reversed(JOBS)) / CRATE).read_bytes() == (deposit / CRATE).read_bytes()
 
 
-def test_the_same_deposit_has_the_same_bytes(deposit, tmp_path):
-    code = (
-        "import sys; sys.path[:0] = sys.argv[2:]; from pathlib import Path; from test_crate import *; "
-        "written(Path(sys.argv[1]), ALL, reversed(JOBS))"
-    )
-    command = [sys.executable, "-c", code, tmp_path, Path(__file__).parent, Path(__file__).parents[1]]
-    subprocess.run(command, check=True, env={"PYTHONHASHSEED": "7", "LC_ALL": "C"})
-    assert (tmp_path / CRATE).read_bytes() == (deposit / CRATE).read_bytes()
-
-
-def test_jobs_that_make_no_sense_are_refused(deposit):
-    surface, run, *others = JOBS
-    cases = {
-        r"^no job: ": [],
-        r"^runs/none.nc: a file of rule run .* is not in the deposit": [run._replace(outputs=("runs/none.nc",))],
-        r"^surfaces/a/seed1.nc: is made by more than one job": [surface, run._replace(outputs=surface.outputs)],
-        r": is made from itself": [surface._replace(inputs=("dataset/mine.nc",)), run, *others],
-    }
-    for message, jobs in cases.items():
-        with pytest.raises(ValueError, match=message):
-            write_crate(deposit, ALL, jobs, campaign="mine", revision=COMMIT, checksums=checksums_of(deposit))
+def test_jobs_with_files_that_are_not_in_the_deposit_are_refused(deposit):
+    with pytest.raises(ValueError, match=r"^runs/none.nc: a file of rule run .* is not in the deposit"):
+        written(deposit, ALL, [JOBS[1]._replace(outputs=("runs/none.nc",))])
 
 
 @pytest.mark.slow
@@ -256,16 +197,10 @@ def test_it_is_a_provenance_run_crate_and_can_be_read(name, deposit, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"^roc-validator: passed; \d{2,} checks of provenance-run-crate-0.5, 0 problems", done.stdout)
     assert f"runcrate: passed; {len(JOBS) + 1} actions" in done.stdout
-
-
-@pytest.mark.slow
-def test_a_crate_that_lacks_something_is_refused(deposit, tmp_path):
-    folder = shutil.copytree(deposit, tmp_path / "deposit")
     content = json.loads((folder / CRATE).read_bytes())
     content["@graph"] = [entity for entity in content["@graph"] if entity["@id"] != "source/Snakefile#run"]
     (folder / CRATE).write_text(json.dumps(content))
     (folder / "dataset/mine.nc").unlink()
     done = validated(sealed(folder), "roc-validator")
-    assert done.returncode == 1, done.stdout + done.stderr
-    assert "A ControlAction must reference a HowToStep instance" in done.stdout
+    assert done.returncode == 1 and "A ControlAction must reference a HowToStep instance" in done.stdout
     assert "dataset/mine.nc" in done.stdout

@@ -1,370 +1,267 @@
-"""`icha reproduce --own-source`: a program that is a small script, for all that may go right and wrong around it."""
+"""`icha reproduce`: a deposit is data for the ICHA that is installed; it is checked, and nothing in it runs."""
 
-import hashlib
 import json
-import os
 import re
 import shutil
-import signal
-import subprocess
-import sys
-import zipfile
 from importlib.metadata import version
+from types import SimpleNamespace
 
+import h5py
 import netCDF4
 import numpy as np
 import pytest
-import yaml
-from reproduced import caller, lock
+import typer
+from conftest import REPOSITORY
+from typer.testing import CliRunner
 
-from icha.deposit.deposit_files import verify_deposit, whole_deposit
-from icha.deposit.rerun import Refused, environment_target
+from icha.cli import app, deposits
+from icha.deposit.reproduce import changed_files
+from icha.deposit.verify import verify_deposit
 
-NAME = "mine-1.0.0"
-# Nothing is isolated, so that a test can plant something; `LC_` is a beginning of names that are passed on.
-OWN = ("--own-source", "--isolation", "none", "--yes")
-SOFT, HARD = "load/rough/seed1/slope1/soft", "load/rough/seed2/slope1/hard"
-# Stands for the deposit's `icha`: it makes what it is asked for, a number each, and tells how it was called.
-PROGRAM = """
-import json, os, signal, sys, time, netCDF4, pathlib
-signal.signal(signal.SIGTERM, signal.default_int_handler)
-command, configuration, *targets = sys.argv[1:]
-assert command == "run" and "cores" not in targets
-number = float(pathlib.Path("inputs/number.txt").read_text())
-results = pathlib.Path("results/mine")
-runs = ["runs/load/rough/seed1/slope1/soft.nc", "runs/load/rough/seed2/slope1/hard.nc"]
-files = [*runs, "surfaces/rough/seed1.nc", "surfaces/rough/seed2.nc", "dataset/mine.nc"]
-asked = [t.removeprefix("results/mine/") for t in targets if t.endswith(".nc")]
-with open("called.jsonl", "a") as log:
-    log.write(json.dumps([sys.argv[1:], dict(os.environ)]) + "\\n")
-if os.environ.get("LC_PLANTED") == "fails":
-    sys.exit("the program fails")
-surfaces = [f"surfaces/rough/{path.split('/')[3]}.nc" for path in asked]
-for path in [*surfaces, *asked] or files:
-    (results / path).parent.mkdir(parents=True, exist_ok=True)
-    with netCDF4.Dataset(results / path, "w") as file:
-        file.createDimension("step", 3)
-        planted = os.environ.get("LC_PLANTED", "")
-        factor = 1 + float(planted or 0) if path.endswith("soft.nc") and planted != "sleeps" else 1
-        file.createVariable("pressure", "f8", ("step",))[:] = [number, 2.0 * factor, 3.0]
-        if "seed2" in path:
-            file.note = 1000 * "large"
-    try:
-        print("made", path, flush=True)
-        if os.environ.get("LC_PLANTED") == "sleeps":
-            time.sleep(60)
-    except KeyboardInterrupt:
-        time.sleep(0.5)
-        print("\\n".join(3000 * [100 * "."]), flush=True)  # more than a pipe holds
-        pathlib.Path("ended").touch()
-        sys.exit(1)
-(results / "verdict.txt").write_text("passed")
+SOFT, HARD = "load/plate/seed0/slope0.5/soft", "load/plate/seed0/slope0.5/hard"
+CAMPAIGN = """
+name: tiny
+title: Tiny
+summary: One file.
+license: CC0-1.0
+surfaces:
+  plate: {{kind: file, path: {path}, height_unit: um, period: 10 um}}
+materials:
+  soft: {{contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 40 nm}}
+  hard: {{contact_modulus: 250 MPa, surface_energy: 0 mJ/m^2, interaction_range: 40 nm}}
+studies:
+  load:
+    surfaces: [plate]
+    rms_slopes: [0.5]
+    materials: [soft, hard]
+    targets: {{reduced_pressures: [1.0e-3]}}
 """
-MAKEFILE = f"""
-environment:
-	@test "$$LC_PLANTED" != "no network" || (echo "cannot reach the index" && exit 1)
-	@mkdir -p .venv/bin
-	@printf '#!{sys.executable}\\nimport runpy; runpy.run_path("program.py")\\n' > .venv/bin/icha
-	@chmod +x .venv/bin/icha
-"""
+LEAVES_A_MARK = "import pathlib; pathlib.Path({mark!r}).touch()\n"
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """A deposit as a folder and as a zip; not to be changed."""
-    folder = tmp_path_factory.mktemp("deposit")
-    deposit = folder / NAME
-    for path, text in {
-        "config.used.yaml": "name: mine\n",
-        "inputs/number.txt": "1.5",
-        "source/Snakefile": "",
-        "source/Makefile": MAKEFILE,
+def lock(numpy=None):
+    """A lock file with numpy alone, in the version that is installed or in another one."""
+    numpy = numpy or version("numpy")
+    return f'[[package]]\nname = "numpy"\nversion = "{numpy}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
+
+
+def write_run(path, steps=3, factor=1.0, size=1, **attributes):
+    """A file that stands for a run or a surface."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("step", steps)
+        file.createVariable("pressure", "f8", ("step",))[:] = factor * (np.arange(steps) + 1.0)
+        file.note = size * "large"
+        file.setncatts(attributes)
+
+
+@pytest.fixture
+def deposit(pack, tmp_path):
+    """A function that makes a deposit, with files changed or left out (None)."""
+    x = np.arange(32) / 32 * 2 * np.pi
+    np.save(tmp_path / "z.npy", np.cos(x) + np.cos(2 * x)[:, None])
+    write_run(tmp_path / "soft.nc")
+    write_run(tmp_path / "hard.nc", size=1000)
+    files = {
+        "config.used.yaml": CAMPAIGN.format(path="inputs/z.npy"),
+        "inputs/z.npy": (tmp_path / "z.npy").read_bytes(),
+        f"runs/{SOFT}.nc": (tmp_path / "soft.nc").read_bytes(),
+        f"runs/{HARD}.nc": (tmp_path / "hard.nc").read_bytes(),
+        "surfaces/plate/seed0.nc": (tmp_path / "soft.nc").read_bytes(),
+        "verdict.txt": "passed",
+        "source/pyproject.toml": f'[project]\nversion = "{version("icha")}"\n',
         "source/uv.lock": lock(),
-        "source/program.py": PROGRAM,
-        "README.md": "# Mine\n",
-    }.items():
-        (deposit / path).parent.mkdir(parents=True, exist_ok=True)
-        (deposit / path).write_text(text)
-    work = folder / "work"
-    shutil.copytree(deposit / "source", work)
-    shutil.copytree(deposit / "inputs", work / "inputs")
-    subprocess.run([sys.executable, "program.py", "run", "config.used.yaml", "all"], cwd=work, check=True)
-    shutil.copytree(work / "results/mine", deposit, dirs_exist_ok=True)
-    seal(deposit)
-    return deposit
+        ".zenodo.json": json.dumps({"title": "A \x1b[2J title", "creators": [{"name": "Carberry, Josiah"}]}),
+    }
 
+    def made(**changes):
+        return pack({path: text for path, text in (files | changes).items() if text is not None})
 
-def seal(deposit):
-    """Write checksums and the zip."""
-    files = sorted(path.relative_to(deposit).as_posix() for path in deposit.rglob("*") if path.is_file())
-    sums = [f"{hashlib.sha256((deposit / f).read_bytes()).hexdigest()}  {f}\n" for f in files if f != "SHA256SUMS"]
-    (deposit / "SHA256SUMS").write_text("".join(sums))
-    with zipfile.ZipFile(deposit.with_name(f"{NAME}.zip"), "w") as archive:
-        for file in sorted({*files, "SHA256SUMS"}):
-            archive.write(deposit / file, f"{NAME}/{file}")
+    return made
 
 
 @pytest.fixture
-def deposit(made, tmp_path):
-    """One of one's own."""
-    shutil.copytree(made.parent, tmp_path / "own", ignore=shutil.ignore_patterns("work"))
-    return tmp_path / "own" / NAME
+def reproduce(monkeypatch, tmp_path):
+    """Call the command; return exit status and output. Nothing may stay of what is refused, or act on the terminal."""
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(temporary))
 
+    def call(*arguments):
+        done = CliRunner().invoke(app, ["reproduce", *map(str, arguments)])
+        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+        assert done.exit_code != 2 or list(temporary.iterdir()) == []
+        assert not set("\x1b\u202e") & set(done.output)
+        return done.exit_code, done.output
 
-@pytest.fixture
-def reproduce(monkeypatch, tmp_path, capfd):
-    """Call the command for the deposit's own source, with something planted; return exit status and what was said."""
-    called = caller(monkeypatch, capfd, tmp_path / "temporary")
-
-    def call(*arguments, planted=""):
-        monkeypatch.setenv("LC_PLANTED", planted)
-        return called(*arguments, *OWN)
-
-    call.temporary = tmp_path / "temporary"
     return call
 
 
-def calls(folder):
-    return [json.loads(line) for line in (folder / "source/called.jsonl").read_text().splitlines()]
+@pytest.fixture
+def computed(monkeypatch, tmp_path):
+    """Stand in for `icha run`: make the files that are asked for, and note how it was called."""
+    calls = []
+
+    def run(configuration, targets, *, cores, folder, anyway):
+        calls.append((configuration, targets, cores, anyway))
+        results = folder / "results/tiny"
+        asked = [each.removeprefix("results/tiny/") for each in targets if each != "all"]
+        for path in asked or [f"runs/{SOFT}.nc", f"runs/{HARD}.nc"]:
+            write_run(
+                results / path, factor=calls.factor if "soft" in path else 1.0, size=1000 if "hard" in path else 1
+            )
+        write_run(results / "surfaces/plate/seed0.nc")
+        (results / "verdict.txt").write_text("passed")
+        if calls.fails:
+            shutil.rmtree(results)
+            raise typer.Exit(1)
+
+    calls = type("Calls", (list,), {"factor": 1.0, "fails": False})()
+    monkeypatch.setattr(deposits, "run", run)
+    return calls
 
 
 @pytest.mark.parametrize("ending", ["", ".zip"])
-def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, made, reproduce):
-    deposit = made.with_name(NAME + ending)
-    before = {path: path.stat().st_mtime_ns for path in made.rglob("*")}
-    status, said = reproduce(deposit)
-    assert status == 0, said
-    assert "identical: 6 files, every value" in said and "made dataset/mine.nc" in said
-    assert list(reproduce.temporary.iterdir()) == []
-    assert verify_deposit(deposit) == [] and {path: path.stat().st_mtime_ns for path in made.rglob("*")} == before
+def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, deposit, reproduce, computed, tmp_path):
+    folder = deposit()
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    status, said = reproduce(folder.with_name(folder.name + ending), "--cores", "3", "--anyway")
+    assert status == 0 and "identical: 4 files, every value" in said, said
+    assert "it says of itself, and nobody has checked it:\n  title:    A \\x1b[2J title\n  authors:  Carb" in said
+    assert f"is run:     the ICHA that is installed, {version('icha')}; nothing in the deposit is executed" in said
+    ((_, targets, cores, anyway),) = computed
+    assert (targets, cores, anyway) == (["all"], "3", True)
+    assert list((tmp_path / "temporary").iterdir()) == []
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
+
+
+@pytest.mark.parametrize(("factor", "status", "told"), [(1 + 1e-9, 0, "within tolerance: 4"), (1.001, 1, "different:")])
+def test_differences_are_told_by_variable(factor, status, told, deposit, reproduce, computed, tmp_path):
+    computed.factor = factor
+    ended, said = reproduce(deposit(), "--json", tmp_path / "out.json")
+    assert ended == status and told in said and "runs: pressure: " in said, said
+    (differing,) = [each for each in json.loads((tmp_path / "out.json").read_text())["files"] if each["variables"]]
+    assert differing["path"] == f"runs/{SOFT}.nc"
+    assert len(list((tmp_path / "temporary").iterdir())) == status  # what differs is kept
+
+
+def test_single_runs(deposit, reproduce, computed, tmp_path):
+    own = deposit()
+    for asked, runs in (
+        (["smallest"], [SOFT]),
+        ([HARD, f"runs/{SOFT}.nc"], [HARD, SOFT]),
+    ):
+        status, said = reproduce(own, *(f"--only={each}" for each in asked), "--folder", tmp_path / "again")
+        assert status == 0 and f"identical: {len(runs) + 1} files" in said, said  # and the surface of both
+        assert computed[-1][1] == [f"results/tiny/runs/{run}.nc" for run in runs]
+    status, said = reproduce(own, "--only", "load/plate/seed3/slope1/soft")
+    assert status == 2 and "has no such run; allowed: smallest, or one of its 2 runs" in said and SOFT in said
+
+
+def test_the_smallest_run_is_the_smallest_that_is_complete(deposit, reproduce, computed, tmp_path):
+    write_run(tmp_path / "failed.nc", 2, incomplete="the path ends: stuck")
+    failed = (tmp_path / "failed.nc").read_bytes()
+    assert reproduce(deposit(**{f"runs/{SOFT}.nc": failed}), "--only", "smallest")[0] == 0
+    assert computed[-1][1] == [f"results/tiny/runs/{HARD}.nc"]
+    status, said = reproduce(
+        deposit(**dict.fromkeys([f"runs/{SOFT}.nc", f"runs/{HARD}.nc"], failed)), "--only=smallest"
+    )
+    assert status == 2 and "no run of the deposit is complete" in said
+
+
+def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp_path):
+    own = deposit()
+    computed.fails = True
+    status, said = reproduce(own, "--folder", tmp_path / "again")
+    assert status == 1 and "nothing was computed" in said
+    computed.fails = False
+    assert reproduce(own, "--folder", tmp_path / "again")[0] == 0
+    (tmp_path / "again/rerun-of.sha256").write_text("another")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/file").write_text("mine")
+    for folder, said in (
+        (tmp_path / "again", "belongs to another deposit"),
+        (tmp_path / "other", "has other files in it"),
+        (own / "again", "is in the deposit"),
+    ):
+        status, told = reproduce(own, "--folder", folder)
+        assert status == 2 and said in told, told
+    assert verify_deposit(own) == [] and len(computed) == 2
 
 
 @pytest.mark.parametrize(
-    ("asked", "targets", "target"),
+    ("changes", "said"),
     [
-        ("name: mine\nfinite_range: {truth: {study: load}}\n", "environment tamaas", "tamaas"),
-        ("name: mine\n", "environment tamaas", "environment"),
-        # Of a program that installed all for everybody.
-        ("name: mine\nfinite_range: {truth: {study: load}}\n", "environment", "environment"),
+        ({"source/pyproject.toml": '[project]\nversion = "99.0"\n'}, "is installed, 99.0 made the deposit"),
+        ({"source/uv.lock": lock("0.1")}, "is installed, 0.1 is locked"),
+        ({"source/pyproject.toml": "project = 3"}, "has no version of the program"),
+        ({"source/pyproject.toml": b"\xff"}, "has no version of the program"),
+        ({"source/uv.lock": "package = [1]"}, "is not a lock file of uv"),
+        ({"source/uv.lock": "x = " + 10_000 * "["}, "is not a lock file of uv"),
+        ({"source/uv.lock": None}, "has no source/uv.lock"),
+        ({"config.used.yaml": "name: [a, b]"}, "name: ['a', 'b'] is not the name"),
+        ({"config.used.yaml": "name: ../../tmp"}, "name: '../../tmp' is not the name"),
+        ({"config.used.yaml": "- name"}, "config.used.yaml: the file is a list"),
+        ({"config.used.yaml": "name: !!python/object/apply:os.getcwd []"}, "config.used.yaml"),
+        ({"config.used.yaml": b"\xff\xfe\x00"}, "deposit"),
+        ({"config.used.yaml": "name: tiny\ntitle: 3\n"}, "the configuration of the deposit cannot be run"),
+        ({"config.used.yaml": CAMPAIGN.format(path="/etc/passwd")}, "allowed: files beside it"),
+        ({"config.used.yaml": CAMPAIGN.format(path="../../../secret.npy")}, "allowed: files beside it"),
+        ({".zenodo.json": "[1]"}, ".zenodo.json: is not a mapping"),
     ],
 )
-def test_the_environment_is_the_one_that_the_campaign_needs(asked, targets, target, tmp_path):
-    (tmp_path / "source").mkdir()
-    (tmp_path / "source/Makefile").write_text("".join(f"{each}:\n\t@true\n" for each in targets.split()))
-    with whole_deposit(tmp_path) as found:
-        assert environment_target(found, yaml.safe_load(asked)) == target
+def test_what_a_deposit_says_is_checked(changes, said, deposit, reproduce, computed):
+    status, told = reproduce(deposit(**changes))
+    assert status == 2 and said in told and not computed, told
 
 
-def test_a_makefile_that_is_too_large_is_refused(made):
-    with whole_deposit(made) as found:
-        larger = found._replace(sizes=found.sizes | {"source/Makefile": 10**9})
-        with pytest.raises(Refused, match="source/Makefile: has 1 GB; allowed: "):
-            environment_target(larger, {})
+def test_damaged_deposits_and_those_without_results_are_refused(deposit, reproduce, computed, tmp_path):
+    (own := deposit()).joinpath("verdict.txt").write_text("Passed")
+    status, said = reproduce(own)
+    assert status == 2 and "damaged" in said and "verdict.txt" in said
+    assert reproduce(tmp_path / "none")[0] == 2 and not computed
 
 
-def test_nothing_of_the_caller_s_environment_gets_in(made, reproduce, tmp_path, monkeypatch):
-    leaking = ("VIRTUAL_ENV", "PYTHONPATH", "PYTHONHOME_", "SNAKEMAKE_PROFILE", "UV_PROJECT_ENVIRONMENT", "MAKEFLAGS")
-    leaking += ("ZENODO_TOKEN", "GITHUB_TOKEN", "AWS_SECRET_ACCESS_KEY", "SSH_AUTH_SOCK", "UV_PUBLISH_TOKEN", "X")
-    for name in leaking:
-        monkeypatch.setenv(name, str(tmp_path))
-    monkeypatch.setenv("HTTPS_PROXY", "http://user:secret@proxy:8080")
-    monkeypatch.setenv("HTTP_PROXY", "http://proxy:8080")
-    monkeypatch.setenv("PATH", os.pathsep.join([f"{sys.prefix}/bin", os.environ["PATH"]]))
-    status, said = reproduce(made, "--folder", tmp_path / "again", "--cores", "3")
-    assert status == 0
-    ((arguments, environment),) = calls(tmp_path / "again")
-    assert arguments == ["run", "config.used.yaml", "all", "--cores", "3"]
-    assert not {*leaking, "HTTPS_PROXY"} & set(environment) and {"LC_PLANTED", "HTTP_PROXY"} <= set(environment)
-    passed = re.search("^variables:  (.*); no other ones of yours$", said, re.MULTILINE)[1].split(", ")
-    # Make and the shell add some of their own.
-    assert {"HTTP_PROXY", "PATH"} <= set(passed) and set(environment) <= {
-        *passed,
-        "PWD",
-        "SHLVL",
-        "_",
-        "LC_CTYPE",
-        "HDF5_PLUGIN_PATH",
-    }
-    if sys.prefix != sys.base_prefix:
-        assert f"{sys.prefix}/bin" not in environment["PATH"].split(os.pathsep)
+@pytest.mark.parametrize("content", [b"no netCDF", "link"])
+def test_what_is_called_a_run_and_is_none_is_not_followed(content, deposit, reproduce, computed, tmp_path):
+    if content == "link":
+        with h5py.File(tmp_path / "run.nc", "w") as file:
+            file["step"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
+        content = (tmp_path / "run.nc").read_bytes()
+    status, said = reproduce(
+        deposit(**dict.fromkeys([f"runs/{SOFT}.nc", f"runs/{HARD}.nc"], content)), "--only=smallest"
+    )
+    assert status == 2 and re.search("soft.nc: is not a run|hard.nc: is not a run", said) and not computed, said
 
 
-@pytest.mark.parametrize("planted, status, told", [
-    ("1e-9", 0, "within tolerance: 6 files, every value to 1e-06"),
-    ("1e-3", 1, "different: not everything is reproduced"),
-])  # fmt: skip
-def test_differences_are_told_by_variable(planted, status, told, made, reproduce, tmp_path):
-    ended, said = reproduce(made, "--json", tmp_path / "out.json", planted=planted)
-    assert ended == status and told in said, said
-    assert "runs: pressure: " in said
-    written = json.loads((tmp_path / "out.json").read_text())
-    (differing,) = [file for file in written["files"] if file["verdict"] != "identical"]
-    assert differing["path"] == f"runs/{SOFT}.nc"
-    # What differs is kept to be looked at.
-    kept = list(reproduce.temporary.iterdir())
-    assert len(kept) == status
-    if kept:
-        assert f"what was computed again: {kept[0]}/source/results/mine" in said
+def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, monkeypatch, tmp_path):
+    own = deposit()
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=3))
+    status, said = reproduce(own.with_name("tiny.zip"))
+    assert status == 1 and "3 B are free" in said and list((tmp_path / "temporary").iterdir()) == []
 
 
-def test_a_table_is_told_even_if_it_cannot_be_written(made, reproduce, tmp_path):
-    (tmp_path / "folder").mkdir()
-    status, said = reproduce(made, "--json", tmp_path / "folder")
-    assert status == 1 and "identical: 6 files, every value" in said and "Is a directory" in said
-
-
-def test_what_runs_is_told_to_begin_anyway_if_we_are(made, reproduce, tmp_path):
-    assert reproduce(made, "--anyway", "--folder", tmp_path / "again")[0] == 0
-    assert calls(tmp_path / "again")[0][0] == ["run", "config.used.yaml", "all", "--anyway"]
-
-
-def test_single_runs(made, reproduce, tmp_path):
-    status, said = reproduce(made, "--only", "smallest", "--folder", tmp_path / "again")
-    assert status == 0 and "identical: 2 files" in said, said
-    assert calls(tmp_path / "again")[-1][0] == ["run", "config.used.yaml", f"results/mine/runs/{SOFT}.nc"]
-    status, said = reproduce(made, "--only", SOFT, "--only", f"runs/{HARD}.nc", "--folder", tmp_path / "again")
-    assert status == 0 and "identical: 4 files" in said  # two runs, and the surface of each
-    assert calls(tmp_path / "again")[-1][0][2:] == [f"results/mine/runs/{run}.nc" for run in (SOFT, HARD)]
-
-
-def fail_run(deposit, run, steps):
-    """Give a run so many steps, and a reason why there are no more."""
-    with netCDF4.Dataset(deposit / f"runs/{run}.nc", "w") as file:
-        file.createDimension("step", steps)
-        file.incomplete = "the path ends: stuck"
-        file.createVariable("pressure", "f8", ("step",))[:] = np.arange(steps) + 1.0
-    seal(deposit)
-
-
-@pytest.mark.parametrize("ending", ["", ".zip"])
-@pytest.mark.parametrize("steps", [0, 2])
-def test_the_smallest_run_is_the_smallest_that_is_complete(steps, ending, deposit, reproduce, tmp_path):
-    fail_run(deposit, SOFT, steps)
-    assert (deposit / f"runs/{SOFT}.nc").stat().st_size < (deposit / f"runs/{HARD}.nc").stat().st_size
-    status, said = reproduce(deposit.with_name(NAME + ending), "--only", "smallest", "--folder", tmp_path / "again")
-    assert status == 0 and "identical: 2 files" in said, said
-    assert calls(tmp_path / "again")[-1][0][2:] == [f"results/mine/runs/{HARD}.nc"]
-    fail_run(deposit, HARD, steps)
-    status, said = reproduce(deposit.with_name(NAME + ending), "--only", "smallest")
-    assert status == 2 and "no run of the deposit is complete" in said
-    assert list(reproduce.temporary.iterdir()) == []
-
-
-def test_a_run_without_steps_is_refused_by_name_and_one_with_some_is_not(deposit, reproduce, tmp_path):
-    fail_run(deposit, SOFT, 0)
-    status, said = reproduce(deposit, "--only", HARD, "--only", SOFT)
-    assert status == 2 and f"--only {SOFT}: this run holds no data (the path ends: stuck)" in said
-    assert list(reproduce.temporary.iterdir()) == []
-    fail_run(deposit, SOFT, 2)
-    status, said = reproduce(deposit, "--only", SOFT, "--folder", tmp_path / "again")
-    assert status == 1 and "different" in said  # the program that stands for the deposit's makes three
-    assert calls(tmp_path / "again")[-1][0][2:] == [f"results/mine/runs/{SOFT}.nc"]
-
-
-def test_a_damaged_deposit_is_refused(deposit, reproduce):
-    with (deposit / "dataset/mine.nc").open("ab") as file:
-        file.write(b"x")
-    status, said = reproduce(deposit)
-    assert status == 2 and "damaged" in said and "dataset/mine.nc" in said
-    whole = deposit.with_name(f"{NAME}.zip")
-    whole.write_bytes(whole.read_bytes()[:-100])
-    assert reproduce(whole)[0] == 2
-    assert reproduce(deposit.with_name("none"))[0] == 2
-    (deposit / "dataset/mine.nc").unlink()
-    (deposit / "source/uv.lock").unlink()
-    seal(deposit)
-    status, said = reproduce(deposit)
-    assert status == 2 and "has no source/uv.lock" in said
-    assert list(reproduce.temporary.iterdir()) == []
-
-
-def test_wrong_use_is_refused_before_anything_is_done(made, reproduce, tmp_path):
-    status, said = reproduce(made, "--only", "load/rough/seed3/slope1/soft")
-    assert status == 2 and "has no such run; allowed: smallest, or one of its 2 runs" in said and SOFT in said
-    assert reproduce(made, "--cores", "none")[0] == 2
-    status, said = reproduce(made, "--folder", made / "again")
-    assert status == 2 and "is in the deposit" in said
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other/file").write_text("mine")
-    status, said = reproduce(made, "--folder", tmp_path / "other")
-    assert status == 2 and "has other files in it" in said
-    (tmp_path / "other/file").rename(tmp_path / "other/rerun-of.sha256")
-    status, said = reproduce(made, "--folder", tmp_path / "other")
-    assert status == 2 and "belongs to another deposit" in said
-    assert [path.name for path in (tmp_path / "other").iterdir()] == ["rerun-of.sha256"]
-    assert list(reproduce.temporary.iterdir()) == []
-
-
-def test_a_deposit_that_is_unpacked_is_no_folder_of_a_rerun(deposit, reproduce):
-    """Even of itself: it is not written to."""
-    status, said = reproduce(deposit.with_name(f"{NAME}.zip"), "--folder", deposit)
-    assert status == 2 and "has other files in it" in said
-    assert verify_deposit(deposit) == []
-
-
-def test_an_environment_that_cannot_be_installed(made, reproduce, tmp_path):
-    folder = tmp_path / "again"
-    status, said = reproduce(made, "--folder", folder, planted="no network")
-    assert status == 1 and "cannot reach the index" in said and f"log: {folder}/environment.log" in said
-    assert "--environment here" in said and not (folder / "source/called.jsonl").exists()
-    # With network, the same call goes on.
-    assert reproduce(made, "--folder", folder)[0] == 0
-
-
-def test_a_program_that_fails(made, reproduce, tmp_path):
-    status, said = reproduce(made, "--folder", tmp_path / "again", planted="fails")
-    assert status == 1 and "the program fails" in said
-    assert f"nothing was computed; the same command with --folder {tmp_path / 'again'} goes on" in said
-
-
-def test_the_environment_that_is_here_has_to_agree_with_the_lock_file(deposit, reproduce):
-    (deposit / "source/uv.lock").write_text(lock("0.1"))
-    seal(deposit)
-    status, said = reproduce(deposit, "--environment", "here")
-    assert status == 2 and f"numpy: {version('numpy')} is installed, 0.1 is locked" in said
-    for content in (b"package = [1]", b"\xff"):
-        (deposit / "source/uv.lock").write_bytes(content)
-        seal(deposit)
-        status, said = reproduce(deposit, "--environment", "here")
-        assert status == 2 and "source/uv.lock: is no lock file of uv" in said
-    assert list(reproduce.temporary.iterdir()) == []
+def test_whatever_differs_of_the_program_is_counted(tmp_path):
+    """Of the package and of the workflow, which decides as much."""
+    ours = {"Snakefile", *(f"icha/{path.name}" for path in (REPOSITORY / "icha").glob("*.py"))}
+    (tmp_path / "SHA256SUMS").write_text(f"{64 * '0'}  source/docs/model.md\n{64 * '0'}  README.md\n")
+    everything = changed_files(tmp_path)
+    assert everything > len(ours)
+    (tmp_path / "SHA256SUMS").write_text(f"{64 * '0'}  source/Snakefile\n{64 * '0'}  source/workflow/scripts/more.py\n")
+    assert changed_files(tmp_path) == everything + 1
 
 
 @pytest.mark.slow
-def test_what_was_stopped_goes_on(made, reproduce, tmp_path):
-    folder = tmp_path / "again"
-    # What was left by one that was killed while it copied is no part of it.
-    assert reproduce(made, "--folder", folder, planted="fails")[0] == 1
-    (folder / "source").rename(folder / ".source.part")
-    (folder / ".source.part/program.py").unlink()
-    (folder / ".source.part/Makefile.orig").touch()
-    program = [
-        sys.executable,
-        "-c",
-        "from icha.cli import main; main()",
-        "reproduce",
-        str(made),
-        "--folder",
-        str(folder),
-        *OWN,
-    ]
-    process = subprocess.Popen(
-        program,
-        env=os.environ | {"LC_PLANTED": "sleeps"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        start_new_session=True,
-    )
-    while "made" not in (line := process.stdout.readline()):
-        assert line
-    process.send_signal(signal.SIGTERM)
-    said = process.communicate(timeout=50)[0]
-    assert process.returncode == 1 and f"stopped; the same command with --folder {folder} goes on" in said
-    ours = subprocess.run(["pgrep", "-f", f"{folder}/source/.venv/bin/icha"], capture_output=True, text=True).stdout
-    assert not ours, ours
-    assert (folder / "source/ended").exists() and not list(folder.rglob("Makefile.orig"))
-    copied = (folder / "source/program.py").stat().st_mtime_ns
-    status, said = reproduce(made, "--folder", folder)
-    assert status == 0 and "identical: 6 files" in said
-    assert (folder / "source/program.py").stat().st_mtime_ns == copied and len(calls(folder)) == 2
+def test_nothing_in_a_deposit_is_executed(deposit, reproduce, tmp_path, monkeypatch):
+    """For real, wherever the command is called: neither the source, nor what lies beside configuration and inputs."""
+    mark = LEAVES_A_MARK.format(mark=str(tmp_path / "mark"))
+    names = ("Snakefile", "icha/__init__.py", "sitecustomize.py", "workflow/rules/runs.smk", "workflow/scripts/job.py")
+    names += ("workflow/scripts/run_sweep.py", "numpy.py")
+    places = [f"{folder}{name}" for folder in ("source/", "inputs/", "") for name in names]
+    own = deposit(**dict.fromkeys(places, mark))
+    monkeypatch.chdir(own / "source")
+    status, said = reproduce(own, "--only", SOFT, "--folder", tmp_path / "again")
+    assert not (tmp_path / "mark").exists()
+    assert status == 1 and "different: not everything is reproduced" in said, said
+    with netCDF4.Dataset(tmp_path / f"again/data/results/tiny/runs/{SOFT}.nc") as file:
+        assert float(file["reduced_pressure"][-1]) == pytest.approx(1e-3)  # it was computed

@@ -1,11 +1,13 @@
 """The wheel, built from the sdist and installed where nothing else is: the library, a campaign, its deposit."""
 
 import json
+import os
 import subprocess
 import sys
 import tarfile
 import tomllib
 import zipfile
+from pathlib import Path
 
 import bare_campaign
 import pytest
@@ -15,8 +17,7 @@ from conftest import REPOSITORY
 
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import write_dataset
-from icha.deposit.environment import constraints
-from icha.deposit.rerun import surroundings
+from icha.deposit.program import constraints
 
 pytestmark = pytest.mark.slow
 
@@ -77,11 +78,19 @@ publication:
 """
 
 
+# Without this virtual environment.
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+ENVIRONMENT["PATH"] = os.pathsep.join(
+    part for part in os.environ["PATH"].split(os.pathsep) if not Path(part).is_relative_to(sys.prefix)
+)
+ENVIRONMENT["OMP_NUM_THREADS"] = "1"
+
+
 def call(*command, cwd, status=0):
     done = subprocess.run(
         [str(part) for part in command],
         cwd=cwd,
-        env=surroundings() | {"OMP_NUM_THREADS": "1"},
+        env=ENVIRONMENT,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -11,12 +11,10 @@ from small_rough_solution import MATERIALS, PRESSURE
 
 from icha.asperity.cohesive_zone import longest_spacing, strength_number
 from icha.asperity.material import Material
-from icha.references.failures import NotSolved
 from icha.references.finite_range import (
-    LOAD_TOLERANCE,
+    NotSolved,
     contact_state,
     finite_range_solution,
-    perimeter_correction,
     states_at_mean_separations,
 )
 from icha.surfaces.surface import Surface
@@ -49,12 +47,12 @@ def test_wavy_surface_is_westergaards(share):
 
     H. M. Westergaard, J. Appl. Mech. 6 (1939) A49.
     """
-    surface = wavy(512, 1)
+    surface = wavy(256, 1)
     full = HERTZ.contact_modulus * 0.01 / 2
     state = contact_state(surface, HERTZ, share * full / (HERTZ.contact_modulus * surface.rms_slope))
     # Strips along the grid have no corners: their nodes are counted as they are, to one on each side.
-    assert state.contact.mean() == pytest.approx(2 / np.pi * np.arcsin(np.sqrt(share)), abs=2 / 512)
-    assert state.traction.max() == pytest.approx(2 * share * full / np.sqrt(share), rel=2e-3)
+    assert state.contact.mean() == pytest.approx(2 / np.pi * np.arcsin(np.sqrt(share)), abs=2 / 256)
+    assert state.traction.max() == pytest.approx(2 * share * full / np.sqrt(share), rel=4e-3)
 
 
 def test_full_contact_is_johnsons():
@@ -75,7 +73,7 @@ def test_perimeter_correction_takes_the_excess_of_hertzian_areas_away():
     """Of circles of 16 nodes in radius the nodes count 2 % too much, the corrected areas on average nothing."""
     surface, hertz = paraboloid(256, 12.0, offset=0.37), Material(1.0, 0.0, 1.0)
     raw, corrected = [], []
-    for radius in np.linspace(0.7, 0.8, 9):
+    for radius in np.linspace(0.7, 0.8, 5):
         reduced = 4 / 3 * radius**3 / surface.period**2 / surface.rms_slope
         solution = finite_range_solution(surface, hertz, reduced)
         exact = np.pi * radius**2 / surface.period**2
@@ -85,12 +83,6 @@ def test_perimeter_correction_takes_the_excess_of_hertzian_areas_away():
         assert edges == pytest.approx(8 * radius / float(solution.spacing), rel=0.06)
     assert np.mean(raw) > 0.01
     assert abs(np.mean(corrected)) < 0.005
-
-
-def test_perimeter_of_a_square():
-    contact = np.zeros((16, 16), dtype=bool)
-    contact[14:, 3:7] = contact[:2, 3:7] = True  # across the border of the cell
-    assert perimeter_correction(contact)[1] == 16
 
 
 # --- the equations, checked by other means -----------------------------------------------------------------------
@@ -119,15 +111,6 @@ def test_state_is_in_equilibrium(rough):
     assert np.all(state.gap[state.contact] < 1e-5 * surface.rms_height)
 
 
-def test_load_asked_for_is_reached_and_its_error_stored(rough):
-    surface, material, state, solution = rough
-    asked = PRESSURE * material.contact_modulus * surface.rms_slope
-    assert state.traction.mean() == pytest.approx(asked, rel=LOAD_TOLERANCE)
-    assert solution.load_error == pytest.approx(state.traction.mean() / asked - 1, abs=1e-12)
-    assert solution.target_reduced_pressure == PRESSURE
-    assert 0 < solution.residual <= solution.tolerance
-
-
 def test_identities_of_the_dataset(rough):
     surface, material, state, solution = rough
     raw = float(solution.contact_area_fraction_raw)
@@ -147,12 +130,6 @@ def test_identities_of_the_dataset(rough):
     assert all(np.all(np.isfinite(variable)) for variable in solution.data_vars.values())
     assert all({"units", "long_name"} <= set(variable.attrs) for variable in solution.variables.values())
     np.testing.assert_array_equal(solution.contact, state.contact)
-
-
-def test_refined_surface_keeps_its_nodes(rough):
-    surface, _, state, _ = rough
-    np.testing.assert_allclose(state.surface.heights[::2, ::2], surface.heights, atol=1e-12 * surface.rms_height)
-    assert state.surface.rms_slope == pytest.approx(surface.rms_slope, rel=1e-9)
 
 
 def test_energetic_area_is_the_derivative_of_the_energy():
@@ -248,13 +225,3 @@ def test_same_bytes_in_another_process_with_more_threads():
         text=True,
     )
     assert other.stdout.strip() == small_rough_solution.digest(here)
-
-
-def test_area_without_adhesion_does_not_depend_on_the_slope():
-    """One topography, scaled: the same area and reduced separation at the same reduced pressure."""
-    steep, flat = (
-        finite_range_solution(small_rough_solution.surface().scaled_to_rms_slope(slope), HERTZ, PRESSURE)
-        for slope in (1.0, 0.2)
-    )
-    assert flat.contact_area_fraction == pytest.approx(float(steep.contact_area_fraction), rel=1e-6)
-    assert flat.reduced_separation == pytest.approx(float(steep.reduced_separation), rel=1e-6)

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.special import erfc
 
 from icha import Material, SelfAffineSpectrum
 from icha.asperity.jkr import JKR
@@ -43,11 +42,6 @@ def test_summit_statistics_are_those_of_the_random_field():
     assert found.mean_height == pytest.approx(height, rel=3e-3)
     assert found.deviation**2 == pytest.approx(variance, rel=3e-3)
     assert 1 / found.radius_of_curvature == pytest.approx(curvature, rel=3e-3)
-
-
-def test_mccools_rounded_constant():
-    found = theories.gaussian_summits(SpectralMoments(1.0, 1.0, 4.0))
-    assert found.deviation**2 == pytest.approx(1 - 0.8968 / 4, abs=5e-5)
 
 
 def test_summits_found_on_surfaces_are_those_of_the_theory():
@@ -94,42 +88,8 @@ def test_greenwood_williamson_is_the_sum_over_random_summits():
         assert float(theories.greenwood_williamson_pressure(u, MOMENTS)) == pytest.approx(force, rel=noise)
 
 
-def test_greenwood_williamson_area_in_closed_form():
-    theory = theories.gaussian_summits(MOMENTS)
-    t = (SEPARATIONS * MOMENTS.rms_height - theory.mean_height) / theory.deviation
-    first = np.exp(-(t**2) / 2) / math.sqrt(2 * np.pi) - t * erfc(t / math.sqrt(2)) / 2
-    expected = np.pi * theory.density * theory.radius_of_curvature * theory.deviation * first
-    np.testing.assert_allclose(theories.greenwood_williamson_area(SEPARATIONS, MOMENTS), expected, rtol=1e-12)
-
-
-def test_high_planes_see_an_exponential_of_heights():
-    # Far up the tail of the Gaussian is nearly the exponential exp(-t z/sigma), for which area over load is constant,
-    # A E*/F = pi R l/(4/3 R^(1/2) Gamma(5/2) l^(3/2)) = sqrt(pi R/l) with l = sigma/t.
-    theory = theories.gaussian_summits(MOMENTS)
-    t = 9.0
-    u = (theory.mean_height + t * theory.deviation) / MOMENTS.rms_height
-    area, p = theories.greenwood_williamson_area(u, MOMENTS), theories.greenwood_williamson_pressure(u, MOMENTS)
-    expected = math.sqrt(math.pi * theory.radius_of_curvature * t / theory.deviation) * MOMENTS.rms_slope
-    assert float(area / p) == pytest.approx(expected, rel=0.02)
-
-
 def separation_at_pressure(p):
     return theories.separation_at(theories.greenwood_williamson_pressure, p, MOMENTS)
-
-
-def test_area_over_load_varies_slowly_and_lies_below_bush_gibson_and_thomas():
-    p = np.geomspace(1e-5, 1e-2, 4)
-    ratio = theories.greenwood_williamson_area(separation_at_pressure(p), MOMENTS) / p
-    assert np.all(np.diff(ratio) < 0) and np.all(np.diff(ratio) > -0.25)
-    assert np.all(ratio < theories.BUSH_GIBSON_THOMAS_SLOPE) and np.all(ratio > 1.5)
-
-
-def test_without_adhesion_neither_slope_nor_length_matters():
-    scaled = MOMENTS.scaled_to_rms_slope(0.2)
-    longer = SpectralMoments(MOMENTS.m0 * 1e6, MOMENTS.m2, MOMENTS.m4 / 1e6)
-    for law in (theories.greenwood_williamson_area, theories.greenwood_williamson_pressure):
-        for other in (scaled, longer):
-            np.testing.assert_allclose(law(SEPARATIONS, other), law(SEPARATIONS, MOMENTS), rtol=1e-12)
 
 
 def test_separation_at_pressure_is_the_inverse():
@@ -155,32 +115,6 @@ def test_without_adhesion_it_is_greenwood_and_williamsons(pulled):
 
 
 @PULLED
-def test_weak_adhesion_changes_little(pulled):
-    bare = theories.greenwood_williamson_pressure(SEPARATIONS, MOMENTS)
-    errors = []
-    for energy in (1e-4, 1e-6, 1e-8):
-        pressure = theories.fuller_tabor_pressure(SEPARATIONS, MOMENTS, Material(MODULUS, energy, 2e-9), pulled=pulled)
-        errors.append(np.max(np.abs(pressure / bare - 1)))
-    assert errors[0] > errors[1] > errors[2] and errors[2] < 1e-3
-
-
-@PULLED
-def test_it_is_the_sum_over_random_summits(pulled):
-    theory, heights = random_heights()
-    law, R = JKR(SOFT), theory.radius_of_curvature
-    first = float(law.jump_off_approach(R)) if pulled else 0.0
-    per_area = theory.density / len(heights)
-    for u in SEPARATIONS:
-        approach = heights - u * MOMENTS.rms_height
-        a = law.contact_radius(approach[approach > first], R)
-        noise = 5 / math.sqrt(len(a))
-        area, force = np.sum(np.pi * a**2) * per_area, law.force(a, R)
-        own = float(theories.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled)) * MODULUS * MOMENTS.rms_slope
-        assert float(theories.fuller_tabor_area(u, MOMENTS, SOFT, pulled=pulled)) == pytest.approx(area, rel=noise)
-        assert own == pytest.approx(force.sum() * per_area, abs=5 * math.sqrt(np.sum(force**2)) * per_area)
-
-
-@PULLED
 def test_it_is_the_integral_over_the_heights(pulled):
     theory = theories.gaussian_summits(MOMENTS)
     law, R = JKR(SOFT), theory.radius_of_curvature
@@ -200,17 +134,6 @@ def test_it_is_the_integral_over_the_heights(pulled):
         expected = sum(parts) / (MODULUS * MOMENTS.rms_slope)
         own = float(theories.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled))
         assert own == pytest.approx(expected, rel=1e-6)
-
-
-def test_adhesion_enlarges_the_area_and_pulling_more_so():
-    bare = theories.greenwood_williamson_area(SEPARATIONS, MOMENTS)
-    pressed = theories.fuller_tabor_area(SEPARATIONS, MOMENTS, SOFT)
-    pulled = theories.fuller_tabor_area(SEPARATIONS, MOMENTS, SOFT, pulled=True)
-    assert np.all(bare < pressed) and np.all(pressed < pulled)
-    forces = [theories.fuller_tabor_pressure(SEPARATIONS, MOMENTS, SOFT, pulled=way) for way in (False, True)]
-    assert np.all(forces[1] < forces[0]) and np.all(
-        forces[0] < theories.greenwood_williamson_pressure(SEPARATIONS, MOMENTS)
-    )
 
 
 def test_summits_of_one_height_are_pulled_off_at_jkrs_force():

@@ -5,7 +5,6 @@ run as children of this process, with a configuration, a key, a socket and a spo
 `with` block. A Slurm that is already set up on the machine is never touched: `why_not` then says so.
 """
 
-import ctypes
 import fcntl
 import os
 import secrets
@@ -17,12 +16,14 @@ import tempfile
 import time
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+
+from icha.support.program import end_with_parent
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "srun", "squeue", "sinfo", "scancel")
 PACKAGES = "slurmctld slurmd slurm-client munge"
 FOLDER = "icha-slurm-"
-PR_SET_PDEATHSIG = 1  # of prctl(2), Linux
 # Job steps lose the variable SLURM_CONF on their way through the executor, and look here.
 SYSTEM_CONFIGURATION = Path("/etc/slurm/slurm.conf")
 
@@ -80,10 +81,6 @@ class SingleNode:
             raise RuntimeError(f"{' '.join(arguments)} ended with {done.returncode}:\n{done.stdout}")
         return done.stdout
 
-    def active_jobs(self) -> list[str]:
-        """Numbers of the jobs that wait or run."""
-        return self.command("squeue", "--noheader", "--format=%i").split()
-
     def finished_jobs(self) -> list[dict[str, str]]:
         """Records of the jobs that have ended, in the order in which they ended, as Slurm's controller wrote them."""
         records = self.folder / "finished_jobs"
@@ -125,17 +122,9 @@ def single_node(cores: int = 4, memory: int = 8000):
         key.chmod(0o400)
 
         configuration = folder / "slurm.conf"
-        controller_port, node_port = _free_ports(2)
-        configuration.write_text(
-            CONFIGURATION.format(
-                host=socket.gethostname().split(".")[0],
-                folder=folder,
-                cores=cores,
-                memory=memory,
-                controller_port=controller_port,
-                node_port=node_port,
-            )
-        )
+        values = {"host": socket.gethostname().split(".")[0], "folder": folder, "cores": cores, "memory": memory}
+        values["controller_port"], values["node_port"] = _free_ports(2)
+        configuration.write_text(CONFIGURATION.format(**values))
         SYSTEM_CONFIGURATION.parent.mkdir(parents=True, exist_ok=True)
         SYSTEM_CONFIGURATION.unlink(missing_ok=True)
         SYSTEM_CONFIGURATION.symlink_to(configuration)
@@ -158,7 +147,7 @@ def single_node(cores: int = 4, memory: int = 8000):
                 stdout=said,
                 stderr=said,
                 start_new_session=True,
-                preexec_fn=_end_with_parent,
+                preexec_fn=partial(end_with_parent, os.getpid()),
             )
             stack.callback(_end, daemon)
             if name == "munged":
@@ -166,11 +155,6 @@ def single_node(cores: int = 4, memory: int = 8000):
         _wait_for(lambda: "idle" in node.command("sinfo", "--noheader", "--format=%t"), daemon, folder)
         stack.callback(_cancel_all, node)
         yield node
-
-
-def _end_with_parent() -> None:
-    """In a new process: have the kernel end it when its parent ends, even if that is killed."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _ours(path: Path) -> bool:
@@ -199,11 +183,11 @@ def _wait_for(ready, daemon: subprocess.Popen, folder: Path, seconds: float = 30
     raise RuntimeError(f"Slurm did not start:\n{said}")
 
 
-def _cancel_all(node: SingleNode, seconds: float = 30) -> None:
+def _cancel_all(node: SingleNode) -> None:
     """Cancel what still runs, and wait until its processes are gone."""
-    end = time.monotonic() + seconds
-    while (jobs := node.active_jobs()) and time.monotonic() < end:
-        node.command("scancel", *jobs)
+    node.command("scancel", "--user=root")
+    end = time.monotonic() + 30
+    while node.command("squeue", "--noheader") and time.monotonic() < end:
         time.sleep(0.3)
 
 

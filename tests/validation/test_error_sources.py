@@ -13,7 +13,7 @@ from icha.surfaces.summits import Asperities, find_summits
 from validation.error_sources import chain, effects, error_sources, shape_ratio, shape_ratio_of_fourth_order
 from validation.paraboloids import fourth_order_terms, paraboloids, summit_curvatures
 from validation.spot_by_spot import CATEGORIES, contact_patches, match
-from validation.without_unions import Discs, discs_apart, independent_discs, union_area_fraction
+from validation.without_unions import Discs, discs_apart, union_area_fraction
 
 HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)
 LAW = JKR(HARD)
@@ -70,20 +70,11 @@ def test_envelope_of_a_rough_surface_lies_above_every_paraboloid_and_touches_the
 # --- contact without unions -------------------------------------------------------------------------------------
 
 
-def test_equal_summits_without_interaction_have_the_closed_sum():
-    count, radius, pressure = 7, 0.3, 1e-4
-    position = np.random.default_rng(1).random((count, 2)) * 5
-    discs = independent_discs(summits_at(position, [0.2] * count, [radius] * count, 5.0), LAW, pressure)
-    approach = (0.75 * pressure * 25 / (count * 2.0 * np.sqrt(radius))) ** (2 / 3)
-    assert discs.separation == pytest.approx(0.2 - approach, rel=1e-12)
-    assert discs.contact_radius == pytest.approx(np.full(count, np.sqrt(radius * approach)), rel=1e-9)
-
-
-@pytest.mark.parametrize("switch", [{}, {"point_forces": True}, {"field_shape": True}])
-def test_a_lone_summit_is_hertz_and_its_images(switch):
+@pytest.mark.parametrize("field_shape", [False, True])
+def test_a_lone_summit_is_hertz_and_its_images(field_shape):
     radius, period, pressure = 1.0, 40.0, 1e-6
     summits = summits_at([[3.0, 4.0]], [0.5], [radius], period)
-    discs = discs_apart(summits, LAW, pressure, 0.1, **switch)
+    discs = discs_apart(summits, LAW, pressure, 0.1, field_shape=field_shape)
     force = pressure * period**2
     a = np.cbrt(0.75 * force * radius / 2.0)
     assert discs.contact_radius == pytest.approx([a], rel=1e-5)
@@ -198,6 +189,7 @@ def test_effects_add_up_to_the_error(sources):
     assert effects(sources).sizes["source"] == len(chain(sources)) - 1
 
 
+@pytest.mark.slow
 def test_with_adhesion_the_chain_is_shorter(surface):
     sticky = icha.Material(contact_modulus=2.0, surface_energy=1e-4, interaction_range=5e-3)
     sources = error_sources(surface, sticky, [2e-2], tolerance=1e-6)

@@ -13,7 +13,7 @@ PERIOD = 10.0
 
 @pytest.fixture(scope="module")
 def hertzian():
-    return hertz_asperity(contact_radii=[1.0, 0.5], period=16.0, grid=512)
+    return hertz_asperity()
 
 
 @pytest.mark.parametrize(

@@ -10,26 +10,36 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import copy
+import functools
 import io
 import json
 import logging
+import re
 import subprocess
 import sys
 import tempfile
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
-# Neither the package nor these modules are installed beside the validators.
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
+# The package is not installed beside the validators.
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 CRATE = "ro-crate-metadata.json"
 PROFILE = "provenance-run-crate-0.5"
 CONVENTIONS = "cf:1.11"
+# Attributes by which a variable names others (CF 1.11, appendix A).
+NAMING = "ancillary_variables bounds cell_measures climatology coordinates formula_terms grid_mapping".split()
+# Questions that compliance-checker asks of a file some thousand times, each time looking at all variables anew.
+ASKED = (
+    "auxiliary_coordinate_variables axis_variables cell_boundary_variables climatology_variable coordinate_variables "
+    "geophysical_variables latitude_variables longitude_variables time_variable time_variables z_variables".split()
+)
 
 
 class Outcome(NamedTuple):
@@ -167,7 +177,7 @@ def check_conventions(folder: Path) -> Outcome:
 
 
 class Conformance(NamedTuple):
-    """What compliance-checker says of one group of a file."""
+    """The verdict of compliance-checker on one group of a file."""
 
     place: Path
     points: tuple[int, int]
@@ -179,10 +189,8 @@ def _conventions_of(path: Path) -> list[Conformance]:
     """CF of one netCDF file, group by group."""
     from compliance_checker.base import BaseCheck
     from compliance_checker.suite import CheckSuite
-    from flat import flat_files
-    from remembered import remember
 
-    remember()
+    remember_answers()
     suite = CheckSuite()
     suite.load_all_available_checkers()
     answers = []
@@ -200,6 +208,79 @@ def _conventions_of(path: Path) -> list[Conformance]:
                     told += [f"{result.name}: {message}" for message in result.msgs or ["failed"]]
             answers.append(Conformance(path / group.strip("/"), (score, out_of), problems, remarks))
     return answers
+
+
+def remember_answers() -> None:
+    """Have compliance-checker remember its answers about a file, which does not change meanwhile."""
+    from compliance_checker.cf import util
+
+    def remembered(ask):
+        answers = {}
+
+        @functools.wraps(ask)
+        def answer(data):
+            # The file is kept, too, so that no other one can have its id.
+            if id(data) not in answers:
+                answers[id(data)] = data, ask(data)
+            return copy.copy(answers[id(data)][1])
+
+        return answer
+
+    for name in ASKED:
+        ask = getattr(util, f"get_{name}")
+        if not hasattr(ask, "__wrapped__"):
+            setattr(util, f"get_{name}", remembered(ask))
+
+
+def flat_files(path: Path, folder: Path) -> Iterator[tuple[str, Path]]:
+    """Write every group with variables to a file of its own, for tools that know no groups; yield its name and file.
+
+    What a group inherits stands in its file, too. A file without groups is yielded as it is.
+    """
+    import netCDF4
+
+    with netCDF4.Dataset(path) as data:
+        if not data.groups:
+            yield "/", path
+            return
+        pending = [data]
+        while pending:
+            group = pending.pop(0)
+            pending += group.groups.values()
+            if group.variables:
+                target = folder / f"{path.stem}{group.path.replace('/', '-').rstrip('-')}.nc"
+                with netCDF4.Dataset(target, "w") as flat:
+                    _copy_group(group, flat)
+                yield group.path, target
+
+
+def _copy_group(group, flat) -> None:
+    """Copy a group with the attributes of the groups above, and with the variables there that its own ones name."""
+    ancestry = [group]
+    while ancestry[0].parent is not None:
+        ancestry.insert(0, ancestry[0].parent)
+    known = {name: variable for above in ancestry for name, variable in above.variables.items()}
+    variables, pending = dict(group.variables), list(group.variables.values())
+    while pending:
+        variable = pending.pop()
+        texts = [str(variable.getncattr(key)) for key in NAMING if key in variable.ncattrs()]
+        for name in {*re.findall(r"\w+", " ".join(texts)), *variable.dimensions} & set(known) - set(variables):
+            variables[name] = known[name]
+            pending.append(known[name])
+    for above in ancestry:
+        flat.setncatts({key: above.getncattr(key) for key in above.ncattrs()})
+    for name, variable in variables.items():
+        for dimension in variable.get_dims():
+            if dimension.name not in flat.dimensions:
+                flat.createDimension(dimension.name, None if dimension.isunlimited() else dimension.size)
+        attributes = {key: variable.getncattr(key) for key in variable.ncattrs()}
+        fill = attributes.pop("_FillValue", None)
+        made = flat.createVariable(name, variable.datatype, variable.dimensions, fill_value=fill)
+        made.setncatts(attributes)
+        for both in (variable, made):
+            both.set_auto_maskandscale(False)
+            both.set_auto_chartostring(False)
+        made[...] = variable[...]
 
 
 def stay_off_the_network() -> None:
@@ -279,8 +360,7 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
 
 def main() -> int:
     """Validate what the command line names."""
-    from icha.deposit.deposit_files import verify_deposit
-    from icha.deposit.strangers_files import LARGE, LIMITS, NO_LIMITS, looked_through, unpack
+    from icha.deposit.verify import LARGE, Damaged, whole_deposit
     from icha.support.in_words import printable
     from icha.support.input_files import refuse_traps
 
@@ -292,25 +372,20 @@ def main() -> int:
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
-    deposit, name = arguments.deposit.absolute(), printable(arguments.deposit)
-    limits = NO_LIMITS if arguments.large else LIMITS
-    if problems := verify_deposit(deposit, limits):
-        print(*problems, sep="\n")
-        sys.exit(f"{name}: is not whole, so no validator has seen it")
-    with looked_through(deposit, limits) as found, tempfile.TemporaryDirectory() as scratch:
-        if CRATE not in found.sizes:
-            sys.exit(f"{name}: is no deposit: there is no {CRATE} in it")
-        folder = deposit
-        if not deposit.is_dir():
-            folder = Path(scratch)
-            unpack(found, folder)
-        for file in sorted(folder.rglob("*.nc")):
-            try:
+    name = printable(arguments.deposit)
+    try:
+        with whole_deposit(arguments.deposit.absolute(), large=arguments.large) as folder:
+            if not (folder / CRATE).is_file():
+                sys.exit(f"{name}: is no deposit: there is no {CRATE} in it")
+            for file in sorted(folder.rglob("*.nc")):
                 refuse_traps(file)
-            except (OSError, ValueError) as error:
-                sys.exit(f"{name}: {printable(file.relative_to(folder))}: {printable(error)}")
-        stay_off_the_network()
-        return 0 if validate(folder, arguments.only, sys.maxsize if arguments.all else 5) else 1
+            stay_off_the_network()
+            return 0 if validate(folder, arguments.only, sys.maxsize if arguments.all else 5) else 1
+    except Damaged as damaged:
+        print(*damaged.args, sep="\n")
+        sys.exit(f"{name}: is not whole, so no validator has seen it")
+    except (OSError, ValueError) as error:
+        sys.exit(f"{name}: {printable(error)}")
 
 
 if __name__ == "__main__":

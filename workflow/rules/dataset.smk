@@ -2,7 +2,7 @@
 # boundary elements; what every result must satisfy, and whether it does.
 
 from icha.configuration.cases import campaign_sha256
-from icha.deposit.attributes import discovery_attributes
+from icha.deposit.metadata import discovery_attributes
 from icha.support.checksums import sha256_of
 
 

@@ -2,9 +2,9 @@
 
 import contextlib
 import os
-import select
 import sys
 import threading
+import time
 import traceback
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,7 +22,7 @@ def _failures_of_solvers():
     names = {
         "icha.simulation": "ConvergenceError",
         "icha.contact.model": "NotConverged",
-        "icha.references.failures": "NotSolved",
+        "icha.references.finite_range": "NotSolved",
     }
     return [getattr(sys.modules[module], name) for module, name in names.items() if module in sys.modules]
 
@@ -137,28 +137,23 @@ def _end_with_snakemake():
 
     Worse, it could replace those of the next call, which computes them, too, and maybe of other values.
     """
-    if SNAKEMAKE not in os.environ or not hasattr(os, "pidfd_open"):
+    number, _, began = os.environ.get(SNAKEMAKE, "").partition(" ")
+    if not number:
         return  # no job of Snakemake, or not on Linux
-    number, _, began = os.environ[SNAKEMAKE].partition(" ")
-    number = int(number)
-    try:
-        snakemake = os.pidfd_open(number)
-    except OSError:  # it is gone, which is seen next, or processes may not be watched here
-        snakemake = None
-    try:
-        # Another process may have the number by now.
-        is_gone = beginning_of(number) != began
-    except (ProcessLookupError, FileNotFoundError):
-        is_gone = True
-    if is_gone:
-        os._exit(1)
-    if os.getppid() == number:
-        end_with_parent(number)
-    if snakemake is None:
-        return
+
+    def is_gone():
+        try:
+            return beginning_of(int(number)) != began  # another process may have the number by now
+        except (ProcessLookupError, FileNotFoundError):
+            return True
 
     def wait():
-        select.select([snakemake], [], [])
+        while not is_gone():
+            time.sleep(0.2)
         os._exit(1)
 
+    if is_gone():
+        os._exit(1)
+    if os.getppid() == int(number):
+        end_with_parent(int(number))
     threading.Thread(target=wait, daemon=True).start()

@@ -13,10 +13,8 @@ def publish(archive, *, results, files, named_files, project):
     """
     # What is imported at the top is imported for every job of a campaign.
     from icha.configuration.load import load_configuration
-    from icha.deposit.consistency import refuse_mixed
-    from icha.deposit.deposit import make_deposit
-    from icha.deposit.environment import refuse_other_environment
-    from icha.deposit.source import program_source
+    from icha.deposit.make import make_deposit, refuse_mixed
+    from icha.deposit.program import program_source, refuse_other_environment
     from icha.planning.plan import whole_cost
     from icha.support.checksums import asked_of
 
@@ -24,7 +22,7 @@ def publish(archive, *, results, files, named_files, project):
     sys.path.insert(0, str(Path(project, "workflow")))
     from provenance import recorded_jobs, recorded_parameters
 
-    refuse_other_environment(Path(project))
+    refuse_other_environment(Path(project), Path(results))
     used = "config.used.yaml"
     places = {file: str(Path(file).relative_to(results)) for file in files}
     given = {file: place for place, file in named_files.items()} | {f"{results}/{used}": used}
@@ -39,7 +37,6 @@ def publish(archive, *, results, files, named_files, project):
         archive,
         results=results,
         files=places.values(),
-        publication=campaign.published(),
         campaign=campaign,
         source=program_source(project),
         jobs=jobs,

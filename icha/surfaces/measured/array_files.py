@@ -1,8 +1,9 @@
 """Readers of arrays: npy, netCDF, HDF5, and whatever formats of instruments SurfaceTopography reads."""
 
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -129,7 +130,7 @@ def read_hdf5(source, how: Preparation) -> Found:
         file.visititems(note)
         plane = sorted(maps_among(shapes))
         asked = how.data.strip("/") if how.data else None
-        name = asked if asked in shapes else chosen_name(asked, plane, (), "dataset")
+        name = str(asked) if asked in shapes else chosen_name(asked, plane, (), "dataset")
         chosen = file[name]
         _require_room(chosen)
         heights = chosen[...].reshape(chosen.shape[-2:])
@@ -156,7 +157,7 @@ def _is_map(shape):
     return len(shape) >= 2 and all(count == 1 for count in shape[:-2])
 
 
-def maps_among(shapes: Mapping[Hashable, tuple[int, ...]]) -> list:
+def maps_among(shapes: Mapping[Any, tuple[int, ...]]) -> list:
     """Names of the arrays that can be maps of heights; lines and single numbers of two dimensions only if no other is.
 
     MATLAB keeps every number and every line as an array of two dimensions.
@@ -205,7 +206,8 @@ def read_instrument(file, how: Preparation) -> Found:
     topography = channel.topography(**({"physical_sizes": (1.0, 1.0)} if said is None else {}))
     heights = np.ma.filled(np.ma.asarray(topography.heights()).astype(float), np.nan).T
     unit = None if topography.unit is None else metres_of(topography.unit)
-    size = coordinates = None if said is None else tuple(float(side) for side in topography.physical_sizes)
+    size: Any = None if said is None else tuple(float(side) for side in topography.physical_sizes)
+    coordinates = size
     lateral = how.lateral_unit or unit
     if size is not None:
         size = None if lateral is None else tuple(side * lateral for side in size)

@@ -145,6 +145,6 @@ def _format_of(path: Path) -> str:
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:
         return known[suffix]
-    if (known := format_of_hdf5(path)) is not None:
-        return known
+    if (hdf5 := format_of_hdf5(path)) is not None:
+        return hdf5
     return "xyz" if path.name.lower().endswith(".xyz.gz") else "text"

@@ -44,7 +44,7 @@ _BYTES_OF_NODE = 64
 
 def read_matrix(file: SourceFile, how: Preparation) -> Found:
     """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
-    values, lines = file.values, file.layout.heading
+    values, lines = file.values, file.layout.heading  # type: ignore[union-attr]
     if lines and (known := _as_instrument_file(file, how)):
         return known
     heights, steps, remark = without_scales(values)
@@ -71,7 +71,7 @@ def _as_instrument_file(file, how):
 def read_xyz(file: SourceFile, how: Preparation) -> Found:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
     points = _columns_of_points(file.values, how)
-    heading = read_heading(file.layout.heading, points.shape)
+    heading = read_heading(file.layout.heading, points.shape)  # type: ignore[union-attr]
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
     (column, nx, dx), (row, ny, dy) = (_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
@@ -170,7 +170,7 @@ class Heading:
 
 def read_heading(lines: Sequence[str], shape: tuple[int, int]) -> Heading:
     """Read the heading of a table of a shape (rows, columns)."""
-    said = {}
+    said: dict[str, str] = {}
     for line in lines:
         if found := _LINE.match(line):
             said.setdefault(re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(), found[2].strip())

@@ -126,14 +126,15 @@ def layout_of(path: Path) -> Layout | None:
         return None
     if "\0" in start:
         return None
-    heading, words = [], False
+    heading: list[str] = []
+    words = False
     for number, line in enumerate(start.splitlines()[:_LONGEST_HEADING]):
         text = _without_remark(line)
         if text.strip():
             found = _delimiter(text)
             fields = _fields(text, found[0])
             numbers = [_number(field, found[1]) for field in fields]
-            if None not in numbers and not np.all(np.isnan(numbers)):
+            if None not in numbers and not np.all(np.isnan(numbers)):  # type: ignore[arg-type]
                 _refuse_damaged_row(heading, found)
                 return Layout(tuple(heading), words, number, *found, _columns(fields))
             words = True
@@ -273,7 +274,8 @@ def without_scales(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] 
         heights = heights[:, 1:]
     left_out = [name for name, step in (("row", across), ("column", down)) if step is not None]
     remark = f"first {' and '.join(left_out)} left out: numbers in equal steps, not heights"
-    return heights, (across, down) if len(left_out) == 2 else None, remark if left_out else ""
+    steps = None if across is None or down is None else (across, down)
+    return heights, steps, remark if left_out else ""
 
 
 def _scale(line, others):

@@ -62,8 +62,8 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     UnfitTopography
         A ValueError that says which setting (`key`) does not fit the file, why, and what is allowed.
     """
-    path, how = _existing(path), Preparation(**preparation)
-    scan = load_scan(path, how)
+    file, how = _existing(path), Preparation(**preparation)
+    scan = load_scan(file, how)
     touching = scan.heights if how.touches_first == "high" else -scan.heights
     part = cropped(scan.after(touching, f"{how.touches_first} numbers touch first"), how)
     missing, left = int(np.count_nonzero(~np.isfinite(part.heights))), part
@@ -73,8 +73,8 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     surface, steps = bounded(left, how)
     return PreparedTopography(
         surface=surface,
-        source_file=path.name,
-        source_sha256=sha256_of(path),
+        source_file=file.name,
+        source_sha256=sha256_of(file),
         description="; ".join(steps),
         format=scan.format,
         data=scan.data,

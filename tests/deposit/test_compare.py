@@ -8,18 +8,16 @@ import netCDF4
 import numpy as np
 import pytest
 
-from icha.deposit.rerun_comparison import (
+from icha.deposit.compare import (
     DIFFERENT,
     EXTRA,
     FLOOR,
     IDENTICAL,
     MISSING,
-    NOISE,
     TOLERANCE,
     WITHIN,
     compare_folders,
     compare_values,
-    lines,
     table,
     write_json,
 )
@@ -134,7 +132,7 @@ def test_a_planted_difference_is_found_and_nothing_else(planted, folders):
     write(rerun / FILE, change)
     comparison = compare_folders(deposit, rerun)
     (file,) = comparison.files
-    found = {item.name: item for item in file.items if item.verdict != IDENTICAL}
+    found = {each.name: each for each in file.differences}
     assert found[name].verdict == verdict and detail in found[name].detail, found
     assert comparison.verdict == file.verdict == (WITHIN if verdict == WITHIN else DIFFERENT)
     renaming = planted in ("type", "dimension") or planted.startswith(("missing", "extra"))
@@ -144,39 +142,31 @@ def test_a_planted_difference_is_found_and_nothing_else(planted, folders):
 
 def test_the_same_content_is_identical_however_it_is_stored(folders):
     deposit, rerun = folders
-    write(rerun / FILE)
-    assert compare_folders(deposit, rerun).files[0].items == ()  # not even opened
 
-    def reordered(file):
-        file.renameVariable("pressure", "old")
-        file.createVariable("pressure", "f8", ("step",), zlib=True)[:] = file["old"][:]
-        file["pressure"].factor = np.float64(2.5)
-        file["pressure"].units = "Pa"
+    def again(compressed):
+        def change(file):
+            file.renameVariable("pressure", "old")
+            file.createVariable("pressure", "f8", ("step",), zlib=compressed)[:] = file["old"][:]
 
-    write(deposit / FILE, lambda file: file.renameVariable("pressure", "old") or copy_of_old(file))
-    write(rerun / FILE, reordered)
-    (file,) = compare_folders(deposit, rerun).files
-    assert file.verdict == IDENTICAL and file.items and "storage" in file.detail
+        return change
 
-
-def copy_of_old(file):
-    file.createVariable("pressure", "f8", ("step",))[:] = file["old"][:]
-    file["pressure"].units = "Pa"
-    file["pressure"].factor = np.float64(2.5)
+    write(deposit / FILE, again(False))
+    write(rerun / FILE, again(True))
+    assert (deposit / FILE).read_bytes() != (rerun / FILE).read_bytes()
+    assert compare_folders(deposit, rerun).verdict == IDENTICAL
 
 
 def test_ragged_variables_of_other_lengths_are_different(folders):
     deposit, rerun = folders
     write(rerun / FILE, spots=6)
     (file,) = compare_folders(deposit, rerun).files
-    found = {item.name: item.detail for item in file.items if item.verdict != IDENTICAL}
+    found = {each.name: each.detail for each in file.differences}
     assert found == {"/study/spot (dimension)": "size: 4 and 6", "/study/radius": "shape: (4,) and (6,)"}
 
 
 def test_tolerance_holds_for_each_value_by_itself():
     """A thousandth is found in a small value beside large ones, and its measure is symmetric."""
-    generator = np.random.default_rng(1)
-    a = 10.0 ** generator.uniform(-4, 1, 1000)
+    a = 10.0 ** np.random.default_rng(1).uniform(-4, 1, 1000)
     for factor, verdict in ((1 + 0.9 * TOLERANCE, WITHIN), (1 + 1.1 * TOLERANCE, DIFFERENT)):
         for k in (int(np.argmin(a)), int(np.argmax(a))):
             b = a.copy()
@@ -185,118 +175,76 @@ def test_tolerance_holds_for_each_value_by_itself():
             assert one.verdict == other.verdict == verdict
             assert one.deviation == other.deviation == pytest.approx((factor - 1) / factor, rel=1e-6)
             assert f"at [{k}]" in one.detail
-    # The scale of what is smaller than that is the largest value's.
+    # Smaller values are measured by the largest one.
     a = np.array([1.0, 1e-9])
     assert compare_values(a, a + np.array([0, 0.9 * FLOOR * TOLERANCE])).verdict == WITHIN
     assert compare_values(a, a + np.array([0, 1.1 * FLOOR * TOLERANCE])).verdict == DIFFERENT
     assert compare_values(a, a + np.array([0, 1e-6]), noise=2e-6).verdict == WITHIN
+    assert compare_values(a, a.copy()) is None
 
 
-def test_files_that_are_missing_extra_damaged_or_drawn_otherwise(folders):
+@pytest.fixture
+def twice(folders):
+    """The same results twice, with figures and a page."""
     deposit, rerun = folders
-    (deposit / "figures").mkdir()
-    for name in ("a.png", "b.png", "c.pdf"):
-        (deposit / "figures" / name).write_bytes(b"picture")
-    (deposit / "verdict.txt").write_text("passed\n")
-    (deposit / "README.md").write_text("is not made by a rerun")
-    shutil.copytree(deposit, rerun)
-    (rerun / "README.md").unlink()
-    assert compare_folders(deposit, rerun).verdict == IDENTICAL
-    # Pictures that only look different are remarks; that they are there is not.
-    (rerun / "figures/a.png").write_bytes(b"PICTURE")
-    comparison = compare_folders(deposit, rerun)
-    assert comparison.verdict == WITHIN and [file.path for file in comparison.remarks] == ["figures/a.png"]
-    assert "figures/a.png: different" in table(comparison) and "look different" in table(comparison)
-    (rerun / "figures/b.png").unlink()
-    assert compare_folders(deposit, rerun).verdict == DIFFERENT
-    shutil.copyfile(deposit / "figures/b.png", rerun / "figures/b.png")
-    (rerun / "figures/d.png").write_bytes(b"picture")
-    comparison = compare_folders(deposit, rerun)
-    assert comparison.verdict == DIFFERENT and "figures/d.png: extra" in table(comparison)
-    assert compare_folders(deposit, rerun, [FILE]).verdict == IDENTICAL
-    (rerun / "figures/d.png").unlink()
-    (rerun / "verdict.txt").write_text("failed\n")
-    assert compare_folders(deposit, rerun).verdict == DIFFERENT
-    shutil.copyfile(deposit / "verdict.txt", rerun / "verdict.txt")
-    (rerun / FILE).write_bytes((rerun / FILE).read_bytes()[:-1000])
-    (found,) = [file for file in compare_folders(deposit, rerun).files if file.path == FILE]
-    assert found.verdict == DIFFERENT and "the rerun's cannot be opened" in found.detail
-    # A file that can be opened, and of whose values some cannot be read.
-    for folder in (deposit, rerun):
-        with netCDF4.Dataset(folder / FILE, "w") as file:
-            file.createDimension("step", 1000)
-            file.createVariable("pressure", "f8", ("step",), zlib=True, fletcher32=True)[:] = np.sqrt(np.arange(1000))
-    whole = (rerun / FILE).read_bytes()
-    spoilt = bytearray(whole)
-    spoilt[-2000:-1900] = bytes(100)
-    (rerun / FILE).write_bytes(spoilt)
-    (found,) = [file for file in compare_folders(deposit, rerun).files if file.path == FILE]
-    assert found.verdict == DIFFERENT and "cannot be compared: RuntimeError" in found.detail
-
-
-def test_checks_have_to_be_passed_alike(tmp_path):
-    check = {"name": "residual", "subject": "a/b", "value": 1e-12, "limit": NOISE["residual"], "passed": True}
-
-    def verdict(**changes):
-        for folder, content in (("deposit", check), ("rerun", check | changes)):
-            (tmp_path / folder).mkdir(exist_ok=True)
-            (tmp_path / folder / "checks.json").write_text(json.dumps([content]))
-        return compare_folders(tmp_path / "deposit", tmp_path / "rerun").verdict
-
-    assert verdict() == IDENTICAL
-    assert verdict(value=5e-9) == WITHIN
-    assert verdict(value=5e-8) == DIFFERENT
-    assert verdict(passed=False) == DIFFERENT
-    assert verdict(limit=1.0) == DIFFERENT
-    assert verdict(name="another") == DIFFERENT
-
-
-CHECK = {"name": "residual", "subject": "a/b", "value": 1e-12, "limit": 1e-8, "passed": True}
+    for path, text in {
+        "figures/a.png": "picture",
+        "figures/b.pdf": "page",
+        "checks.json": "[]",
+        "verdict.txt": "passed",
+        "README.md": "is not computed",
+    }.items():
+        (deposit / path).parent.mkdir(exist_ok=True)
+        (deposit / path).write_text(text)
+    return deposit, shutil.copytree(deposit, rerun)
 
 
 @pytest.mark.parametrize(
-    "content",
+    ("change", "path", "verdict", "of_all"),
     [
-        json.dumps([{key: value for key, value in CHECK.items() if key != "value"}]),
-        json.dumps([CHECK | {"value": "q"}]),
-        json.dumps([CHECK | {"value": [1, 2, 3]}]),
-        json.dumps([CHECK | {"name": 3}]),
-        json.dumps([CHECK | {"name": "\ud800"}]),
-        json.dumps([1, 2, 3]),
-        100_000 * "[",
-        "\xff",
+        (lambda r: (r / "README.md").unlink(), None, None, IDENTICAL),
+        (lambda r: (r / "figures/a.png").write_text("PICTURE"), "figures/a.png", DIFFERENT, WITHIN),
+        (lambda r: (r / "checks.json").write_text("[1]"), "checks.json", DIFFERENT, WITHIN),
+        (lambda r: (r / "figures/a.png").unlink(), "figures/a.png", MISSING, DIFFERENT),
+        (lambda r: (r / "figures/d.png").touch(), "figures/d.png", EXTRA, DIFFERENT),
+        (lambda r: (r / "verdict.txt").write_text("failed"), "verdict.txt", DIFFERENT, DIFFERENT),
+        (lambda r: (r / FILE).write_bytes(b"no netCDF"), FILE, DIFFERENT, DIFFERENT),
+        (lambda r: write(r / FILE, attribute("pressure", "missing_value", "none")), FILE, DIFFERENT, DIFFERENT),
     ],
 )
-def test_checks_that_are_none_are_different_and_end_nothing(content, tmp_path):
-    for folder, text in (("deposit", content), ("rerun", json.dumps([CHECK]))):
-        write(tmp_path / folder / FILE)
-        (tmp_path / folder / "checks.json").write_text(text, encoding="latin-1")
-    comparison = compare_folders(tmp_path / "deposit", tmp_path / "rerun")
-    assert [file.verdict for file in comparison.files] == [DIFFERENT, IDENTICAL]
-    table(comparison).encode()
+def test_files_that_are_missing_extra_damaged_or_drawn_otherwise(change, path, verdict, of_all, twice, tmp_path):
+    change(twice[1])
+    comparison = compare_folders(*twice)
+    assert {file.path: file.verdict for file in comparison.files if file.differences} == (
+        {path: verdict} if path else {}
+    )
+    assert comparison.verdict == of_all
+    assert path is None or path.split("/")[0] in table(comparison)
+    assert compare_folders(*twice, ["figures/b.pdf"]).verdict == IDENTICAL
     write_json(comparison, tmp_path / "out.json")
-    assert json.loads((tmp_path / "out.json").read_text())["files"][0]["verdict"] == DIFFERENT
+    assert json.loads((tmp_path / "out.json").read_text())["verdict"] == of_all
 
 
-def test_attributes_that_are_of_no_use_are_different_and_end_nothing(folders):
+def test_values_that_cannot_be_read_are_different(folders):
+    for folder in folders:
+        (folder / FILE).parent.mkdir(parents=True, exist_ok=True)
+        with netCDF4.Dataset(folder / FILE, "w") as file:
+            file.createDimension("step", 1000)
+            file.createVariable("pressure", "f8", ("step",), zlib=True, fletcher32=True)[:] = np.sqrt(np.arange(1000))
+    spoilt = bytearray((folders[1] / FILE).read_bytes())
+    spoilt[-2000:-1900] = bytes(100)
+    (folders[1] / FILE).write_bytes(spoilt)
+    (found,) = compare_folders(*folders).files
+    assert found.verdict == DIFFERENT and "cannot be compared: RuntimeError" in found.differences[0].detail
+
+
+def test_a_file_with_links_to_other_files_is_not_opened(folders, tmp_path):
     deposit, rerun = folders
-    write(deposit / FILE, lambda file: file["pressure"].setncattr("missing_value", "none"))
     write(rerun / FILE)
+    with h5py.File(rerun / FILE, "a") as file:
+        file["elsewhere"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
     (found,) = compare_folders(deposit, rerun).files
-    assert found.verdict == DIFFERENT
-
-
-@pytest.mark.parametrize("link", [FILE, "runs", "runs/load/rough", "checks.json"])
-def test_links_to_the_deposit_s_own_results_are_not_the_same_results(link, folders):
-    """Whoever runs the program of a stranger is left with what that has made, which may be links."""
-    deposit, rerun = folders
-    (deposit / "checks.json").write_text("[]")
-    shutil.copytree(deposit, rerun, dirs_exist_ok=True)
-    assert compare_folders(deposit, rerun).verdict == IDENTICAL
-    shutil.rmtree(rerun / link) if (rerun / link).is_dir() else (rerun / link).unlink()
-    (rerun / link).symlink_to(deposit / link)
-    assert compare_folders(deposit, rerun).verdict == DIFFERENT
-    assert compare_folders(deposit, rerun, [FILE, "checks.json"]).verdict == DIFFERENT
+    assert found.verdict == DIFFERENT and "is a link to another file" in found.differences[0].detail
 
 
 def test_the_same_difference_in_many_files_is_one_line(tmp_path):
@@ -304,29 +252,8 @@ def test_the_same_difference_in_many_files_is_one_line(tmp_path):
         path = f"runs/load/rough/seed{k}/slope1/soft.nc"
         write(tmp_path / "deposit" / path)
         write(tmp_path / "rerun" / path, changed("pressure", 3, 1e3 * (1 + k * 1e-8)))
+    text = table(compare_folders(tmp_path / "deposit", tmp_path / "rerun"))
+    assert text.count("pressure") == 1 and "3e-08 at most (3 files, most in runs/load/rough/seed3" in text
     write(tmp_path / "rerun" / path, changed("pressure", 3, 2e3))
-    comparison = compare_folders(tmp_path / "deposit", tmp_path / "rerun")
-    # Those that are different stand first.
-    different, within = lines(comparison)
-    assert (different.item.verdict, different.count, different.worst) == (DIFFERENT, 1, path)
-    assert (within.item.verdict, within.count) == (WITHIN, 2) and "seed2" in within.worst
-    head, row, *_ = table(comparison).splitlines()
-    assert head.split() == ["files", "within", "tolerance", "different"] and row.split() == ["runs", "3", "2", "1"]
-    write_json(comparison, tmp_path / "out.json")
-    written = json.loads((tmp_path / "out.json").read_text())
-    assert written["verdict"] == DIFFERENT and len(written["files"]) == 3
-    assert written["files"][2]["path"] == path and written["files"][2]["verdict"] == DIFFERENT
-    values = {each["name"]: each for each in written["files"][2]["variables"]}
-    assert values["/pressure"]["deviation"] == 0.5 and values["/area"]["verdict"] == IDENTICAL
-
-
-def test_values_that_a_deposit_has_elsewhere_are_not_read(folders, tmp_path):
-    deposit, rerun = folders
-    write(rerun / FILE)
-    (tmp_path / "secret").write_bytes(np.arange(5.0).tobytes())
-    with h5py.File(deposit / FILE, "a") as file:
-        del file["gap"]
-        file.create_dataset("gap", (5,), "f8", external=[(str(tmp_path / "secret"), 0, 40)])
-    (found,) = compare_folders(deposit, rerun).files
-    assert found.verdict == DIFFERENT and "'gap' has its data elsewhere" in found.detail and not found.items
-    assert "4.0" not in table(compare_folders(deposit, rerun))
+    lines = table(compare_folders(tmp_path / "deposit", tmp_path / "rerun")).splitlines()
+    assert "different" in lines[2] and "within tolerance" in lines[3]  # after headings and counts

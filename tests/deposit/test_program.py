@@ -1,13 +1,17 @@
-"""The source of a deposit is what was committed, and nothing else can be published."""
+"""The source of a deposit is what was committed or installed, its environment that of the lock."""
 
+import hashlib
+import importlib.metadata
 import re
 import shutil
 import subprocess
+from base64 import urlsafe_b64encode
 
 import pytest
+from conftest import REPOSITORY
 
-from icha.deposit.deposit_files import files_of
-from icha.deposit.source import committed_source
+from icha.deposit.program import MADE_WITH, differences, note_versions, program_source, refuse_other_environment
+from icha.deposit.verify import files_of
 
 
 def git(folder, *arguments):
@@ -44,7 +48,7 @@ def repository(tmp_path):
 
 
 def test_source_is_what_was_committed_byte_by_byte(repository, tmp_path):
-    source = committed_source(repository)
+    source = program_source(repository)
     assert source.revision == git(repository, "rev-parse", "HEAD").strip()
     source.export(tmp_path / "export")
     exported = {name: tmp_path / "export" / name for name in files_of(tmp_path / "export")}
@@ -68,14 +72,14 @@ def test_source_is_what_was_committed_byte_by_byte(repository, tmp_path):
 def test_changes_that_are_not_committed_are_refused(repository, spoil, said):
     spoil(repository)
     with pytest.raises(ValueError, match=f"git commit(.|\n)*{re.escape(said)}"):
-        committed_source(repository)
+        program_source(repository)
 
 
 def test_changes_cannot_be_hidden(repository, monkeypatch, tmp_path):
     (repository / "icha/more.py").write_text("TWO = 2\n")
     git(repository, "add", "icha/more.py")
     with pytest.raises(ValueError, match=r"not committed: icha/more\.py"):
-        committed_source(repository)
+        program_source(repository)
     git(repository, "reset", "--quiet")
     (repository / ".git/info/exclude").write_text("more.py\n")
     (tmp_path / "ignore").write_text("more.py\n")
@@ -83,23 +87,23 @@ def test_changes_cannot_be_hidden(repository, monkeypatch, tmp_path):
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", str(tmp_path / "gitconfig"))
     assert git(repository, "status", "--porcelain") == ""
     with pytest.raises(ValueError, match=r"not committed: icha/more\.py"):
-        committed_source(repository)
+        program_source(repository)
     (repository / "icha/more.py").unlink()
     git(repository, "update-index", "--assume-unchanged", "icha/physics.py")
     (repository / "icha/physics.py").write_text("ONE = 2\n")
     assert git(repository, "status", "--porcelain") == ""
     with pytest.raises(ValueError, match=r"changed: icha/physics\.py"):
-        committed_source(repository)
+        program_source(repository)
 
 
 def test_configurations_results_and_other_files_are_no_part_of_the_program(repository):
-    commit = committed_source(repository).revision
+    commit = program_source(repository).revision
     (repository / "config/config.yaml").write_text("name: yours\n")
     for name in ("config/campaigns/new.yaml", "results/x.nc", "icha/__pycache__/physics.pyc", "notes.txt"):
         (repository / name).parent.mkdir(parents=True, exist_ok=True)
         (repository / name).write_text("")
-    source = committed_source(repository)
-    assert source.revision == commit and "notes.txt" not in source.files
+    source = program_source(repository)
+    assert source.revision == commit
 
 
 def test_a_project_may_be_a_part_of_a_repository_and_of_a_shallow_clone(repository, tmp_path, monkeypatch):
@@ -115,7 +119,7 @@ def test_a_project_may_be_a_part_of_a_repository_and_of_a_shallow_clone(reposito
     for folder in (outer, tmp_path / "shallow"):
         # Where git thinks that it is called from a hook.
         monkeypatch.setenv("GIT_DIR", str(repository / ".git"))
-        source = committed_source(folder / "sub/contact")
+        source = program_source(folder / "sub/contact")
         monkeypatch.delenv("GIT_DIR")
         assert source.revision == git(outer, "rev-parse", "HEAD").strip()
         target = tmp_path / f"of_{folder.name}"
@@ -124,18 +128,107 @@ def test_a_project_may_be_a_part_of_a_repository_and_of_a_shallow_clone(reposito
         assert {name: (target / name).read_bytes() for name in files_of(target)} == own
 
 
-def test_folders_without_a_commit_are_refused(repository, tmp_path, monkeypatch):
+def test_folders_without_a_commit_and_links_are_refused(repository, tmp_path, monkeypatch):
     plain = shutil.copytree(repository, tmp_path / "plain", ignore=shutil.ignore_patterns(".git"))
-    with pytest.raises(ValueError, match=r"is not under git(.|\n)*git init"):
-        committed_source(plain)
-    git(plain, "init", "--quiet")
-    with pytest.raises(ValueError, match="nothing is committed yet"):
-        committed_source(plain)
+    for _ in range(2):
+        with pytest.raises(ValueError, match=r"not under git, or nothing is committed yet(.|\n)*git init"):
+            program_source(plain)
+        git(plain, "init", "--quiet")
     (repository / "link").symlink_to("Snakefile")
     git(repository, "add", "link")
     git(repository, "commit", "--quiet", "--message", "Link")
-    with pytest.raises(ValueError, match=r"files only(.|\n)*link"):
-        committed_source(repository)
+    with pytest.raises(ValueError, match="changed: link"):
+        program_source(repository)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ValueError, match="git: no such program"):
-        committed_source(repository)
+        program_source(repository)
+
+
+INSTALLED = {
+    "icha/__init__.py": "",
+    "icha/physics.py": "ONE = 1\n",
+    "icha_workflow/Snakefile": "rule all:\n",
+    "icha_workflow/uv.lock": "version = 1\n",
+    "snakemake_logger_plugin_icha/__init__.py": "",
+}
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder as pip leaves it."""
+    place, record = tmp_path / "site-packages", []
+    for name, text in INSTALLED.items():
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        (place / name).write_text(text)
+        digest = urlsafe_b64encode(hashlib.sha256(text.encode()).digest()).decode().rstrip("=")
+        record.append(f"{name},sha256={digest},{len(text)}")
+    information = place / "icha-7.1.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.4\nName: icha\nVersion: 7.1\n")
+    (information / "RECORD").write_text("\n".join([*record, "../../bin/icha,sha256=x,1", "icha/physics.pyc,,"]) + "\n")
+    return place
+
+
+def test_source_is_what_was_installed_in_its_places_in_the_repository(place, tmp_path):
+    (place / "icha/__pycache__").mkdir()
+    (place / "icha/__pycache__/physics.pyc").write_bytes(b"x")
+    source = program_source(place / "icha_workflow")
+    own = {name: text for name, text in INSTALLED.items() if name.startswith("icha")}
+    listed = "".join(f"{hashlib.sha256(own[name].encode()).hexdigest()}  {name}\n" for name in sorted(own))
+    assert source.revision == f"icha-7.1-{hashlib.sha256(listed.encode()).hexdigest()}"
+    source.export(tmp_path / "export")
+    assert {name: (tmp_path / "export" / name).read_text() for name in files_of(tmp_path / "export")} == {
+        name.removeprefix("icha_workflow/"): text for name, text in own.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda p: (p / "icha/physics.py").write_text("ONE = 2\n"), "changed: icha/physics.py"),
+        (lambda p: (p / "icha_workflow/Snakefile").unlink(), "changed: icha_workflow/Snakefile"),
+        (lambda p: (p / "icha/more.py").write_text(""), "not of the installed version: icha/more.py"),
+        (lambda p: (p / "icha-7.1.dist-info").rename(p / "other"), "no distribution `icha` is installed here"),
+    ],
+)
+def test_another_program_than_what_was_installed_is_refused(place, spoil, said):
+    spoil(place)
+    with pytest.raises(ValueError, match=re.escape(said)):
+        program_source(place / "icha_workflow")
+
+
+def write_lock(folder, **versions):
+    packages = (
+        f'[[package]]\nname = "{name}"\nversion = "{version}"\nsource = {{ registry = "https://pypi.org/simple" }}\n'
+        for name, version in versions.items()
+    )
+    text = "".join(['version = 1\n[[package]]\nname = "icha"\nsource = { editable = "." }\n', *packages])
+    (folder / "uv.lock").write_text(text)
+    return text
+
+
+def test_another_environment_than_the_locked_one_is_refused(tmp_path):
+    numpy = importlib.metadata.version("numpy")
+    assert differences(write_lock(tmp_path, NumPy=numpy, nobody="1")) == []
+    assert differences(write_lock(tmp_path, NumPy="0.1")) == [f"  numpy: {numpy} is installed, 0.1 is locked"]
+    with pytest.raises(ValueError, match=r"make environment(.|\n)*icha: imported from(.|\n)*numpy: "):
+        refuse_other_environment(tmp_path, tmp_path / "results")
+
+
+def test_results_that_were_made_with_other_versions_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("icha.deposit.program.package_of", lambda project: REPOSITORY / "icha")
+    results = tmp_path / "results/mine"
+    write_lock(tmp_path, numpy=importlib.metadata.version("numpy"))
+    refuse_other_environment(tmp_path, results)  # nothing is known of them
+    results.mkdir(parents=True)
+    note_versions(results)
+    refuse_other_environment(tmp_path, results)
+    (results / MADE_WITH).write_text("numpy==0.1\nother==3\n")
+    note_versions(results)
+    noted = (results / MADE_WITH).read_text().splitlines()
+    assert "numpy==0.1" in noted and len([line for line in noted if line.startswith("numpy==")]) == 2
+    with pytest.raises(ValueError, match=r"made with versions that are not those of uv\.lock(.|\n)*  numpy 0\.1"):
+        refuse_other_environment(tmp_path, results)
+    written = (results / MADE_WITH).stat().st_mtime_ns
+    note_versions(results)
+    assert (results / MADE_WITH).stat().st_mtime_ns == written

@@ -1,0 +1,205 @@
+"""Make a deposit: results with all that others need to understand, trust and compute them again, as a folder and a zip.
+
+The same results of the same revision give the same bytes: the only times and the only names of people, machines and
+folders are those in the results, the configuration and the source.
+"""
+
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import xarray as xr
+
+from icha.analysis.checks import read_checks, refuse_unknown_failures
+from icha.configuration.campaign import Campaign
+from icha.configuration.cases import campaign_sha256, run_sha256
+from icha.configuration.publication import Publication
+from icha.datasets.files import read_campaign
+from icha.deposit.crate import Job, write_crate
+from icha.deposit.metadata import citation_cff, datacite_metadata, known_licence, zenodo_metadata
+from icha.deposit.program import Source
+from icha.deposit.readme import data_dictionary, dictionary_csv, readme
+from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
+from icha.planning.costs import Cost
+from icha.planning.plan import read_attributes
+from icha.planning.results import campaign_files
+from icha.support.atomic_files import sync_folder, while_owned, whole_file
+from icha.support.checksums import is_whole, made_as, sha256_of, stale
+
+_BLOCK = 2**20
+# The earliest time that a zip can hold.
+_NO_TIME = (1980, 1, 1, 0, 0, 0)
+# The system in a zip to which modes of files belong.
+_UNIX = 3
+
+
+def make_deposit(
+    folder: str | os.PathLike,
+    archive: str | os.PathLike,
+    *,
+    results: str | os.PathLike,
+    files: Iterable[str],
+    campaign: Campaign,
+    source: Source,
+    jobs: Sequence[Job],
+    cost: Cost,
+) -> None:
+    """Write a deposit to `folder` and, as a zip, to `archive`, replacing what is there; whole, or not at all.
+
+    Parameters
+    ----------
+    folder, archive : where it goes. The name of the folder is also that within the archive.
+    results : the campaign's folder of results.
+    files : what of it is published, by paths from there: at least config.used.yaml, checks.json and the campaign
+        dataset.
+    campaign : what was asked for, with complete metadata (`icha.configuration.publication.needed`).
+    source : the source of the program.
+    jobs : those that made the results.
+    cost : what computing the campaign is expected to take.
+
+    Raises
+    ------
+    ValueError
+        If a file is not what its job wrote or has a name that not every system can have, or if the failed checks are
+        not exactly the known failures.
+    """
+    folder, archive, results = Path(folder), Path(archive), Path(results)
+    files, publication = sorted(files), campaign.published()
+    _refuse_unknown_failures(results, publication)
+    _refuse_changed(results, files)
+    part = folder.with_name(f".{folder.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    try:
+        for file in files:
+            (part / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(results / file, part / file)
+            (part / file).chmod(0o644)
+        source.export(part / SOURCE)
+        _refuse_names(files_of(part))
+        _describe(part, files, campaign, source.revision, cost)
+        checksums = {path: sha256_of(part / path) for path in files_of(part)}
+        write_crate(part, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
+        checksums[CRATE] = sha256_of(part / CRATE)
+        _write(part / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
+        with whole_file(archive) as temporary:
+            _write_zip(temporary, part, folder.name)
+            sync_folder(part)
+            with while_owned():
+                # What was here before goes at once, and its checksums with it.
+                archive.unlink(missing_ok=True)
+                _remove(folder)
+                part.rename(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _refuse_names(files: Iterable[str]) -> None:
+    """Refuse names that `verify` would refuse."""
+    if wrong := [f"  {file!r} {problem}" for file in files if (problem := problem_with_name(file))]:
+        raise ValueError("not published, because of these names; rename the files:\n" + "\n".join(wrong))
+
+
+def _refuse_unknown_failures(results: Path, publication: Publication) -> None:
+    try:
+        refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
+    except ValueError as error:
+        raise ValueError(
+            "not published, since readers would not know of failures; needed: results without them, or each run that "
+            f"fails, and no other, among publication.known_failures with its reason:\n{error}"
+        ) from None
+
+
+def _refuse_changed(results: Path, files: Iterable[str]) -> None:
+    """Refuse results that are not what their jobs wrote, as far as that is recorded; every byte is read."""
+    changed = [file for file in files if not is_whole(results, file, thorough=True)]
+    if changed:
+        raise ValueError(
+            "not published, since these files of the results are not what was written; needed: remove them, and run "
+            "the campaign again:\n" + "\n".join(f"  {results / file}" for file in changed)
+        )
+
+
+def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str]) -> None:
+    """Refuse results that do not belong together: computed with other settings, or not from one another.
+
+    Parameters
+    ----------
+    results : the campaign's folder of results.
+    campaign : what is published.
+    recorded : results, from that folder, with what the workflow has recorded that it asked of their jobs
+        (`icha.support.checksums.asked_of`).
+
+    Raises
+    ------
+    ValueError
+        Naming each of them and the reason.
+    """
+    files = campaign_files(campaign)
+    expected = {path: run_sha256(campaign, case) for path, case in files.runs.items()}
+    expected[files.dataset] = campaign_sha256(campaign)
+    wrong = dict(stale(results, recorded))
+    for path, sha256 in expected.items():
+        if (read_attributes(results / path) or {}).get("config_sha256") != sha256:
+            wrong[path] = "it was not computed with the settings of this campaign"
+    for path, asked in recorded.items():
+        if asked != made_as(results, path):
+            wrong.setdefault(path, "the workflow has recorded another job for it")
+    if wrong:
+        raise ValueError(
+            "not published, since these results do not belong together; needed: remove them, and give the same command "
+            "again:\n" + "\n".join(f"  {results / path}: {why}" for path, why in sorted(wrong.items()))
+        )
+
+
+def _describe(part: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
+    """Write the files by which the deposit describes itself."""
+    publication, dictionary = campaign.published(), data_dictionary(part, files)
+    _write(part / "LICENSE.txt", known_licence(publication.license).page(SOURCE))
+    _write(part / "CITATION.cff", citation_cff(publication, revision))
+    for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
+        _write(part / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    _write(part / "data_dictionary.csv", dictionary_csv(dictionary))
+    error = part / "aggregated/model_error.nc"
+    # Opened and not loaded, since the dataset may be large and the page shows little of it.
+    with xr.open_datatree(part / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
+        page = readme(
+            campaign,
+            revision=revision,
+            dataset=dataset,
+            checks=read_checks(part / "checks.json"),
+            model_error=read_campaign(error) if error.is_file() else None,
+            dictionary=dictionary,
+            sizes={path: (part / path).stat().st_size for path in files_of(part)},
+            cost=cost,
+        )
+    _write(part / README, page)
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+    path.chmod(0o644)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder so that at no moment a part of it has its name."""
+    if folder.is_dir():
+        old = folder.with_name(f".{folder.name}.old")
+        shutil.rmtree(old, ignore_errors=True)
+        folder.rename(old)
+        shutil.rmtree(old)
+
+
+def _write_zip(path: Path, folder: Path, name: str) -> None:
+    """Write all files of a folder to a zip, in a folder of the given name; without compression, as zlib may differ."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for file in files_of(folder):
+            status = (folder / file).stat()
+            entry = zipfile.ZipInfo(f"{name}/{file}", date_time=_NO_TIME)
+            entry.create_system = _UNIX
+            entry.external_attr = (0o100000 | (0o755 if status.st_mode & 0o100 else 0o644)) << 16
+            entry.file_size = status.st_size
+            with (folder / file).open("rb") as content, archive.open(entry, "w") as stored:
+                shutil.copyfileobj(content, stored, _BLOCK)

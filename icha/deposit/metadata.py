@@ -1,0 +1,367 @@
+"""Metadata of a deposit: licence, citation (CITATION.cff), Zenodo, DataCite, and attributes of the campaign dataset."""
+
+import json
+import re
+from html import escape
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
+
+from icha.configuration.campaign import Campaign
+from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
+from icha.contact.models import MODEL_PAPER
+from icha.deposit.verify import ZENODO, read_text
+
+_TEXTS = Path(__file__).parent / "license_texts"
+# Names and addresses of the licences whose text is in `_TEXTS`, as their authors give them.
+_USUAL_LICENCES = {
+    "CC-BY-4.0": ("Creative Commons Attribution 4.0 International", "https://creativecommons.org/licenses/by/4.0/"),
+    "CC-BY-SA-4.0": (
+        "Creative Commons Attribution-ShareAlike 4.0 International",
+        "https://creativecommons.org/licenses/by-sa/4.0/",
+    ),
+    "CC0-1.0": ("CC0 1.0 Universal", "https://creativecommons.org/publicdomain/zero/1.0/"),
+    "ODbL-1.0": ("Open Data Commons Open Database License v1.0", "https://opendatacommons.org/licenses/odbl/1-0/"),
+}
+# Zenodo's types of related works, by DataCite's names (https://developers.zenodo.org, deposit metadata).
+_ZENODO_TYPES = {
+    "Book": "publication-book",
+    "BookChapter": "publication-section",
+    "ConferencePaper": "publication-conferencepaper",
+    "Dataset": "dataset",
+    "Dissertation": "publication-thesis",
+    "Image": "image-other",
+    "JournalArticle": "publication-article",
+    "Other": "other",
+    "Preprint": "publication-preprint",
+    "Report": "publication-report",
+    "Software": "software",
+    "Text": "publication-other",
+    "Workflow": "other",
+}
+# Funders whose grants Zenodo accepts, by their number in the funder registry 10.13039 (the same page).
+_ZENODO_FUNDERS = (
+    "501100000923 501100002428 501100000780 501100000806 501100002341 501100004488 501100001871 501100004564 "
+    "501100006588 501100000925 100000002 100000001 501100003246 501100000690 501100001711 501100001602 100004440"
+)
+_FUNDER_REGISTRY, _ROR, _ZENODO_DOI = "10.13039/", "https://ror.org/", "10.5281/zenodo."
+
+
+class Licence(NamedTuple):
+    """A licence.
+
+    Attributes
+    ----------
+    identifier : its SPDX identifier.
+    name, address : its name and web address.
+    text : its text, if ICHA has it; else empty.
+    """
+
+    identifier: str
+    name: str
+    address: str
+    text: str
+
+    def page(self, source: str) -> str:
+        """Write LICENSE.txt of a deposit whose data have this licence; `source` is the folder of the program."""
+        name = self.identifier if self.name == self.identifier else f"{self.name} ({self.identifier})"
+        said = (
+            f"Data, figures and texts of this deposit: {name}\n{self.address}\n\n"
+            f"The program in {source}/ has a licence of its own: {source}/LICENSE\n"
+        )
+        return f"{said}\n{'-' * 72}\n\n{self.text}" if self.text else said
+
+
+def known_licence(identifier: str) -> Licence:
+    """Return the licence with an SPDX identifier.
+
+    Raises
+    ------
+    ValueError
+        If SPDX has no such licence or spells it differently, or if it is an expression of several licences.
+    """
+    try:
+        found = canonicalize_license_expression(identifier)
+    except InvalidLicenseExpression:
+        found = ""
+    if not re.fullmatch(r"(?!LicenseRef-)[A-Za-z0-9.-]+", found):
+        raise ValueError(
+            "is not a licence known to SPDX; allowed: one identifier of https://spdx.org/licenses, for data usually "
+            f"one of {', '.join(_USUAL_LICENCES)}"
+        )
+    if identifier != found:
+        raise ValueError(f"is not spelled as SPDX spells it; allowed: {found!r}")
+    if found not in _USUAL_LICENCES:
+        return Licence(found, found, f"https://spdx.org/licenses/{found}.html", "")
+    return Licence(found, *_USUAL_LICENCES[found], (_TEXTS / f"{found}.txt").read_text(encoding="utf-8"))
+
+
+def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
+    """Return key and text of what is wrong with the licence of a campaign's data; None if a deposit can have it."""
+    licence = campaign.published().license
+    try:
+        known_licence(licence)
+    except ValueError as error:
+        return "publication.license" if campaign.publication.license else "license", f"{licence!r} {error}"
+    return None
+
+
+def acknowledgement(funding: Funding) -> str:
+    """Write a sentence that names the funder and the grant."""
+    number = f"award {funding.award_number}" if funding.award_number else ""
+    award = ": ".join(filter(None, (number, funding.award_title)))
+    return f"Funded by {funding.funder}{f' ({award})' if award else ''}"
+
+
+def discovery_attributes(publication: Publication) -> dict[str, str]:
+    """Return the attributes of the Attribute Convention for Data Discovery (ACDD 1.3) for a dataset.
+
+    Several creators are separated by semicolons, since names hold commas, in the same order in every attribute.
+    """
+    authors = publication.authors
+    values = {
+        "creator_name": [author.full_name for author in authors],
+        "creator_type": ["person" if author.is_person else "institution" for author in authors],
+        "creator_url": [author.orcid_address or author.ror or "" for author in authors],
+        "creator_institution": [author.affiliation or "" for author in authors],
+        "keywords": [", ".join(publication.keywords)],
+        "product_version": [publication.version or ""],
+        "acknowledgement": [acknowledgement(each) for each in publication.funding],
+        "metadata_link": [f"https://doi.org/{publication.doi}" if publication.doi else ""],
+    }
+    return {name: "; ".join(texts) for name, texts in values.items() if any(texts)}
+
+
+def web_address(identifier: str) -> str:
+    """Return the web address of a DOI, of `arXiv:…`, or of a web address itself."""
+    if identifier.startswith("10."):
+        return f"https://doi.org/{identifier}"
+    return identifier.replace("arXiv:", "https://arxiv.org/abs/", 1)
+
+
+def citation_cff(publication: Publication, revision: str) -> str:
+    """Write CITATION.cff of the data, Citation File Format 1.2.0 (https://doi.org/10.5281/zenodo.5171937).
+
+    Parameters
+    ----------
+    publication : what is to be cited; complete (`icha.configuration.publication.needed`).
+    revision : the state of the program that made the data.
+    """
+    licence = known_licence(publication.license)
+    content = {
+        "cff-version": "1.2.0",
+        "message": "If you use these data, please cite them as below, and the paper of their model (in references).",
+        "type": "dataset",
+        "title": publication.title,
+        "abstract": publication.summary,
+        "authors": [_cff_author(author) for author in publication.authors],
+        "version": publication.version,
+        "date-released": publication.date,
+        # The format accepts only the licences that SPDX had in 2021, but the address of any.
+        "license": licence.identifier if licence.text else None,
+        "license-url": None if licence.text else licence.address,
+        "commit": revision,
+        "doi": publication.doi,
+        "keywords": publication.keywords,
+        "references": [
+            {
+                "type": "article",
+                "title": MODEL_PAPER.title,
+                "authors": [{"family-names": family, "given-names": given} for given, family in MODEL_PAPER.authors],
+                "year": MODEL_PAPER.year,
+                "url": MODEL_PAPER.address,
+            }
+        ],
+    }
+    return yaml.safe_dump(_given(content), sort_keys=False, allow_unicode=True, width=100)
+
+
+def _cff_author(author: Author) -> dict[str, str]:
+    if not author.is_person:
+        return _given({"name": author.name, "website": author.ror})
+    names = {"family-names": author.family_names, "given-names": author.given_names}
+    return _given(names | {"orcid": author.orcid_address, "affiliation": author.affiliation})
+
+
+def zenodo_metadata(publication: Publication) -> dict[str, Any]:
+    """Return the metadata of `.zenodo.json`, as Zenodo's deposit API takes them (https://developers.zenodo.org).
+
+    Grants are listed where Zenodo knows the funder. The notes have all funding, and the runs that are published
+    although a check fails.
+    """
+    notes = [f"{acknowledgement(funding)}." for funding in publication.funding]
+    notes += [f"Published with a failed check: {each.run}. {each.reason}" for each in publication.known_failures]
+    funders = {f"{_FUNDER_REGISTRY}{number}" for number in _ZENODO_FUNDERS.split()}
+    return _given(
+        {
+            "upload_type": "dataset",
+            "title": publication.title,
+            "description": _html(paragraphs(publication.summary)),
+            "publication_date": publication.date,
+            "version": publication.version,
+            "creators": [
+                _given({"name": author.sorted_name, "affiliation": author.affiliation, "orcid": author.orcid})
+                for author in publication.authors
+            ],
+            "access_right": "open",
+            "license": known_licence(publication.license).identifier.lower(),
+            "language": "eng",
+            "doi": publication.doi,
+            "keywords": publication.keywords,
+            "related_identifiers": [
+                _given(
+                    {
+                        "identifier": related.identifier,
+                        "relation": related.relation[0].lower() + related.relation[1:],
+                        "resource_type": related.resource and _ZENODO_TYPES[related.resource],
+                    }
+                )
+                for related in publication.related_identifiers
+            ],
+            "references": [MODEL_PAPER.line],
+            "grants": [
+                {"id": f"{funding.funder_id}::{funding.award_number}"}
+                for funding in publication.funding
+                if funding.funder_id in funders and funding.award_number
+            ],
+            "communities": [{"identifier": community} for community in publication.communities],
+            "notes": _html(notes),
+        }
+    )
+
+
+def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
+    """Read the metadata of a deposit that may be a stranger's.
+
+    Raises
+    ------
+    ValueError
+        If an entry that is shown to users is not the text or the list of mappings that it must be.
+    """
+    try:
+        metadata = json.loads(read_text(folder, ZENODO))
+        if not isinstance(metadata, dict):
+            raise ValueError("is not a mapping")
+        for name in ("title", "version", "license", "doi", "description"):
+            if not isinstance(metadata.get(name, ""), str):
+                raise ValueError(f"{name} is not text")
+        for name in ("creators", "communities"):
+            entries = metadata.get(name, [])
+            if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+                raise ValueError(f"{name} is not a list of mappings")
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{ZENODO}: {error or 'is nested too deeply'}") from None
+    return metadata
+
+
+def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
+    """Return title, version, authors, licence and communities of Zenodo metadata as lines of text."""
+    return {
+        "title": metadata.get("title", ""),
+        "version": metadata.get("version", ""),
+        "authors": "; ".join(str(each.get("name", "")) for each in metadata.get("creators", ())),
+        "licence": metadata.get("license", ""),
+        "community": "; ".join(str(each.get("identifier", "")) for each in metadata.get("communities", ())),
+    }
+
+
+def datacite_metadata(publication: Publication) -> dict[str, Any]:
+    """Return the metadata after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293), as JSON.
+
+    The publisher is known only with the DOI; else it is `:tba`, DataCite's word for what will be known later.
+    """
+    licence = known_licence(publication.license)
+    paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
+    published = publication.doi is not None and publication.doi.startswith(_ZENODO_DOI)
+    return _given(
+        {
+            "schemaVersion": "http://datacite.org/schema/kernel-4",
+            "doi": publication.doi,
+            "types": {"resourceTypeGeneral": "Dataset", "resourceType": "Simulation results"},
+            "creators": [_datacite_creator(author) for author in publication.authors],
+            "titles": [{"title": publication.title}],
+            "publisher": {"name": "Zenodo" if published else ":tba"},
+            "publicationYear": publication.date[:4],
+            "dates": [{"date": publication.date, "dateType": "Issued"}],
+            "version": publication.version,
+            "language": "en",
+            "descriptions": [{"description": publication.summary, "descriptionType": "Abstract"}],
+            "subjects": [{"subject": keyword} for keyword in publication.keywords],
+            "rightsList": [
+                {
+                    "rights": licence.name,
+                    "rightsUri": licence.address,
+                    "rightsIdentifier": licence.identifier,
+                    "rightsIdentifierScheme": "SPDX",
+                    "schemeUri": "https://spdx.org/licenses/",
+                }
+            ],
+            "relatedIdentifiers": [
+                _given(
+                    {
+                        "relatedIdentifier": related.identifier,
+                        "relatedIdentifierType": _datacite_type(related.identifier),
+                        "relationType": related.relation,
+                        "resourceTypeGeneral": related.resource,
+                    }
+                )
+                for related in (*publication.related_identifiers, paper)
+            ],
+            "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
+        }
+    )
+
+
+def _datacite_creator(author: Author) -> dict[str, Any]:
+    orcid = {"nameIdentifier": author.orcid_address, "nameIdentifierScheme": "ORCID", "schemeUri": "https://orcid.org"}
+    organisation = {"nameIdentifier": author.ror, "nameIdentifierScheme": "ROR", "schemeUri": _ROR}
+    affiliation = {"name": author.affiliation}
+    if author.ror:
+        affiliation |= {"affiliationIdentifier": author.ror, "affiliationIdentifierScheme": "ROR", "schemeUri": _ROR}
+    identifiers = [orcid] if author.orcid else [organisation] if author.ror and not author.is_person else []
+    return _given(
+        {
+            "name": author.sorted_name,
+            "nameType": "Personal" if author.is_person else "Organizational",
+            "givenName": author.given_names,
+            "familyName": author.family_names,
+            "nameIdentifiers": identifiers,
+            "affiliation": [affiliation] if author.affiliation else [],
+        }
+    )
+
+
+def _datacite_type(identifier: str) -> str:
+    return "DOI" if identifier.startswith("10.") else "arXiv" if identifier.startswith("arXiv:") else "URL"
+
+
+def _datacite_funding(funding: Funding) -> dict[str, Any]:
+    registries = {None: None, _ROR: "ROR", _FUNDER_REGISTRY: "Crossref Funder ID"}
+    start = funding.funder_id and next((each for each in (_ROR, _FUNDER_REGISTRY) if each in funding.funder_id), "")
+    return _given(
+        {
+            "funderName": funding.funder,
+            "funderIdentifier": funding.funder_id and web_address(funding.funder_id),
+            "funderIdentifierType": registries.get(start, "Other"),
+            "awardNumber": funding.award_number,
+            "awardTitle": funding.award_title,
+            "awardUri": funding.award_url and web_address(funding.award_url),
+        }
+    )
+
+
+def paragraphs(text: str) -> list[str]:
+    """Split a text at empty lines into paragraphs of one line each."""
+    return [" ".join(part.split()) for part in re.split(r"\n\s*\n", text) if part.strip()]
+
+
+def _html(texts: list[str]) -> str:
+    """Write paragraphs of plain text as HTML."""
+    return "".join(f"<p>{escape(text, quote=False)}</p>" for text in texts)
+
+
+def _given(content: dict[str, Any]) -> dict[str, Any]:
+    """Leave out what is not given."""
+    return {key: value for key, value in content.items() if value not in (None, [], "")}

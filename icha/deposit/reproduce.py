@@ -1,0 +1,186 @@
+"""Prepare the rerun of a deposit with the ICHA that is installed; nothing in the deposit is executed.
+
+The deposit is a folder that `icha.deposit.verify.whole_deposit` has found to be whole.
+"""
+
+import difflib
+import re
+import shutil
+import textwrap
+import tomllib
+from collections.abc import Iterable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+
+import netCDF4
+
+from icha.configuration.errors import ConfigurationError
+from icha.configuration.load import INPUTS, load_configuration
+from icha.configuration.yaml_files import read_yaml
+from icha.datasets.attributes import why_no_result
+from icha.datasets.results import CONFIGURATION
+from icha.deposit.program import PROGRAM, differences
+from icha.deposit.verify import CHECKSUMS, COMPUTED, SOURCE, files_of, read_text
+from icha.support.checksums import sha256_of
+from icha.support.in_words import counted
+from icha.support.input_files import refuse_traps
+from icha.support.program import own_workflow, package_of
+from icha.support.values import NAME_PATTERN
+
+SMALLEST = "smallest"
+# In the source of a deposit: the version of the program, and the versions of all packages.
+_PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
+# In the folder of a rerun: the checksum of the deposit's list of checksums; configuration, inputs and results.
+_BEGUN, _PROJECT = "rerun-of.sha256", "data"
+_RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
+# Longest reason of a failure that is shown, in characters.
+_LONGEST_REASON = 120
+
+
+class Refused(ValueError):
+    """A rerun that cannot begin; the message gives the reason."""
+
+
+def campaign_name(deposit: Path) -> str:
+    """Return the name of the campaign in a deposit; `Refused` if it lacks what a rerun needs."""
+    for file in (CONFIGURATION, _PYPROJECT, _LOCK):
+        if not (deposit / file).is_file():
+            raise Refused(f"the deposit has no {file}, so it cannot be computed again")
+    if not any((deposit / name).exists() for name in COMPUTED):
+        raise Refused("the deposit has no results, so there is nothing to compare with")
+    try:
+        read_text(deposit, CONFIGURATION)  # of a size that can be read
+        name = read_yaml(deposit / CONFIGURATION).get("name")
+    except ValueError as error:
+        raise Refused(str(error).replace(f"{deposit}/", "")) from None
+    if not (isinstance(name, str) and re.fullmatch(NAME_PATTERN, name)):
+        raise Refused(f"{CONFIGURATION}: name: {name!r} is not the name of a campaign")
+    return name
+
+
+def other_versions(deposit: Path) -> list[str]:
+    """List the versions of ICHA and of packages that differ between the deposit and what is installed."""
+    try:
+        made_by = tomllib.loads(read_text(deposit, _PYPROJECT))["project"]["version"]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise Refused(f"{_PYPROJECT}: has no version of the program") from None
+    try:
+        wrong = differences(read_text(deposit, _LOCK))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise Refused(f"{_LOCK}: is not a lock file of uv") from None
+    installed = version("icha")
+    if made_by != installed:
+        wrong.insert(0, f"  icha: {installed} is installed, {made_by} made the deposit")
+    return wrong
+
+
+def changed_files(deposit: Path) -> int:
+    """Count the files of package and workflow that differ between the deposit's source and what is installed."""
+    lines = read_text(deposit, CHECKSUMS).splitlines()
+    listed = {name.removeprefix(f"{SOURCE}/"): digest for digest, name in (line.split("  ", 1) for line in lines)}
+    theirs = {name: digest for name, digest in listed.items() if name == PROGRAM[0] or name.startswith(PROGRAM[1:])}
+    ours = {name: sha256_of(file) for name, file in _installed_files()}
+    return sum(theirs.get(name) != ours.get(name) for name in {*theirs, *ours})
+
+
+def _installed_files() -> Iterator[tuple[str, Path]]:
+    """Files of the installed program with their names in the repository."""
+    workflow = own_workflow()
+    for part in PROGRAM:
+        top = package_of(workflow) if part == "icha/" else workflow / part
+        for file in [top] if top.is_file() else top.rglob("*"):
+            if file.is_file() and "__pycache__" not in file.parts:
+                yield (Path(part) / file.relative_to(top)).as_posix(), file
+
+
+def asked_runs(only: Iterable[str], deposit: Path) -> list[str]:
+    """Return the paths of the runs that are asked for.
+
+    Parameters
+    ----------
+    only : names, `study/surface/seed1/slope1/material`, or `SMALLEST`.
+    deposit : its folder.
+
+    Raises
+    ------
+    Refused
+        If there is no such run, or if it has no data.
+    """
+    runs = [name for name in files_of(deposit) if _RUN.fullmatch(name)]
+    found = []
+    for asked in only:
+        if asked == SMALLEST and runs:
+            found.append(_smallest(deposit, runs))
+            continue
+        path = f"runs/{asked.removeprefix('runs/').removesuffix('.nc')}.nc"
+        if path not in runs:
+            names = [run.removeprefix("runs/").removesuffix(".nc") for run in runs]
+            close = difflib.get_close_matches(asked, names, 5, 0)
+            raise Refused(
+                f"--only {asked}: the deposit has no such run; allowed: {SMALLEST}, or one of its "
+                f"{counted(len(names), 'run')}, such as {', '.join(close)}"
+            )
+        steps, failure = _outcome(deposit, path)
+        if steps == 0:
+            why = f" ({textwrap.shorten(failure, _LONGEST_REASON, placeholder=' …')})" if failure else ""
+            raise Refused(f"--only {asked}: this run has no data{why}; allowed: a run with at least one step")
+        found.append(path)
+    return list(dict.fromkeys(found))
+
+
+def _smallest(deposit: Path, runs: list[str]) -> str:
+    """Return the complete run that, together with its surface, has the fewest bytes."""
+    sizes = {run: sum((deposit / path).stat().st_size for path in with_surfaces([run], deposit)) for run in runs}
+    for run in sorted(runs, key=lambda run: sizes[run]):
+        steps, failure = _outcome(deposit, run)
+        if steps and not failure:
+            return run
+    raise Refused(f"--only {SMALLEST}: no run of the deposit is complete; allowed: the name of a run that has steps")
+
+
+def _outcome(deposit: Path, run: str) -> tuple[int, str]:
+    """Return the number of steps of a run, and why it is incomplete; an empty text if it is complete."""
+    try:
+        refuse_traps(deposit / run)
+        with netCDF4.Dataset(deposit / run) as file:
+            steps = file.dimensions.get("step")
+            return (len(steps) if steps is not None else 0), why_no_result(file.__dict__)
+    except (OSError, ValueError, RuntimeError) as error:  # the last one for what the library cannot read
+        raise Refused(f"{run}: is not a run: {error}") from None
+
+
+def with_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
+    """Return the paths of runs and of their surfaces, as far as the deposit has these."""
+    surfaces = dict.fromkeys("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
+    return [*runs, *(path for path in surfaces if (deposit / path).is_file())]
+
+
+def prepare(folder: Path, deposit: Path) -> Path:
+    """Copy configuration and inputs of a deposit to the folder of a rerun, unless they are there, and return the copy.
+
+    Raises
+    ------
+    Refused
+        If the folder has other files or belongs to another deposit, or if the configuration cannot be run, for instance
+        because it names files outside the deposit.
+    """
+    if folder.resolve().is_relative_to(deposit.resolve()):
+        raise Refused(f"--folder {folder}: is in the deposit, which is only read; allowed: another folder")
+    digest = f"{sha256_of(deposit / CHECKSUMS)}\n"
+    begun, project = folder / _BEGUN, folder / _PROJECT
+    if begun.is_file():
+        if begun.read_text(encoding="ascii", errors="replace") != digest:
+            raise Refused(f"--folder {folder}: belongs to another deposit; allowed: a new or empty folder")
+    else:
+        if folder.is_dir() and any(folder.iterdir()):
+            raise Refused(f"--folder {folder}: has other files in it; allowed: a new or empty folder")
+        project.mkdir(parents=True)
+        if (deposit / INPUTS).is_dir():
+            shutil.copytree(deposit / INPUTS, project / INPUTS, copy_function=shutil.copyfile)
+        shutil.copyfile(deposit / CONFIGURATION, project / CONFIGURATION)
+    try:
+        load_configuration(project / CONFIGURATION, within=project)
+    except ConfigurationError as error:
+        raise Refused(f"the configuration of the deposit cannot be run:\n{error}") from None
+    begun.write_text(digest, encoding="ascii")
+    return project

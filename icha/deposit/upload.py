@@ -1,0 +1,250 @@
+"""A client for Zenodo's deposit API (https://developers.zenodo.org), and for other servers with the same API."""
+
+import hashlib
+import ipaddress
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import quote, urlsplit
+
+import requests
+from requests.adapters import HTTPAdapter
+from urllib3 import Retry
+
+ZENODO = "https://zenodo.org"
+SANDBOX = "https://sandbox.zenodo.org"
+# For the connection, and for an answer, as checksums of large files take the server its time; in s.
+_TIMEOUT = (20, 900)
+_FAILING = (429, 500, 502, 503, 504)
+# Longest text of a server that is shown, in characters.
+_LONGEST = 300
+_SCOPES = "deposit:write and deposit:actions"
+# What users can do about a status; the address of the server is put in.
+_ADVICE = {
+    401: f"make a token at {{}}/account/settings/applications/tokens/new/ with the scopes {_SCOPES}; the sandbox has "
+    "tokens of its own",
+    403: f"needed: a token with the scopes {_SCOPES}, and a draft or record of your own",
+    404: "is the number of the draft or record right?",
+    413: "the file is too large; Zenodo takes 50 GB a record",
+}
+
+
+class ZenodoError(Exception):
+    """The server refuses a request, or cannot be reached; the message says what to do."""
+
+
+class Uploaded(NamedTuple):
+    """A file of a draft; `md5` is empty if the server does not report it."""
+
+    identifier: str
+    name: str
+    md5: str
+
+
+class Draft(NamedTuple):
+    """A record that is not published yet.
+
+    Attributes
+    ----------
+    number : its number.
+    page : address of its page.
+    bucket : path on the server to which files are sent.
+    doi : the DOI reserved for it.
+    files : the files that it has.
+    """
+
+    number: str
+    page: str
+    bucket: str
+    doi: str
+    files: tuple[Uploaded, ...]
+
+
+# What can be repeated waits 0, 2, 4, 8, 16 s, or as long as the server asks for, up to five minutes.
+_PATIENCE = Retry(
+    total=5, backoff_factor=1, status_forcelist=_FAILING, redirect=0, raise_on_status=False, retry_after_max=300
+)
+
+
+class _Bearer(requests.auth.AuthBase):
+    """The token in its header; set this way, no `.netrc` replaces it."""
+
+    def __init__(self, token: str):
+        self._token = token
+
+    def __call__(self, request):
+        request.headers["Authorization"] = f"Bearer {self._token}"
+        return request
+
+
+def server_address(address: str) -> str:
+    """Return the address of a server without a path.
+
+    Raises
+    ------
+    ValueError
+        If it is not the address of a server, or if others could read what is sent: http is for servers on this machine.
+    """
+    parts = urlsplit(address if "//" in address else f"https://{address}")
+    plain = not (parts.username or parts.query or parts.fragment) and parts.path.rstrip("/") in ("", "/api")
+    if parts.scheme not in ("http", "https") or not parts.hostname or not plain:
+        raise ValueError(f"{address!r} is not the address of a server; allowed: one such as {ZENODO}")
+    if parts.scheme == "http" and not _is_loopback(parts.hostname):
+        raise ValueError(f"{address!r}: over http others could read the token; allowed: https")
+    return f"{parts.scheme}://{parts.netloc}"
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def md5_of(path: str | os.PathLike) -> str:
+    """Return the MD5 of a file, the checksum that Zenodo keeps."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.md5(usedforsecurity=False)).hexdigest()
+
+
+class Zenodo:
+    """A server with a token for it. Every method raises `ZenodoError` if the server refuses or does not answer."""
+
+    def __init__(self, address: str, token: str, patience: Retry | None = None):
+        """Keep the address, as `server_address` takes it, and the token; nothing is sent yet."""
+        self.address = server_address(address)
+        self._token = token
+        self._session = requests.Session()
+        self._session.auth = _Bearer(token)
+        for scheme in ("https://", "http://"):
+            self._session.mount(scheme, HTTPAdapter(max_retries=patience or _PATIENCE))
+
+    def create(self) -> Draft:
+        """Make an empty draft."""
+        return self._draft(self._call("POST", "/api/deposit/depositions", json={}))
+
+    def draft(self, number: str) -> Draft:
+        """Return an existing draft."""
+        content = self._call("GET", f"/api/deposit/depositions/{quote(number, safe='')}")
+        if content.get("submitted") is True or content.get("state") == "done":
+            raise ZenodoError(
+                f"{number} is published already; a new version of it is made with --new-version-of {number}"
+            )
+        return self._draft(content)
+
+    def new_version(self, number: str) -> Draft:
+        """Make a draft of a new version of a published record; it begins with the files of the previous version."""
+        content = self._call("POST", f"/api/deposit/depositions/{quote(number, safe='')}/actions/newversion")
+        found = _text(content, "links", "latest_draft").rstrip("/").rpartition("/")[2]
+        if found in ("", number):
+            raise ZenodoError(
+                f"{self.address} gives no draft of a new version of {number}; if there is one already, continue it "
+                "with --draft"
+            )
+        return self.draft(found)
+
+    def describe(self, draft: Draft, metadata: Mapping) -> None:
+        """Set the metadata of a draft, as https://developers.zenodo.org/#representation lists them."""
+        self._call("PUT", f"/api/deposit/depositions/{draft.number}", json={"metadata": dict(metadata)})
+
+    def upload(self, draft: Draft, path: str | os.PathLike, md5: str) -> bool:
+        """Send a file, read in pieces; return whether the server has confirmed its checksum `md5`."""
+        name = Path(path).name
+        with open(path, "rb") as file:
+            received = _md5(self._call("PUT", f"{draft.bucket}/{quote(name)}", data=file))
+        if received and received != md5:
+            raise ZenodoError(f"{name} has not arrived as it was sent: its MD5 is {md5}, that of the server {received}")
+        return bool(received)
+
+    def remove(self, draft: Draft, file: Uploaded) -> None:
+        """Remove a file of a draft."""
+        path = f"/api/deposit/depositions/{draft.number}/files/{quote(file.identifier, safe='')}"
+        try:
+            self._call("DELETE", path)
+        except ZenodoError:
+            # Zenodo has been seen to remove files and to report a failure (zenodo/zenodo#2561).
+            if any(each.name == file.name for each in self.draft(draft.number).files):
+                raise
+
+    def publish(self, draft: Draft) -> tuple[str, str]:
+        """Publish a draft, which cannot be undone; return its page and DOI."""
+        content = self._call("POST", f"/api/deposit/depositions/{draft.number}/actions/publish")
+        page = _text(content, "links", "record_html") or f"{self.address}/records/{draft.number}"
+        return page, _text(content, "doi") or draft.doi
+
+    def _draft(self, content: Mapping) -> Draft:
+        number, bucket = _text(content, "id"), _text(content, "links", "bucket")
+        if not number or not bucket:
+            raise ZenodoError(f"{self.address} does not answer as Zenodo does: a draft without number or bucket")
+        if not bucket.startswith(f"{self.address}/"):
+            # The token goes to nobody else.
+            raise ZenodoError(f"{self.address} wants the files to be sent to another server: {self._plain(bucket)}")
+        listed = content.get("files")
+        files = tuple(
+            Uploaded(_text(file, "id"), _text(file, "filename") or _text(file, "key"), _md5(file))
+            for file in (listed if isinstance(listed, list) else ())
+            if isinstance(file, dict)
+        )
+        doi = _text(content, "metadata", "prereserve_doi", "doi") or _text(content, "metadata", "doi")
+        page = _text(content, "links", "html") or f"{self.address}/uploads/{number}"
+        return Draft(number, page, bucket.removeprefix(self.address).rstrip("/"), doi, files)
+
+    def _call(self, method: str, path: str, **content) -> dict:
+        """Send a request; return its JSON, or {} where there is none."""
+        try:
+            answer = self._session.request(
+                method, f"{self.address}{path}", timeout=_TIMEOUT, allow_redirects=False, **content
+            )
+        except requests.RequestException as error:
+            raise ZenodoError(f"{self.address} cannot be reached, or breaks off: {self._plain(error)}") from None
+        if answer.is_redirect:
+            raise ZenodoError(f"{self.address} redirects to {self._plain(answer.headers['Location'])}; use that one")
+        if not answer.ok:
+            raise ZenodoError(self._refusal(path, answer))
+        try:
+            found = answer.json() if answer.content else {}
+        except (ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict):
+            raise ZenodoError(f"{self.address} does not answer as Zenodo does: no mapping from {path}")
+        return found
+
+    def _refusal(self, path: str, answer: requests.Response) -> str:
+        """Describe why the server refuses: its message, what is wrong with which field, and what to do."""
+        status = answer.status_code
+        try:
+            content = answer.json()
+        except (ValueError, RecursionError):
+            content = None
+        content = content if isinstance(content, dict) else {"message": answer.reason}
+        errors = content.get("errors")
+        lines = [content.get("message")]
+        for error in errors if isinstance(errors, list) else ():
+            if isinstance(error, dict):
+                lines.append(f"{error.get('field')}: {error.get('message') or error.get('messages')}")
+        told = "\n    ".join(self._plain(line) for line in lines if line)
+        advice = _ADVICE.get(status, "").format(self.address)
+        if status in _FAILING:
+            advice = "it is busy or has failed; try again in a while"
+        elif status == 400 and path.endswith("/newversion"):
+            advice = "if there is a draft of a new version already, continue it with --draft"
+        return f"{self.address} refuses {path} ({status}): {'; '.join(filter(None, (told, advice)))}"
+
+    def _plain(self, text: object) -> str:
+        """Shorten text of the server, and leave out the token, should the server repeat it."""
+        plain = " ".join(str(text).split()).replace(self._token, "…")
+        return plain if len(plain) <= _LONGEST else f"{plain[: _LONGEST - 1]}…"
+
+
+def _text(content: Any, *keys: str) -> str:
+    """Text or number in nested mappings of an answer, as text; empty if there is none."""
+    for key in keys:
+        content = content.get(key) if isinstance(content, dict) else None
+    return str(content) if isinstance(content, str | int) else ""
+
+
+def _md5(content: Mapping) -> str:
+    """The checksum that the server reports for a file, with or without the prefix `md5:`."""
+    kind, _, digits = _text(content, "checksum").rpartition(":")
+    return digits.lower() if kind in ("", "md5") else ""

@@ -1,0 +1,210 @@
+"""Verify deposits, which anybody may have made: nothing is read before names, kinds and sizes have been inspected.
+
+A zip is extracted into an empty folder, within `LIMITS`. Then every byte is compared with `SHA256SUMS`. Nothing in a
+deposit is executed.
+"""
+
+import contextlib
+import os
+import re
+import shutil
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from icha.support import in_words
+from icha.support.checksums import sha256_of
+from icha.support.in_words import is_printable, printable
+
+CHECKSUMS = "SHA256SUMS"
+# Files by which a deposit describes itself: to readers, as an RO-Crate, to Zenodo.
+README, CRATE, ZENODO = "README.md", "ro-crate-metadata.json", ".zenodo.json"
+# Folder of the program's source.
+SOURCE = "source"
+# What is computed, and computed again by `icha reproduce`.
+COMPUTED = (
+    *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
+    *("report.html", "checks.json", "verdict.txt"),
+)
+# Most bytes of a file that is read as a whole: the list of checksums, a configuration, metadata.
+LARGEST_TEXT = 64_000_000
+# Most bytes of a name that common file systems accept: of one part, of a path.
+_LONGEST_PART, _LONGEST_PATH = 255, 1000
+# Limits for a deposit from a stranger, which the option `LARGE` of the commands lifts: number of files; factor by which
+# a zip may grow when it is extracted, and bytes that it may have in any case. ICHA does not compress deposits; whoever
+# compresses one again gains a factor of about three.
+MOST_FILES, MOST_GROWTH, ALLOWANCE = 200_000, 50, 100_000_000
+LARGE = "--large"
+_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+_BLOCK = 1 << 20
+
+
+class Damaged(ValueError):
+    """A deposit that is not whole; the arguments are the problems, one line each."""
+
+
+@contextlib.contextmanager
+def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[Path]:
+    """Verify a deposit and provide its folder; a zip is extracted into a temporary one.
+
+    Parameters
+    ----------
+    path : its folder or its zip.
+    large : whether to accept more files and bytes than is good from a stranger.
+
+    Raises
+    ------
+    Damaged
+        If files differ from their checksums, are missing or were added, or if the deposit cannot be read safely.
+    OSError
+        If a zip cannot be extracted, for instance because there is no room.
+    """
+    path = Path(path)
+    with contextlib.ExitStack() as opened:
+        folder = path
+        if not path.is_dir():
+            empty = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="icha-deposit-")))
+            folder = _extract(path, empty, large)
+        if problems := list(_problems(folder, large)):
+            raise Damaged(*problems)
+        yield folder
+
+
+def verify_deposit(path: str | os.PathLike, *, large: bool = False) -> list[str]:
+    """List what is wrong with a deposit, one line each; the list is empty if it is whole. Parameters: `whole_deposit`.
+
+    Folders without files do not count, as in git and in the list of checksums.
+    """
+    try:
+        with whole_deposit(path, large=large):
+            return []
+    except Damaged as damaged:
+        return list(damaged.args)
+
+
+def files_of(folder: Path) -> list[str]:
+    """Paths of all files below a folder, sorted."""
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir())
+
+
+def read_text(folder: Path, name: str) -> str:
+    """Read a text file of a deposit.
+
+    Raises
+    ------
+    ValueError
+        If it has more than `LARGEST_TEXT` bytes, or is not UTF-8.
+    """
+    size = (folder / name).stat().st_size
+    if size > LARGEST_TEXT:
+        raise ValueError(f"{name}: has {in_words.size(size)}; allowed: {in_words.size(LARGEST_TEXT)}")
+    return (folder / name).read_text(encoding="utf-8")
+
+
+def problem_with_name(name: str) -> str:
+    """Explain why a path must not be in a deposit; empty if it leads to the same place on every system."""
+    parts = name.split("/")
+    if name.startswith("/") or re.match("[A-Za-z]:", name):
+        return "is an absolute path"
+    if any(part in ("", ".", "..") for part in parts):
+        return "leads elsewhere, or nowhere"
+    if "\\" in name:
+        return "has a backslash, which separates folders on other systems"
+    if not is_printable(name):
+        return "has invisible characters"
+    if len(name.encode()) > _LONGEST_PATH or max(len(part.encode()) for part in parts) > _LONGEST_PART:
+        return "is too long"
+    return ""
+
+
+def _extract(path: Path, folder: Path, large: bool) -> Path:
+    """Extract a zip into an empty folder and return the single folder in it; links become files, and nothing leads out.
+
+    Python's zipfile leaves out what leads out of the folder, and reads no more bytes of a file than are declared.
+    """
+    name = printable(path.name)
+    if not path.is_file():
+        raise Damaged(f"{name}: is neither a folder nor a file")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries, packed = archive.infolist(), path.stat().st_size
+            unpacked, free = sum(entry.file_size for entry in entries), shutil.disk_usage(folder).free
+            if len(entries) > MOST_FILES and not large:
+                raise Damaged(_too_many(len(entries)))
+            if unpacked > MOST_GROWTH * packed + ALLOWANCE and not large:
+                raise Damaged(
+                    f"{name}: unpacks from {in_words.size(packed)} to {in_words.size(unpacked)}; allowed: "
+                    f"{MOST_GROWTH} times its size and {in_words.size(ALLOWANCE)}, or more with {LARGE}"
+                )
+            if unpacked > free:
+                raise OSError(
+                    f"{folder.parent}: {in_words.size(unpacked)} are needed to extract {name}, and "
+                    f"{in_words.size(free)} are free; set TMPDIR to a folder with more room"
+                )
+            archive.extractall(folder)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
+        # Damaged, or encrypted, or compressed by an unknown method.
+        raise Damaged(f"{name}: not a readable zip archive: {printable(error)}") from None
+    held = sorted(os.listdir(folder))
+    if len(held) != 1 or not (folder / held[0]).is_dir():
+        raise Damaged(f"{name}: holds {printable(', '.join(held[:5]) or 'nothing')}; allowed: a single folder")
+    return folder / held[0]
+
+
+def _too_many(count: int) -> str:
+    return f"holds {count:,} files or more; allowed: {MOST_FILES:,}, or more with {LARGE}"
+
+
+def _problems(folder: Path, large: bool) -> Iterator[str]:
+    """Compare the files in a folder with its list of checksums."""
+    found, special = _inspect(folder, large)
+    yield from (f"{printable(name)}: {problem}" for name, problem in special.items())
+    if CHECKSUMS not in found:
+        yield f"{CHECKSUMS}: is missing, so this is no whole deposit"
+        return
+    try:
+        lines = read_text(folder, CHECKSUMS).splitlines()
+    except (OSError, ValueError) as error:
+        yield f"{CHECKSUMS}: cannot be read: {printable(error)}"
+        return
+    expected: dict[str, str] = {}
+    for number, line in enumerate(lines, 1):
+        listed = _LINE.fullmatch(line)
+        if listed is None or problem_with_name(listed[2]):
+            yield f"{CHECKSUMS}, line {number}: {line[:80]!r} is no checksum of a file in this folder"
+        elif listed[2] in expected:
+            yield f"{CHECKSUMS}, line {number}: {listed[2]} is named twice"
+        else:
+            expected[listed[2]] = listed[1]
+    for name, digest in expected.items():
+        if name not in found:
+            if name not in special:
+                yield f"{name}: is missing"
+        elif sha256_of(folder / name) != digest:
+            yield f"{name}: was changed: its checksum is another one"
+    for name in sorted(found - set(expected) - {CHECKSUMS}):
+        yield f"{printable(name)}: was added: it is not in {CHECKSUMS}"
+
+
+def _inspect(folder: Path, large: bool) -> tuple[set[str], dict[str, str]]:
+    """List the files below a folder, and what is wrong with names and kinds of others; links are not followed."""
+    found: set[str] = set()
+    problems: dict[str, str] = {}
+    pending = [""]
+    while pending:
+        inside = pending.pop()
+        for entry in os.scandir(folder / inside):
+            name = f"{inside}{entry.name}"
+            if entry.is_dir(follow_symlinks=False):
+                pending.append(f"{name}/")
+            elif not entry.is_file(follow_symlinks=False):
+                problems[name] = "is a link, a device or another special file"
+            elif problem := problem_with_name(name):
+                problems[name] = f"the name {problem}"
+            else:
+                found.add(name)
+            if len(found) + len(problems) > MOST_FILES and not large:
+                raise Damaged(_too_many(len(found) + len(problems)))
+    return found, dict(sorted(problems.items()))

@@ -1,0 +1,477 @@
+"""Deposits: what is in them, what is not, that they are whole, and that they are the same wherever they are made."""
+
+import csv
+import getpass
+import json
+import os
+import re
+import shutil
+import subprocess
+import time
+import zipfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import netCDF4
+import numpy as np
+import pytest
+import small_campaign as small
+import xarray as xr
+import yaml
+from bare_campaign import CAMPAIGN as BARE
+from conftest import REPOSITORY, copy_project, snakemake_command
+from traces import traces
+from typer.testing import CliRunner
+
+from icha.analysis.checks import read_checks
+from icha.cli import app
+from icha.configuration.cases import campaign_sha256, run_sha256
+from icha.configuration.load import load_configuration, with_files_beside_it
+from icha.configuration.publication import KnownFailure
+from icha.datasets.campaign_file import write_campaign
+from icha.datasets.files import write_dataset
+from icha.deposit import make, readme
+from icha.deposit.crate import Job
+from icha.deposit.make import make_deposit, refuse_mixed
+from icha.deposit.program import Source
+from icha.deposit.readme import data_dictionary, kind_of
+from icha.deposit.verify import verify_deposit
+from icha.planning.costs import Cost
+from icha.planning.results import campaign_files
+from icha.support.checksums import asked_of, sha256_as_written, write_checksum
+
+# Where and by whom the campaign is run: words that are nowhere else.
+PLACE, PERSON, MACHINE, SECRET = "Quittenbaumhof", "zwetschgenwirt", "mirabellenrechner", "hagebuttengeheimnis"
+CAMPAIGN = """
+name: tiny
+title: One file | one material
+summary: A height map from a file, and measurements beside it.
+license: CC-BY-4.0
+surfaces:
+  plate: {{kind: file, path: {absolute}/heights of a plate.npy, height_unit: um, period: 10 um}}
+materials:
+  soft: {{contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 40 nm}}
+studies:
+  load:
+    surfaces: [plate]
+    rms_slopes: [0.5]
+    materials: [soft]
+    targets: {{reduced_pressures: [1.0e-3, 3.0e-3, 1.0e-2]}}
+measurements:
+  lab:
+    path: ../measured/areas.csv
+    label: laboratory
+    citation: Nobody, nowhere.
+    study: load
+    load: {{column: p, unit: "1"}}
+    area: {{column: a, unit: percent}}
+figures:
+  fig5_multi_slope: {{study: load}}
+publication:
+  version: "1.0.0"
+  date: 2026-01-31
+  authors:
+    - {{family_names: Carberry, given_names: Josiah, orcid: 0000-0002-1825-0097}}
+"""
+RUN = "load/plate/seed0/slope0.5/soft"
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    """A clone in which the campaign was run and published; not to be changed."""
+    home = tmp_path_factory.mktemp(PLACE)
+    folder = copy_project(REPOSITORY, home / "clone")
+    (home / "measured").mkdir()
+    np.save(home / "measured/heights of a plate.npy", 1e6 * small.surface().heights)
+    (home / "measured/areas.csv").write_text("p,a\n0.001,0.3\n0.01,2\n")
+    (home / "asked").mkdir()
+    (home / "asked/tiny.yaml").write_text(CAMPAIGN.format(absolute=home / "measured"))
+    command, environment = snakemake_command("publish", configuration=home / "asked/tiny.yaml")
+    environment |= dict.fromkeys(("USER", "LOGNAME", "USERNAME"), PERSON) | {"HOSTNAME": MACHINE, "TOKEN": SECRET}
+    done = subprocess.run(
+        command, cwd=folder, env=environment | {"PYTHONPATH": str(folder)}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def published(project):
+    """The folder of the deposit."""
+    return project / "results/tiny/publish/tiny-1.0.0"
+
+
+def files_of(folder):
+    return {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+
+
+# Made by the workflow.
+
+
+@pytest.mark.slow
+def test_a_deposit_has_everything_and_nothing_else(project, published):
+    there = files_of(published)
+    tops = {path.split("/")[0] for path in there}
+    assert tops == {
+        *("README.md", "LICENSE.txt", "CITATION.cff", ".zenodo.json", "datacite.json", "ro-crate-metadata.json"),
+        *("data_dictionary.csv", "SHA256SUMS", "config.used.yaml", "inputs", "dataset", "aggregated", "runs"),
+        *("surfaces", "references", "figures", "report.html", "checks.json", "verdict.txt", "source"),
+    }
+    for path in (path for path in there if (project / "results/tiny" / path).is_file()):
+        assert there[path].read_bytes() == (project / "results/tiny" / path).read_bytes()
+    assert f"runs/{RUN}.nc" in there and "figures/fig5_multi_slope.pdf" in there
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=project, capture_output=True).stdout.decode()
+    source = {path.removeprefix("source/") for path in there if path.startswith("source/")}
+    assert source == set(listed.split("\0")[:-1])
+    assert {"Snakefile", "uv.lock", "LICENSE", "icha/asperity/jkr.py", ".gitignore"} <= source
+    for path in source:
+        assert there[f"source/{path}"].read_bytes() == (project / path).read_bytes()
+
+
+@pytest.mark.slow
+def test_its_files_have_their_checksums_and_its_configuration_names_them(project, published, tmp_path):
+    command = ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"]
+    assert subprocess.run(command, cwd=published).returncode == 0
+    names = [line[66:] for line in (published / "SHA256SUMS").read_text().splitlines()]
+    assert names == sorted(names) and {*names, "SHA256SUMS"} == set(files_of(published))
+    with zipfile.ZipFile(f"{published}.zip") as archive:
+        entries = archive.infolist()
+        archive.extractall(tmp_path)
+    assert [entry.filename for entry in entries] == sorted(f"tiny-1.0.0/{name}" for name in [*names, "SHA256SUMS"])
+    assert {entry.compress_type for entry in entries} == {zipfile.ZIP_STORED}
+    assert {entry.date_time for entry in entries} == {(1980, 1, 1, 0, 0, 0)}
+    assert {entry.external_attr >> 16 for entry in entries} <= {0o100644, 0o100755}
+    assert subprocess.run(command, cwd=tmp_path / "tiny-1.0.0").returncode == 0
+    asked = load_configuration(project.parent / "asked/tiny.yaml").campaign
+    kept = load_configuration(published / "config.used.yaml").campaign
+    assert campaign_sha256(kept) == campaign_sha256(asked)
+    text = yaml.safe_load((published / "config.used.yaml").read_text())
+    assert text["surfaces"]["plate"]["path"] == "inputs/surfaces/plate/heights of a plate.npy"
+    assert text["measurements"]["lab"]["path"] == "inputs/measurements/lab/areas.csv"
+    for section, name, path in (("surfaces", "plate", "heights of a plate.npy"), ("measurements", "lab", "areas.csv")):
+        copy = published / "inputs" / section / name / path
+        assert copy.read_bytes() == (project.parent / "measured" / path).read_bytes()
+    with netCDF4.Dataset(published / f"runs/{RUN}.nc") as run, netCDF4.Dataset(published / "dataset/tiny.nc") as tree:
+        assert run.config_sha256 != tree.config_sha256 == campaign_sha256(kept)
+
+
+@pytest.mark.slow
+def test_the_dictionary_has_every_variable_and_no_other(published):
+    with open(published / "data_dictionary.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    told = {(row["file"], row["group"], row["variable"]): int(row["files"]) for row in rows}
+    assert len(told) == len(rows)
+    there = {}
+    for path in files_of(published):
+        if path.endswith(".nc"):
+            with netCDF4.Dataset(published / path) as data:
+                for group in (data, *data.groups.values()):
+                    for name in group.variables:
+                        key = (kind_of(path), group.path, name)
+                        there[key] = there.get(key, 0) + 1
+    assert told == there
+    assert all(row["units"] and row["long_name"] for row in rows)
+    (row,) = (r for r in rows if r["file"].startswith("runs/") and r["variable"] == "contact_area_fraction")
+    area = xr.load_dataset(published / f"runs/{RUN}.nc").contact_area_fraction
+    assert (float(row["smallest"]), float(row["largest"])) == (float(area.min()), float(area.max()))
+    assert (row["dimensions"], row["type"]) == ("step", "float64")
+    (status,) = (r for r in rows if r["file"] == "dataset/tiny.nc" and r["variable"] == "status")
+    assert status["flags"].startswith("0: complete, 1: incomplete")
+    (kind,) = (r for r in rows if r["file"].startswith("runs/") and r["variable"] == "step_kind")
+    assert (kind["type"], kind["dimensions"], kind["smallest"]) == ("text", "step", "")
+
+
+@pytest.mark.slow
+def test_the_page_for_readers_tells_the_numbers(published):
+    page = (published / "README.md").read_text(encoding="utf-8")
+    assert page.startswith("# One file \\| one material\n")
+    for said in (
+        "Carberry, Josiah (2026): One file | one material. Version 1.0.0".replace("|", "\\|"),
+        "| made by | ORCID |\n|---|---|\n| Josiah Carberry | <https://orcid.org/0000-0002-1825-0097> |\n",
+        "> G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media",
+        "Every run that was asked for is here and complete.",
+        "| completed | 1 | 0 | 0 | 0 if the run reached the end of its path, else 1 |",
+        "| load | asperities | plate | 0 | 0.5 | soft | 1 | 1 | 0 |",
+        "| soft | 2.5e+07 | 0.05 | 4e-08 |",
+        "sha256sum -c SHA256SUMS",
+        yaml.safe_load((published / "CITATION.cff").read_text())["commit"],
+    ):
+        assert said in page, said
+    checks = read_checks(published / "checks.json")
+    assert f"{len(checks)} of {len(checks)} checks passed" in page
+    residual = max(check.value for check in checks if check.name == "residual")
+    assert f"| residual | 1 | {residual:.2g} | 1e-08 |" in page
+    computed = ("dataset", "aggregated", "runs", "surfaces", "references", "figures")
+    computed += ("report.html", "checks.json", "verdict.txt")
+    there = sum(path.stat().st_size for name, path in files_of(published).items() if name.split("/")[0] in computed)
+    ((told, unit),) = re.findall(r"The results take ([\d.]+) (kB|MB) of disk", page)
+    assert float(told) * {"kB": 1e3, "MB": 1e6}[unit] == pytest.approx(there, rel=6e-3)
+    assert "fails again" not in page and "did not reach" not in page
+    # Every path that it names is there, but for pages that only a whole clone has.
+    for path in re.findall(r"`([\w./-]+)`", page):
+        if "/" in path and not path.startswith("source/docs/"):
+            assert (published / path).exists(), path
+
+
+@pytest.mark.slow
+def test_its_example_runs_in_the_deposit_and_draws_the_data(published, monkeypatch):
+    page = (published / "README.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(published)
+    plt.switch_backend("Agg")
+    plt.close("all")
+    exec(compile(example, "README.md", "exec"), {})
+    (line,) = plt.gca().lines
+    run = xr.load_dataset(published / f"runs/{RUN}.nc")
+    np.testing.assert_array_equal(line.get_ydata(), run.contact_area_fraction)
+    np.testing.assert_array_equal(line.get_xdata(), run.reduced_pressure)
+    assert line.get_label() == "soft"
+    plt.close("all")
+    assert verify_deposit(published) == []
+
+
+@pytest.mark.slow
+def test_nothing_tells_where_when_or_by_whom_it_was_made(project, published):
+    files = files_of(published)
+    own = [path for name, path in files.items() if not name.startswith("source/")]
+    public = b"\0".join(path.read_bytes() for name, path in files.items() if name.startswith("source/"))
+    home = str(Path.home()).rstrip("/")
+    words = [
+        PLACE,
+        PERSON,
+        MACHINE,
+        SECRET,
+        str(project),
+        str(project.parent.parent),
+        f"{home}/",
+        str(REPOSITORY) + "/",
+    ]
+    words += [name for name in (getpass.getuser(), os.uname().nodename) if len(name) > 4]
+    settings = [part for value in os.environ.values() for part in (value, *value.split(os.pathsep))]
+    words += [value for value in settings if len(value) > 8 and value.encode() not in public]
+    words = sorted({word.encode() for word in words if len(word) > 4})
+    finished = time.time()
+    assert traces(own, words, (finished - 86400, finished)) == []
+    # The list of entries of the zip, and what is between them; its files are those of the folder.
+    archive = Path(f"{published}.zip").read_bytes()
+    for word in (PLACE, PERSON, MACHINE, SECRET, str(project.parent.parent)):
+        assert word.encode() not in archive
+    with zipfile.ZipFile(f"{published}.zip") as opened:
+        assert opened.comment == b"" and not any(info.extra or info.comment for info in opened.infolist())
+
+
+@pytest.mark.slow
+def test_computed_again_it_has_the_same_bytes(published, tmp_path):
+    asked = ["--folder", str(tmp_path / "again"), "--json", str(tmp_path / "out.json")]
+    done = CliRunner().invoke(app, ["reproduce", f"{published}.zip", *asked])
+    assert done.exit_code == 0, done.output
+    files = json.loads((tmp_path / "out.json").read_text())["files"]
+    there = {path for path in files_of(published) if path.endswith((".nc", ".png", ".pdf"))}
+    assert {file["path"] for file in files} == {*there, "report.html", "checks.json", "verdict.txt"}
+    assert {file["verdict"] for file in files} == {"identical"}
+
+
+# Made in this process.
+
+PUBLICATION = """
+publication:
+  version: "1.0.0"
+  date: 2026-01-31
+  authors: [{name: The team}]
+"""
+ASKED = asked_of(["0"])
+
+
+def check(run, value):
+    """A check of a run, by the path of its file."""
+    facts = {"limit": 1e-8, "passed": value <= 1e-8, "description": "error of the equilibrium"}
+    return {"subject": run[5:-3], "name": "residual", "value": value, **facts}
+
+
+def write(results, path, run):
+    write_dataset(run, results / path)
+    write_checksum(results, path, asked=ASKED)
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    """A campaign and its results: runs and a dataset that belong together, and all checks passed."""
+    results = tmp_path / "results"
+    results.mkdir()
+    (results / "config.used.yaml").write_text(BARE + PUBLICATION)
+    campaign = load_configuration(results / "config.used.yaml").campaign
+    files, runs = campaign_files(campaign), []
+    for path, case in files.runs.items():
+        run = small.run(case.seed, material="hertz").assign_attrs(config_sha256=run_sha256(campaign, case))
+        runs.append((case, run))
+        write(results, path, run)
+    write_campaign(
+        runs, results / files.dataset, attrs={"campaign": "small", "config_sha256": campaign_sha256(campaign)}
+    )
+    inputs = {path: sha256_as_written(results, path) for path in files.runs}
+    write_checksum(results, files.dataset, asked=ASKED, inputs=inputs)
+    (results / "checks.json").write_text(json.dumps([check(run, 1e-12) for run in files.runs]))
+    return campaign, results
+
+
+def export(folder):
+    for name in ("Snakefile", "uv.lock", "LICENSE", "workflow/scripts/run.py"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(name)
+        (folder / name).chmod(0o644)
+
+
+def published_as(folder, campaign, results):
+    files = [path for path in files_of(results) if not path.startswith("checksums/")]
+    made = tuple(path for path in files if path.endswith(".nc"))
+    make_deposit(
+        folder,
+        f"{folder}.zip",
+        results=results,
+        files=files,
+        campaign=campaign,
+        source=Source("revision", export),
+        jobs=[Job("run", ("config.used.yaml",), made, (), "Compute.", "source/workflow/scripts/run.py")],
+        cost=Cost(60.0, 2e8, 7e6),
+    )
+    return folder
+
+
+def test_the_same_results_give_the_same_bytes_and_what_fails_leaves_them(campaign, tmp_path, monkeypatch):
+    first = published_as(tmp_path / "out/small-1.0.0", *campaign)
+    assert verify_deposit(first) == verify_deposit(f"{first}.zip") == []
+    for path in campaign[1].rglob("*"):
+        os.utime(path, (1e9, 1e9))
+    before = os.umask(0o077)
+    try:
+        other = published_as(tmp_path / "there/small-1.0.0", *campaign)
+    finally:
+        os.umask(before)
+    content = Path(f"{first}.zip").read_bytes()
+    assert Path(f"{other}.zip").read_bytes() == content
+    assert {path.stat().st_mode & 0o777 for path in files_of(other).values()} == {0o644}
+
+    # Whole, or not at all; what a call that was killed has left is in nobody's way.
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    (tmp_path / "out/.small-1.0.0.part/dataset").mkdir(parents=True)
+    with monkeypatch.context() as patched, pytest.raises(OSError, match="No space left"):
+        patched.setattr(make, "_write_zip", full)
+        published_as(first, *campaign)
+    published_as(first, *campaign)
+    assert sorted(path.name for path in first.parent.iterdir()) == ["small-1.0.0", "small-1.0.0.zip"]
+    assert verify_deposit(first) == [] and Path(f"{first}.zip").read_bytes() == content
+
+
+def test_results_that_are_not_what_was_written_are_refused(campaign, tmp_path):
+    run = campaign[1] / next(iter(campaign_files(campaign[0]).runs))
+    content, times = bytearray(run.read_bytes()), run.stat()
+    content[len(content) // 2] ^= 1
+    run.write_bytes(content)
+    os.utime(run, ns=(times.st_atime_ns, times.st_mtime_ns))
+    with pytest.raises(ValueError, match=rf"not what was written(.|\n)*{run.name}"):
+        published_as(tmp_path / "out/small-1.0.0", *campaign)
+    assert not (tmp_path / "out").exists()
+
+
+def test_failures_are_published_only_with_their_reason(campaign, tmp_path):
+    campaign, results = campaign
+    runs, out = list(campaign_files(campaign).runs), tmp_path / "out/small-1.0.0"
+    (results / "checks.json").write_text(json.dumps([check(runs[0], 1e-3), check(runs[1], 1e-12)]))
+    with pytest.raises(ValueError, match=f"not published(.|\n)*{runs[0][5:-3]}: residual"):
+        published_as(out, campaign, results)
+    known = [KnownFailure(run=runs[0][5:-3], reason="It | shows what stiff springs do.")]
+    publication = campaign.publication.model_copy(update={"known_failures": known})
+    campaign = campaign.model_copy(update={"publication": publication})
+    published_as(out, campaign, results)
+    page = (out / "README.md").read_text(encoding="utf-8")
+    assert "| residual | 0.001 | 1e-08 | It \\| shows what stiff springs do. |" in page
+    assert "What failed here fails again" in page and "1 of 2 checks passed" in page
+    (results / "checks.json").write_text(json.dumps([check(run, 1e-12) for run in runs]))
+    with pytest.raises(ValueError, match="is said to fail"):
+        published_as(out, campaign, results)
+
+
+@pytest.mark.parametrize("name", ["heights\n.npy", "a\x1b[2J.npy", "a\\b.npy"])
+def test_names_that_verify_would_refuse_are_not_published(name, campaign, tmp_path):
+    (campaign[1] / "inputs").mkdir()
+    (campaign[1] / "inputs" / name).touch()
+    with pytest.raises(ValueError, match="not published, because of these names"):
+        published_as(tmp_path / "out/small-1.0.0", *campaign)
+    assert files_of(tmp_path / "out") == {}
+
+
+def test_results_that_do_not_belong_together_are_refused(campaign):
+    campaign, results = campaign
+    files = campaign_files(campaign)
+    recorded = dict.fromkeys([*files.runs, files.dataset], ASKED)
+    refuse_mixed(results, campaign, recorded)
+    with pytest.raises(ValueError, match=r"dataset/small.nc: the workflow has recorded another job for it"):
+        refuse_mixed(results, campaign, recorded | {files.dataset: asked_of(["1"])})
+    # A run of an older program, with the right settings.
+    path, case = next(iter(files.runs.items()))
+    run = small.run(1, material="hertz").assign_attrs(config_sha256=run_sha256(campaign, case), summary="Older")
+    write(results, path, run)
+    with pytest.raises(ValueError, match=f"dataset/small.nc: it was made from another {path}"):
+        refuse_mixed(results, campaign, recorded)
+    write(results, path, run.assign_attrs(config_sha256="a" * 64))
+    with pytest.raises(ValueError, match=f"{path}: it was not computed with the settings of this campaign"):
+        refuse_mixed(results, campaign, recorded)
+
+
+def test_files_are_kept_with_the_configuration_whatever_names_them(tmp_path):
+    campaign = yaml.safe_load(CAMPAIGN.format(absolute=tmp_path))
+    scans = {"height_unit": "nm", "size": "10 um", "boundary": "mirror"}
+    campaign["defaults"] = {"surfaces": {"path": "scan.txt", "kind": "measured"} | scans}
+    campaign["surfaces"] = {
+        "one": None,
+        "other": {"path": "sub/scan.txt"},
+        "idle": {"path": "/nobody/knows/scan.txt"},
+        "random": {
+            "kind": "self_affine",
+            **{"period": "10 um", "rolloff_wavelength": "5 um", "short_wavelength": "2 um", "hurst": 0.8, "grid": 16},
+        },
+    }
+    campaign["studies"]["load"]["surfaces"] = ["one", "other", "random"]
+    campaign["studies"]["load"]["vary"] = {"grid": [16, 32]}
+    (tmp_path / "sub").mkdir()
+    heights = np.round(1e9 * small.surface().heights, 3)
+    np.savetxt(tmp_path / "scan.txt", heights)
+    np.savetxt(tmp_path / "sub/scan.txt", 2 * heights.T)
+    (tmp_path / "areas.csv").write_text("p,a\n0.001,0.3\n")
+    campaign["measurements"]["lab"]["path"] = str(tmp_path / "areas.csv")
+    (tmp_path / "asked.yaml").write_text(yaml.safe_dump(campaign))
+    asked = load_configuration(tmp_path / "asked.yaml")
+    text, files = with_files_beside_it(asked)
+    assert str(tmp_path) not in text and "nobody" not in text
+    kept = tmp_path / "kept"
+    for place, file in files.items():
+        (kept / place).parent.mkdir(parents=True)
+        shutil.copyfile(file, kept / place)
+    assert sorted(files) == [
+        "inputs/measurements/lab/areas.csv",
+        "inputs/surfaces/one/scan.txt",
+        "inputs/surfaces/other/scan.txt",
+    ]
+    (kept / "config.used.yaml").write_text(text)
+    again = load_configuration(kept / "config.used.yaml")
+    assert campaign_sha256(again.campaign) == campaign_sha256(asked.campaign)
+    assert with_files_beside_it(again) == (text, {place: str(kept / place) for place in files})
+
+
+def test_ranges_leave_out_what_is_missing_and_do_not_hang_on_the_size_of_blocks(tmp_path, monkeypatch):
+    values = np.random.default_rng(1).normal(size=(7, 5))
+    values[2, 3], values[0, 0], values[6, 4] = np.nan, 1e30, -1e30
+    with netCDF4.Dataset(tmp_path / "a.nc", "w") as file:
+        group = file.createGroup("g")
+        for dim, size in zip("xy", values.shape, strict=True):
+            group.createDimension(dim, size)
+        group.createVariable("v", "f8", ("x", "y"), fill_value=-1e30)[:] = values
+        group.createVariable("none", "i4", ("y",), fill_value=-9)[:] = -9
+    wanted = (float(np.nanmin(np.where(values == -1e30, np.nan, values))), 1e30)
+    for block in (1, 8, 10**6):
+        monkeypatch.setattr(readme, "_BLOCK", block)
+        first, second = data_dictionary(tmp_path, ["a.nc", "b.txt"])
+        assert (first.group, first.variable, first.smallest, first.largest) == ("/g", "v", *wanted)
+        assert (second.smallest, second.largest) == (None, None) and second.missing.startswith("-9")

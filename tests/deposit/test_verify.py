@@ -1,0 +1,183 @@
+"""Deposits of strangers: what is wrong is found, nothing outside is read or written, and limits hold."""
+
+import os
+import random
+import stat
+import struct
+import zipfile
+from types import SimpleNamespace
+
+import pytest
+from typer.testing import CliRunner
+
+from icha.cli import app
+from icha.deposit import verify
+from icha.deposit.verify import Damaged, files_of, problem_with_name, read_text, verify_deposit, whole_deposit
+from icha.support.in_words import is_printable
+
+FILES = {"README.md": "# Tiny\n", "runs/load/soft.nc": bytes(range(256)) * 20, "inputs/Höhen (2).txt": "1 2\n"}
+
+
+@pytest.fixture
+def folder(pack):
+    return pack(FILES)
+
+
+def zipped(tmp_path, **names):
+    """A zip with entries of these names and modes beside a list of checksums."""
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("tiny/SHA256SUMS", "")
+        for name, mode in names.items():
+            entry = zipfile.ZipInfo("placeholder")
+            entry.filename = name  # ZipInfo corrects some of them
+            entry.create_system, entry.external_attr = 3, mode << 16
+            archive.writestr(entry, b"/etc/passwd")
+    return path
+
+
+@pytest.mark.parametrize("ending", ["", ".zip"])
+def test_a_whole_deposit_is_whole(ending, folder):
+    path = folder.with_name(folder.name + ending)
+    assert verify_deposit(path) == []
+    with whole_deposit(path) as found:
+        assert files_of(found) == sorted([*FILES, "SHA256SUMS"])
+    assert found == path or not found.exists()
+    done = CliRunner().invoke(app, ["verify", str(path)])
+    assert done.exit_code == 0 and "whole: 4 files" in done.output
+    assert CliRunner().invoke(app, ["verify", f"{path}.none"]).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("spoil", "problems"),
+    [
+        (lambda f: (f / "README.md").write_text("# tiny\n"), {"README.md": "was changed"}),
+        (lambda f: (f / "README.md").unlink(), {"README.md": "is missing"}),
+        (lambda f: (f / "README.md").rename(f / "readme.md"), {"README.md": "is missing", "readme.md": "was added"}),
+        (lambda f: (f / "link").symlink_to("/etc"), {"link": "is a link"}),
+        (lambda f: (f / "link").symlink_to("/dev/zero"), {"link": "is a link"}),
+        (lambda f: os.mkfifo(f / "pipe"), {"pipe": "is a link, a device"}),
+        (lambda f: (f / "a\\b").touch(), {"a\\b": "has a backslash"}),
+        (lambda f: (f / "b\ntiny: whole: 9 files").touch(), {"b\\ntiny: whole": "invisible"}),
+        (lambda f: (f / "a\x1b[2J").touch(), {"a\\x1b[2J": "invisible"}),
+        (lambda f: (f / "exe\u202etxt.nc").touch(), {"exe\\u202etxt.nc": "invisible"}),
+        (lambda f: (f / "SHA256SUMS").unlink(), {"SHA256SUMS": "is missing"}),
+        (lambda f: (f / "SHA256SUMS").write_bytes(b"\xff"), {"SHA256SUMS": "cannot be read"}),
+    ],
+)
+def test_whatever_is_done_to_a_folder_is_found(spoil, problems, folder):
+    spoil(folder)
+    found = verify_deposit(folder)
+    assert len(found) == len(problems) and all(map(is_printable, found)), found
+    for line, (name, problem) in zip(sorted(found), sorted(problems.items()), strict=True):
+        assert line.startswith(name) and problem in line
+    assert CliRunner().invoke(app, ["verify", str(folder)]).exit_code == 1
+
+
+@pytest.mark.parametrize("line", ["no checksum", "0" * 64 + "  ../outside", "0" * 64 + "  /dev/zero", "twice"])
+def test_lists_name_files_of_the_deposit_once(line, folder):
+    sums = folder / "SHA256SUMS"
+    sums.write_text(sums.read_text() + (sums.read_text().splitlines()[0] if line == "twice" else line) + "\n")
+    (problem,) = verify_deposit(folder)
+    assert "line 4" in problem
+
+
+def test_a_spoilt_zip_is_found_or_has_the_same_files(folder, tmp_path):
+    content = folder.with_name("tiny.zip").read_bytes()
+    chance, spoilt, found = random.Random(1), tmp_path / "spoilt.zip", 0
+    listed_from = content.index(b"PK\x01\x02")
+    for trial in range(120):
+        # Half of them in the list of contents, where there is little else than names and sizes.
+        changed = bytearray(content)
+        changed[chance.randrange(listed_from if trial % 2 else 0, len(content))] ^= 1 << chance.randrange(8)
+        spoilt.write_bytes(changed)
+        try:
+            with whole_deposit(spoilt) as other:
+                assert {name: (other / name).read_bytes() for name in files_of(other)} == {
+                    name: (folder / name).read_bytes() for name in files_of(folder)
+                }
+        except (Damaged, OSError):
+            found += 1
+    assert found > 60
+    for _ in range(20):
+        spoilt.write_bytes(content[: chance.randrange(len(content))])
+        assert verify_deposit(spoilt)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../x", "../../x", "tiny/../../x", "/etc/x", "C:/x", "tiny/a\\b", "tiny/a\x1b[2J", "other/x", "x"],
+)
+def test_names_in_a_zip_lead_nowhere_else(name, tmp_path, monkeypatch):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    path = zipped(tmp_path, **{name: stat.S_IFREG | 0o644})
+    found = verify_deposit(path)
+    assert found and all(map(is_printable, found))
+    assert sorted(each.name for each in tmp_path.rglob("*")) == ["a.zip", "temporary"]
+
+
+@pytest.mark.parametrize("mode", [stat.S_IFLNK | 0o777, stat.S_IFCHR | 0o644, stat.S_IFIFO | 0o644])
+def test_links_and_devices_in_a_zip_become_files(mode, tmp_path):
+    (problem,) = verify_deposit(zipped(tmp_path, **{"tiny/link": mode}))
+    assert problem.startswith("link: was added")
+
+
+def test_what_unpacks_to_far_more_is_not_unpacked_unless_asked(pack, monkeypatch):
+    folder = pack({"zeros": bytes(10_000_000)})
+    monkeypatch.setattr(verify, "ALLOWANCE", 1000)
+    (problem,) = verify_deposit(folder.with_name("tiny.zip"))
+    assert "to 10 MB; allowed: 50 times its size" in problem
+    assert verify_deposit(folder.with_name("tiny.zip"), large=True) == []
+
+
+@pytest.mark.parametrize("ending", ["", ".zip"])
+def test_the_number_of_files_is_bounded(ending, folder, monkeypatch):
+    monkeypatch.setattr(verify, "MOST_FILES", 2)
+    (problem,) = verify_deposit(folder.with_name(folder.name + ending))
+    assert "files or more; allowed: 2, or more with --large" in problem
+
+
+@pytest.mark.parametrize("declared", [3, 5, 10_000_000])
+def test_no_more_bytes_are_written_than_are_declared(declared, folder, tmp_path):
+    path = folder.with_name("tiny.zip")
+    content = bytearray(path.read_bytes())
+    place = content.rindex(b"PK\x01\x02") + 24  # the uncompressed size of the last entry in the list of contents
+    struct.pack_into("<I", content, place, declared)
+    path.write_bytes(content)
+    if problems := verify_deposit(path):
+        assert "not a readable zip archive" in problems[0]
+    else:
+        assert declared > len(FILES["runs/load/soft.nc"])  # it ends before, with the bytes that were packed
+
+
+def test_an_encrypted_file_is_not_read(folder):
+    path = folder.with_name("tiny.zip")
+    content = bytearray(path.read_bytes())
+    content[content.rindex(b"PK\x01\x02") + 8] |= 1
+    path.write_bytes(content)
+    assert "not a readable zip archive" in verify_deposit(path)[0]
+
+
+def test_unpacking_needs_room(folder, monkeypatch):
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=3))
+    with pytest.raises(OSError, match="3 B are free"):
+        verify_deposit(folder.with_name("tiny.zip"))
+
+
+def test_a_large_text_is_not_read_as_a_whole(folder, monkeypatch):
+    monkeypatch.setattr(verify, "LARGEST_TEXT", 3)
+    with pytest.raises(ValueError, match="allowed: 3 B"):
+        read_text(folder, "README.md")
+
+
+def test_no_more_than_a_hundred_problems_are_printed(folder):
+    for k in range(150):
+        (folder / f"added{k}").touch()
+    done = CliRunner().invoke(app, ["verify", str(folder)])
+    assert done.exit_code == 1 and "… and 50 more" in done.output and "not whole: 150 problems" in done.output
+
+
+def test_names_are_too_long_where_file_systems_say_so():
+    assert problem_with_name("a" * 255) == problem_with_name(".zenodo.json") == ""
+    assert problem_with_name("a" * 256) == problem_with_name("é" * 128) == "is too long"
