@@ -195,9 +195,9 @@ def _full_contact(cases):
 def _resolution(cases):
     """The statement on boundary elements with few grid cells for the shortest waves."""
     few = {
-        case.surface: case.facts["nodes_per_short_wave"]
+        case.surface: case.facts.get("nodes_per_short_wave", math.inf)
         for case in cases
-        if MODELS[case.model].by_cells and error_of_cells(case.facts["nodes_per_short_wave"])
+        if MODELS[case.model].by_cells and error_of_cells(case.facts.get("nodes_per_short_wave", math.inf))
     }
     if few:
         places = named(f"{cells:.2g} on {surface}" for surface, cells in few.items())
