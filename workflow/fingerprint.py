@@ -13,12 +13,11 @@ import contextlib
 import hashlib
 import importlib.util
 import json
+import os
 import sys
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
-
-from icha.support.atomic_files import whole_file
 
 PACKAGE = "icha"
 # What surrounds the work of every script, from beside it: it says how jobs begin, fail and end, and changes no number.
@@ -154,8 +153,11 @@ def _syntax_of(file: Path) -> _Syntax:
 
 def keep() -> None:
     """Keep what the modules say for the next process; where nothing can be written, that reads them again."""
-    with contextlib.suppress(OSError), whole_file(_KEPT, lasting=False) as temporary:
+    # Not by `whole_file`, which asks for the owner of results: these are none, and Snakemake has left their folder.
+    temporary = _KEPT.with_suffix(f".{os.getpid()}.tmp")
+    with contextlib.suppress(OSError):
         temporary.write_text(json.dumps(_syntaxes), encoding="ascii")
+        temporary.replace(_KEPT)
 
 
 def _read(tree: ast.Module) -> _Syntax:

@@ -211,11 +211,11 @@ def upload(
         typer.Option(help="Upload to another server with Zenodo's deposit API: https://….", show_default=False),
     ] = None,
     new_version_of: Annotated[
-        str | None,
+        int | None,
         typer.Option(metavar="ID", help="Upload as a new version of this record of yours.", show_default=False),
     ] = None,
     draft: Annotated[
-        str | None,
+        int | None,
         typer.Option(
             metavar="ID",
             help="Upload into this draft, such as one that a failed upload left; files in it are not sent again.",
@@ -243,7 +243,6 @@ def upload(
 
     if (sandbox and url) or (draft and new_version_of):
         raise Mistake("--sandbox and --url, and --draft and --new-version-of, exclude each other; give one of them")
-    draft, new_version_of = _number("--draft", draft), _number("--new-version-of", new_version_of)
     archive = deposit.resolve().with_name(f"{deposit.resolve().name}.zip") if deposit.is_dir() else deposit
     try:
         address = server_address(url or (SANDBOX if sandbox else ZENODO))
@@ -270,16 +269,6 @@ def upload(
         raise Mistake(str(error)) from None
 
 
-def _number(option: str, text: str | None) -> str | None:
-    """Return the number of a record, also from its DOI or the address of its page."""
-    if text is None:
-        return None
-    found = re.fullmatch(r"(?:\S*[./])?(\d+)/?", text)
-    if not found:
-        raise Mistake(f"{option} {text!r}: is not the number of a record; allowed: a number such as 1234567")
-    return found[1]
-
-
 def _token(address: str) -> str:
     token = os.environ.get(TOKEN, "").strip()
     if not re.fullmatch(r"[!-~]+", token):
@@ -290,10 +279,10 @@ def _token(address: str) -> str:
     return token
 
 
-def _refuse_foreign_doi(metadata: dict, draft: str | None) -> None:
+def _refuse_foreign_doi(metadata: dict, draft: int | None) -> None:
     """Refuse a DOI that Zenodo has reserved for another draft, since all files of the deposit name it."""
-    found = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", metadata.get("doi") or "")
-    if found and found[1] != draft:
+    found = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", str(metadata.get("doi")))
+    if found and int(found[1]) != draft:
         raise Mistake(
             f"the deposit has the DOI {metadata['doi']}, which is reserved for draft {found[1]}; needed: --draft "
             f"{found[1]}, or a deposit without publication.doi"
@@ -307,18 +296,17 @@ def _send(server, files, metadata, number, new_version_of, publish, yes) -> None
     draft = None
     try:
         if number:
-            draft = server.draft(number)
+            draft = server.draft(str(number))
         else:
-            draft = server.new_version(new_version_of) if new_version_of else server.create()
+            draft = server.new_version(str(new_version_of)) if new_version_of else server.create()
         say(f"draft:     {draft.page}")
         sums = {path.name: md5_of(path) for path in files}
-        there = {file.name for file in draft.files if file.md5 == sums.get(file.name)}
-        others = [file for file in draft.files if file.name not in there]
-        for file in others:
-            if file.name in sums or new_version_of:
-                server.remove(draft, file)
+        there = {name for name, (_, md5) in draft.files.items() if md5 == sums.get(name)}
+        for name in set(draft.files) - there:
+            if name in sums or new_version_of:
+                server.remove(draft, name)
             else:
-                say(f"{file.name}: another file of the draft, which stays there")
+                say(f"{name}: another file of the draft, which stays there")
         # Before the files, since mistakes in it are known at once.
         server.describe(draft, metadata)
         for path in files:

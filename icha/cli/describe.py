@@ -21,7 +21,7 @@ from icha.cli.project import (
     shown,
     workflow_folder,
 )
-from icha.cli.scans import about_scan, check_picture, draw_scans
+from icha.cli.scans import about_scan, check_picture
 from icha.support import in_words
 from icha.support.in_words import counted
 
@@ -76,6 +76,8 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
         for line in about_scan(name, scan, models=models[name]):
             say(line)
     if plot is not None:
+        from icha.cli.quick_plot import draw_scans
+
         draw_scans(scans, plot)
         say(f"drawn: {shown(plot)}")
 

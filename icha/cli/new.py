@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, say, shown, workflow_folder
-from icha.cli.scans import MeasuredSection, about_scan, check_picture, draw_scans, measured_section
+from icha.cli.scans import MeasuredSection, about_scan, check_picture, measured_section
 
 _TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
 # What explains the keys of a configuration to editors and to people.
@@ -97,6 +97,8 @@ def _tell(section: MeasuredSection, against: list[str], plot: Path | None) -> No
     if not to_scale:
         say(f"{section.name}: `icha describe` looks at its spectrum once units and size are settled")
     if plot is not None:
+        from icha.cli.quick_plot import draw_scans
+
         draw_scans({section.name: section.scan}, plot)
         say(f"drawn: {shown(plot)}")
     for key, why in section.to_fill_in.items():

@@ -1,5 +1,6 @@
 """A quick plot of a file, to look at and not to print."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,20 @@ from icha.datasets.format import RUN, SURFACE
 from icha.datasets.labels import LABELS
 from icha.datasets.surface_file import as_measured
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, gap_label
-from icha.figures.style import COLOURS, ONE_COLUMN, TWO_COLUMNS, new_figure, styled, unit_for
+from icha.figures.style import (
+    COLOURS,
+    GREEN,
+    GREY,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    VERMILLION,
+    new_figure,
+    quantity,
+    styled,
+    unit_for,
+)
 from icha.support.atomic_files import whole_file
+from icha.surfaces.moments import radial_power_spectrum
 
 # By model, in their order.
 _LINES = ("-", "--")
@@ -80,18 +93,57 @@ def _surface(surface: xr.Dataset) -> Figure:
     spectrum = "power_spectrum" in surface
     figure = new_figure(TWO_COLUMNS if spectrum else ONE_COLUMN, 3.2)
     axes = figure.subplots(1, 2) if spectrum else [figure.subplots()]
-    side = float(surface["period"])
-    every = max(1, surface.sizes["x"] // 1024)
-    heights = surface["height"].values[::every, ::every] * as_measured(surface)
-    factor, unit = unit_for(np.abs(heights).max(), "m")
-    image = axes[0].imshow(heights * factor, extent=np.array([0, side, 0, side]) * 1e6, origin="lower")
     how = "as measured" if "measured_rms_slope" in surface else "as stored"
-    figure.colorbar(image, ax=axes[0], label=f"height {how} ({unit})")
-    axes[0].set_xlabel("x (µm)")
-    axes[0].set_ylabel("y (µm)")
+    _map(axes[0], surface["height"].values, as_measured(surface), float(surface["period"]), f"height {how}")
     if spectrum:
-        q, power = surface["psd_wavevector"].values, surface["power_spectrum"].values
-        axes[1].loglog(q[power > 0], power[power > 0], color=COLOURS[0])
-        axes[1].set_xlabel("wave vector q (rad/m)")
-        axes[1].set_ylabel(r"C(q) (m$^4$)")
+        _spectrum(axes[1], surface["psd_wavevector"].values, surface["power_spectrum"].values)
     return figure
+
+
+def draw_scans(scans: Mapping, path: Path) -> None:
+    """Draw every scan, by its name, as a map beside its spectrum with the noise floor and the cut-off.
+
+    Each is a `icha.surfaces.measured.resolution.ScanResolution`.
+    """
+    with whole_file(path) as temporary:
+        _scans(scans).savefig(temporary, format=path.suffix[1:], dpi=150)
+
+
+@styled
+def _scans(scans: Mapping) -> Figure:
+    figure = new_figure(TWO_COLUMNS, 3.0 * len(scans))
+    for (left, right), (name, scan) in zip(figure.subplots(len(scans), 2, squeeze=False), scans.items(), strict=True):
+        _map(left, scan.used.heights, 1.0, scan.used.period, "height")
+        left.set_title(name)
+        q, power = radial_power_spectrum(scan.measured)
+        _spectrum(right, q, power, label="scan")
+        if scan.cutoff is not None:
+            k, used = radial_power_spectrum(scan.used)
+            # What is left of the shortest waves after the filter is rounding.
+            shown = used > 1e-3 * power[power > 0].min()
+            cut = f"as used, cut off at {quantity(scan.cutoff, 'm')}"
+            right.loglog(k[shown], used[shown], color=GREEN, ls="--", label=cut)
+        if (noise := scan.noise) is not None:
+            rms, wavelength = (quantity(float(f"{length:.2g}"), "m") for length in (noise.rms, noise.wavelength))
+            right.axhline(noise.power, color=VERMILLION, lw=0.8, ls=":", label=f"noise floor, {rms} rms")
+            right.axvline(2 * np.pi / noise.wavelength, color=VERMILLION, lw=0.8, label=f"noise below {wavelength}")
+        right.axvline(np.pi / scan.measured.spacing / 4, color=GREY, lw=0.8, ls="-.", label="waves of 8 pixels")
+        right.legend(loc="lower left", frameon=True, framealpha=1, edgecolor="none", fontsize=7)
+    return figure
+
+
+def _map(ax, heights, scale, side, label):
+    """Heights (n, n), multiplied with a scale, in m, on a square of a side, m."""
+    every = max(1, len(heights) // 1024)
+    shown = heights[::every, ::every] * scale
+    (factor, unit), (along, lateral) = (unit_for(value, "m") for value in (np.abs(shown).max(), side))
+    image = ax.imshow(shown * factor, extent=np.array([0, side, 0, side]) * along, origin="lower")
+    ax.figure.colorbar(image, ax=ax, label=f"{label} ({unit})")
+    ax.set_xlabel(f"x ({lateral})")
+    ax.set_ylabel(f"y ({lateral})")
+
+
+def _spectrum(ax, q, power, label=None):
+    ax.loglog(q[power > 0], power[power > 0], color=COLOURS[0], label=label)
+    ax.set_xlabel(r"wave number $q$ (rad/m)")
+    ax.set_ylabel(r"power spectrum $C(q)$ (m$^4$)")

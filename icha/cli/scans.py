@@ -1,4 +1,4 @@
-"""Scans: what is told and drawn of them before anything is computed, and their section in a new campaign."""
+"""Scans: what is told of them before anything is computed, and their section in a new campaign."""
 
 import json
 import os
@@ -105,74 +105,6 @@ def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model
 def in_yaml(advice: Mapping[str, float | int]) -> dict[str, str]:
     """Advised keys with their values as a configuration has them."""
     return {key: in_words.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
-
-
-def draw_scans(scans: Mapping, path: Path) -> None:
-    """Draw every scan, by its name, as a map beside its spectrum with the noise floor and the cut-off."""
-    from icha.figures.style import TWO_COLUMNS, new_figure, styled
-    from icha.support.atomic_files import whole_file
-
-    @styled
-    def drawn():
-        figure = new_figure(TWO_COLUMNS, 3.0 * len(scans))
-        for row, (name, scan) in zip(figure.subplots(len(scans), 2, squeeze=False), scans.items(), strict=True):
-            _map(figure, row[0], name, scan.used)
-            _spectrum(row[1], scan)
-        return figure
-
-    with whole_file(path) as temporary:
-        drawn().savefig(temporary, format=path.suffix[1:], dpi=150)
-
-
-def _map(figure, ax, name, surface):
-    import numpy as np
-
-    from icha.figures.style import unit_for
-
-    every = max(1, surface.grid // 1024)
-    across, along = (unit_for(value, "m") for value in (np.abs(surface.heights).max(), surface.period))
-    image = ax.imshow(
-        surface.heights[::every, ::every] * across[0],
-        extent=np.array([0, surface.period, 0, surface.period]) * along[0],
-        origin="lower",
-    )
-    figure.colorbar(image, ax=ax, label=f"height ({across[1]})")
-    ax.set_xlabel(f"x ({along[1]})")
-    ax.set_ylabel(f"y ({along[1]})")
-    ax.set_title(name)
-
-
-def _spectrum(ax, scan):
-    import numpy as np
-
-    from icha.figures.style import BLUE, GREEN, GREY, VERMILLION, quantity
-    from icha.surfaces.moments import radial_power_spectrum
-
-    q, power = radial_power_spectrum(scan.measured)
-    ax.loglog(q[power > 0], power[power > 0], color=BLUE, label="scan")
-    if scan.cutoff is not None:
-        k, used = radial_power_spectrum(scan.used)
-        # What is left of the shortest waves after the filter is rounding.
-        shown = used > 1e-3 * power[power > 0].min()
-        ax.loglog(
-            k[shown], used[shown], color=GREEN, ls="--", label=f"as used, cut off at {quantity(scan.cutoff, 'm')}"
-        )
-    if (noise := scan.noise) is not None:
-        ax.axhline(noise.power, color=VERMILLION, lw=0.8, ls=":", label=f"noise floor, {_short(noise.rms)} rms")
-        ax.axvline(
-            2 * np.pi / noise.wavelength, color=VERMILLION, lw=0.8, label=f"noise below {_short(noise.wavelength)}"
-        )
-    ax.axvline(np.pi / scan.measured.spacing / 4, color=GREY, lw=0.8, ls="-.", label="waves of 8 pixels")
-    ax.set_xlabel(r"wave number $q$ (rad/m)")
-    ax.set_ylabel(r"power spectrum $C(q)$ (m$^4$)")
-    ax.legend(loc="lower left", frameon=True, framealpha=1, edgecolor="none", fontsize=7)
-
-
-def _short(length):
-    """A length to two digits."""
-    from icha.figures.style import quantity
-
-    return quantity(float(f"{length:.2g}"), "m")
 
 
 class MeasuredSection(NamedTuple):

@@ -5,7 +5,6 @@ Everything here may be left out of a configuration; only a deposit needs it (`ic
 
 import datetime
 import re
-import unicodedata
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal
 
@@ -36,41 +35,30 @@ _BASE_32 = "0123456789abcdefghjkmnpqrstvwxyz"
 _ROR = re.compile(rf"(https?://ror\.org/)?0([{_BASE_32}]{{6}})([0-9]{{2}})")
 
 
-def _readable(value: Any, breaks: str, allowed: str) -> Any:
-    """Refuse text without a visible character, and characters that formats of metadata cannot hold (XML 1.0, 2.2)."""
-    if isinstance(value, str):
-        for char in value:
-            if char == "\n" and not breaks:
-                raise ValueError(f"holds a line break; allowed: {allowed}; in YAML, >- and |- end it without one")
-            foreign = unicodedata.category(char) in ("Cc", "Cs", "Zl", "Zp") or char in "\ufffe\uffff"
-            if foreign and char not in breaks:
-                raise ValueError(f"holds the control character {char!r}; allowed: {allowed}")
-        if not any(char.isprintable() and not char.isspace() for char in value):
-            raise ValueError(f"is blank; allowed: {allowed}")
+def _line(value: str) -> str:
+    """Refuse text with line breaks or tabs, or without a visible character."""
+    if "\n" in value or "\t" in value:
+        raise ValueError(
+            "holds a line break or a tab; allowed: text of one line; in YAML, >- and |- end it without one"
+        )
+    return _prose(value)
+
+
+def _prose(value: str) -> str:
+    if not any(char.isprintable() and not char.isspace() for char in value):
+        raise ValueError("is blank; allowed: text")
     return value
 
 
-def _line(value: Any) -> Any:
-    return _readable(value, "", "text of one line")
-
-
-def _prose(value: Any) -> Any:
-    return _readable(value, "\n", "text, with or without line breaks")
-
-
-def _once(what: str, key: Callable[[Any], tuple], shown: Callable[[Any], str]) -> AfterValidator:
-    """Refuse a list with two entries that have the same key, whatever their capitals and spaces."""
-
-    def check(entries):
-        seen = set()
-        for entry in entries:
-            same = tuple(" ".join(str(part or "").split()).casefold() for part in key(entry))
-            if same in seen:
-                raise ValueError(f"{shown(entry)!r} is given twice; allowed: every {what} once")
-            seen.add(same)
-        return entries
-
-    return AfterValidator(check)
+def _once(entries: list) -> list:
+    """Refuse a list of sections in which an entry stands twice."""
+    seen = set()
+    for entry in entries:
+        written = entry.model_dump_json(exclude_none=True)
+        if written in seen:
+            raise ValueError(f"{written} is given twice; allowed: every entry once")
+        seen.add(written)
+    return entries
 
 
 def _orcid(value: str) -> str:
@@ -168,8 +156,8 @@ FunderId = _example(_funder, "https://ror.org/00k4n6c32")
 Community = _example(_community, "contact-mechanics")
 Date = _example(_date, "2026-01-31")
 Version = _example(_version, "1.0.0")
-Line = Annotated[Text, BeforeValidator(_line)]
-Prose = Annotated[Text, BeforeValidator(_prose)]
+Line = Annotated[Text, AfterValidator(_line)]
+Prose = Annotated[Text, AfterValidator(_prose)]
 
 
 class Author(Section):
@@ -250,27 +238,10 @@ class KnownFailure(Section):
     )
 
 
-Authors = Annotated[
-    list[Author],
-    _once("author", lambda each: (each.orcid or each.full_name,), lambda each: each.full_name),
-]
-Fundings = Annotated[
-    list[Funding],
-    _once(
-        "award of a funder",
-        lambda each: (each.funder_id or each.funder, each.award_number or (each.award_title, each.award_url)),
-        lambda each: each.funder,
-    ),
-]
-Related = Annotated[
-    list[RelatedIdentifier],
-    _once(
-        "relation to an identifier",
-        lambda each: (each.relation, each.identifier),
-        lambda each: f"{each.relation} {each.identifier}",
-    ),
-]
-Failures = Annotated[list[KnownFailure], _once("run", lambda each: (each.run,), lambda each: each.run)]
+Authors = Annotated[list[Author], AfterValidator(_once)]
+Fundings = Annotated[list[Funding], AfterValidator(_once)]
+Related = Annotated[list[RelatedIdentifier], AfterValidator(_once)]
+Failures = Annotated[list[KnownFailure], AfterValidator(_once)]
 
 
 class Publication(Section):

@@ -22,7 +22,7 @@ from rocrate.rocrate import ROCrate
 from icha.configuration.publication import Author, Publication
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.metadata import known_licence, web_address
+from icha.deposit.metadata import TABLES, known_licence, web_address
 from icha.deposit.verify import CRATE, README, SOURCE
 from icha.support.atomic_files import whole_file
 
@@ -31,33 +31,11 @@ WORKFLOW = f"{_PROGRAM}Snakefile"
 LOCK = f"{_PROGRAM}uv.lock"
 PROGRAM_LICENCE = f"{_PROGRAM}LICENSE"
 
-_RUN_PROFILES = {
-    "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
-    "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
-    "https://w3id.org/ro/wfrun/provenance/0.5": ("Provenance Run Crate", "0.5"),
-}
 _WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
 _BIOSCHEMAS = "https://bioschemas.org/profiles"
 # Of the run crates' own terms, the one that is used here (https://w3id.org/ro/terms/workflow-run/context).
 _TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
 _COMPLETED = "http://schema.org/CompletedActionStatus"
-# What IANA calls the formats of a deposit's files; netCDF has no name there but one that is in use.
-_FORMATS = {
-    ".bib": "application/x-bibtex",
-    ".cff": "application/yaml",
-    ".csv": "text/csv",
-    ".html": "text/html",
-    ".json": "application/json",
-    ".lock": "application/toml",
-    ".md": "text/markdown",
-    ".nc": "application/netcdf",
-    ".pdf": "application/pdf",
-    ".png": "image/png",
-    ".py": "text/x-python",
-    ".txt": "text/plain",
-    ".yaml": "application/yaml",
-    "": "text/plain",
-}
 
 
 class Job(NamedTuple):
@@ -145,11 +123,6 @@ def _steps(jobs: Sequence[Job]) -> list[Job]:
 def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
     """What the publication says of the whole."""
     licence = known_licence(publication.license)
-    profiles = [
-        _add(crate, address, "CreativeWork", name=name, version=number)
-        for address, (name, number) in _RUN_PROFILES.items()
-    ]
-    profiles.append(_add(crate, _WORKFLOW_PROFILE, "CreativeWork", name="Workflow RO-Crate", version="1.0"))
     _set(
         crate.root_dataset,
         name=publication.title,
@@ -159,7 +132,7 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
         version=publication.version,
         license=_add(crate, licence.address, "CreativeWork", name=licence.name, identifier=licence.identifier),
         author=[_add_author(crate, author) for author in publication.authors],
-        conformsTo=profiles,
+        conformsTo=[_add(crate, address, "CreativeWork", **known) for address, known in TABLES["profiles"].items()],
         keywords=publication.keywords,
         identifier=publication.doi and web_address(publication.doi),
         citation=_add_paper(crate),
@@ -199,7 +172,7 @@ def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
 
 
 def _add_file(crate: ROCrate, path: str, file: Path, sha256: str) -> File:
-    known = _FORMATS.get(file.suffix, "application/octet-stream")
+    known = TABLES["formats"].get(file.suffix, "application/octet-stream")
     size = str(file.stat().st_size)
     properties = {"name": path, "contentSize": size, "sha256": sha256, "encodingFormat": known}
     return crate.add(File(crate, dest_path=path, properties=properties))

@@ -14,39 +14,9 @@ from icha.configuration.publication import Author, Funding, Publication, Related
 from icha.contact.models import MODEL_PAPER
 from icha.deposit.verify import ZENODO, read_text
 
-_TEXTS = Path(__file__).parent / "license_texts"
-# Names and addresses of the licences whose text is in `_TEXTS`, as their authors give them.
-_USUAL_LICENCES = {
-    "CC-BY-4.0": ("Creative Commons Attribution 4.0 International", "https://creativecommons.org/licenses/by/4.0/"),
-    "CC-BY-SA-4.0": (
-        "Creative Commons Attribution-ShareAlike 4.0 International",
-        "https://creativecommons.org/licenses/by-sa/4.0/",
-    ),
-    "CC0-1.0": ("CC0 1.0 Universal", "https://creativecommons.org/publicdomain/zero/1.0/"),
-    "ODbL-1.0": ("Open Data Commons Open Database License v1.0", "https://opendatacommons.org/licenses/odbl/1-0/"),
-}
-# Zenodo's types of related works, by DataCite's names (https://developers.zenodo.org, deposit metadata).
-_ZENODO_TYPES = {
-    "Book": "publication-book",
-    "BookChapter": "publication-section",
-    "ConferencePaper": "publication-conferencepaper",
-    "Dataset": "dataset",
-    "Dissertation": "publication-thesis",
-    "Image": "image-other",
-    "JournalArticle": "publication-article",
-    "Other": "other",
-    "Preprint": "publication-preprint",
-    "Report": "publication-report",
-    "Software": "software",
-    "Text": "publication-other",
-    "Workflow": "other",
-}
-# Funders whose grants Zenodo accepts, by their number in the funder registry 10.13039 (the same page).
-_ZENODO_FUNDERS = (
-    "501100000923 501100002428 501100000780 501100000806 501100002341 501100004488 501100001871 501100004564 "
-    "501100006588 501100000925 100000002 100000001 501100003246 501100000690 501100001711 501100001602 100004440"
-)
-_FUNDER_REGISTRY, _ROR, _ZENODO_DOI = "10.13039/", "https://ror.org/", "10.5281/zenodo."
+_FOLDER = Path(__file__).parent
+TABLES = yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8"))
+_ROR, _FUNDER_REGISTRY, _ZENODO_DOI = "https://ror.org/", "10.13039/", "10.5281/zenodo."
 
 
 class Licence(NamedTuple):
@@ -89,13 +59,14 @@ def known_licence(identifier: str) -> Licence:
     if not re.fullmatch(r"(?!LicenseRef-)[A-Za-z0-9.-]+", found):
         raise ValueError(
             "is not a licence known to SPDX; allowed: one identifier of https://spdx.org/licenses, for data usually "
-            f"one of {', '.join(_USUAL_LICENCES)}"
+            f"one of {', '.join(TABLES['licences'])}"
         )
     if identifier != found:
         raise ValueError(f"is not spelled as SPDX spells it; allowed: {found!r}")
-    if found not in _USUAL_LICENCES:
+    if found not in TABLES["licences"]:
         return Licence(found, found, f"https://spdx.org/licenses/{found}.html", "")
-    return Licence(found, *_USUAL_LICENCES[found], (_TEXTS / f"{found}.txt").read_text(encoding="utf-8"))
+    text = (_FOLDER / f"license_texts/{found}.txt").read_text(encoding="utf-8")
+    return Licence(found, *TABLES["licences"][found], text)
 
 
 def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
@@ -193,7 +164,6 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
     """
     notes = [f"{acknowledgement(funding)}." for funding in publication.funding]
     notes += [f"Published with a failed check: {each.run}. {each.reason}" for each in publication.known_failures]
-    funders = {f"{_FUNDER_REGISTRY}{number}" for number in _ZENODO_FUNDERS.split()}
     return _given(
         {
             "upload_type": "dataset",
@@ -215,7 +185,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
                     {
                         "identifier": related.identifier,
                         "relation": related.relation[0].lower() + related.relation[1:],
-                        "resource_type": related.resource and _ZENODO_TYPES[related.resource],
+                        "resource_type": related.resource and TABLES["zenodo_types"][related.resource],
                     }
                 )
                 for related in publication.related_identifiers
@@ -224,7 +194,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
             "grants": [
                 {"id": f"{funding.funder_id}::{funding.award_number}"}
                 for funding in publication.funding
-                if funding.funder_id in funders and funding.award_number
+                if funding.funder_id in TABLES["zenodo_funders"] and funding.award_number
             ],
             "communities": [{"identifier": community} for community in publication.communities],
             "notes": _html(notes),
@@ -233,38 +203,26 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
-    """Read the metadata of a deposit that may be a stranger's.
-
-    Raises
-    ------
-    ValueError
-        If an entry that is shown to users is not the text or the list of mappings that it must be.
-    """
+    """Read the metadata of a deposit that may be a stranger's; ValueError if they are not a mapping."""
     try:
         metadata = json.loads(read_text(folder, ZENODO))
-        if not isinstance(metadata, dict):
-            raise ValueError("is not a mapping")
-        for name in ("title", "version", "license", "doi", "description"):
-            if not isinstance(metadata.get(name, ""), str):
-                raise ValueError(f"{name} is not text")
-        for name in ("creators", "communities"):
-            entries = metadata.get(name, [])
-            if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-                raise ValueError(f"{name} is not a list of mappings")
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"{ZENODO}: {error or 'is nested too deeply'}") from None
+        raise ValueError(f"{ZENODO}: cannot be read: {error}") from None
+    if not isinstance(metadata, dict):
+        raise ValueError(f"{ZENODO}: is not a mapping")
     return metadata
 
 
 def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
-    """Return title, version, authors, licence and communities of Zenodo metadata as lines of text."""
-    return {
-        "title": metadata.get("title", ""),
-        "version": metadata.get("version", ""),
-        "authors": "; ".join(str(each.get("name", "")) for each in metadata.get("creators", ())),
-        "licence": metadata.get("license", ""),
-        "community": "; ".join(str(each.get("identifier", "")) for each in metadata.get("communities", ())),
-    }
+    """Return title, version, authors, licence and communities of Zenodo metadata as text, whatever they are."""
+
+    def named(entries: Any, key: str) -> str:
+        entries = entries if isinstance(entries, list) else ()
+        return "; ".join(str(each.get(key, "")) for each in entries if isinstance(each, dict))
+
+    texts = {name: str(metadata.get(name, "")) for name in ("title", "version", "license")}
+    communities = named(metadata.get("communities"), "identifier")
+    return texts | {"authors": named(metadata.get("creators"), "name"), "community": communities}
 
 
 def datacite_metadata(publication: Publication) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
-from icha.deposit.metadata import acknowledgement, known_licence, paragraphs, web_address
+from icha.deposit.metadata import TABLES, acknowledgement, known_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.needs import further_software
@@ -44,22 +44,6 @@ _KINDS = {
 }
 # Numbers of a variable that are read at once.
 _BLOCK = 2**22
-# What lies in a deposit, in the order of interest: only what is there is listed.
-_PARTS = {
-    "dataset": "all runs in one file, a group per study",
-    "aggregated": "the runs of every study compared at common loads, and with boundary elements where there are any",
-    "runs": "the same runs, a file each",
-    "surfaces": "the topographies, scaled to an rms slope of 1",
-    "references": "theories, published points and boundary-element solutions for these topographies",
-    "figures": "figures, as PNG and PDF",
-    "report.html": "report: figures, tables and checks on a page that needs no network",
-    "checks.json": "every check of every result, with its value and its limit",
-    "verdict.txt": "the verdict on the checks",
-    "config.used.yaml": "the configuration: everything that was asked for",
-    "inputs": "the files that the configuration names",
-    "source": "the program and the workflow that made all this, with the lock of their environment, `uv.lock`",
-    "data_dictionary.csv": "every variable of every netCDF file: meaning, unit, dimensions, range",
-}
 # A longer list is cut.
 _MOST_NAMES = 12
 _METADATA = "citation, licence and provenance for people and machines"
@@ -365,12 +349,12 @@ def _short_dictionary(dictionary: Sequence[Entry], campaign: str) -> list[Entry]
 def _parts(sizes: Mapping[str, int]) -> list[dict]:
     """The parts of the deposit: path, content, number of files and bytes."""
     found = []
-    for part, content in _PARTS.items():
+    for part, content in TABLES["contents"].items():
         own = [size for path, size in sizes.items() if path == part or path.startswith(f"{part}/")]
         if own:
             path = part if part in sizes else f"{part}/"
             found.append({"path": path, "content": content, "files": len(own), "size": sum(own)})
-    rest = {path: size for path, size in sizes.items() if path.split("/")[0] not in _PARTS}
+    rest = {path: size for path, size in sizes.items() if path.split("/")[0] not in TABLES["contents"]}
     found.append(
         {"path": ", ".join(sorted(rest)), "content": _METADATA, "files": len(rest), "size": sum(rest.values())}
     )

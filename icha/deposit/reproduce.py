@@ -3,10 +3,8 @@
 The deposit is a folder that `icha.deposit.verify.whole_deposit` has found to be whole.
 """
 
-import difflib
 import re
 import shutil
-import textwrap
 import tomllib
 from collections.abc import Iterable, Iterator
 from importlib.metadata import version
@@ -33,8 +31,6 @@ _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
 # In the folder of a rerun: the checksum of the deposit's list of checksums; configuration, inputs and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
-# Longest reason of a failure that is shown, in characters.
-_LONGEST_REASON = 120
 
 
 class Refused(ValueError):
@@ -104,7 +100,7 @@ def asked_runs(only: Iterable[str], deposit: Path) -> list[str]:
     Raises
     ------
     Refused
-        If there is no such run, or if it has no data.
+        If there is no such run.
     """
     runs = [name for name in files_of(deposit) if _RUN.fullmatch(name)]
     found = []
@@ -114,16 +110,11 @@ def asked_runs(only: Iterable[str], deposit: Path) -> list[str]:
             continue
         path = f"runs/{asked.removeprefix('runs/').removesuffix('.nc')}.nc"
         if path not in runs:
-            names = [run.removeprefix("runs/").removesuffix(".nc") for run in runs]
-            close = difflib.get_close_matches(asked, names, 5, 0)
+            such_as = f", such as {runs[0].removeprefix('runs/').removesuffix('.nc')}" if runs else ""
             raise Refused(
                 f"--only {asked}: the deposit has no such run; allowed: {SMALLEST}, or one of its "
-                f"{counted(len(names), 'run')}, such as {', '.join(close)}"
+                f"{counted(len(runs), 'run')}{such_as}"
             )
-        steps, failure = _outcome(deposit, path)
-        if steps == 0:
-            why = f" ({textwrap.shorten(failure, _LONGEST_REASON, placeholder=' …')})" if failure else ""
-            raise Refused(f"--only {asked}: this run has no data{why}; allowed: a run with at least one step")
         found.append(path)
     return list(dict.fromkeys(found))
 
@@ -132,19 +123,16 @@ def _smallest(deposit: Path, runs: list[str]) -> str:
     """Return the complete run that, together with its surface, has the fewest bytes."""
     sizes = {run: sum((deposit / path).stat().st_size for path in with_surfaces([run], deposit)) for run in runs}
     for run in sorted(runs, key=lambda run: sizes[run]):
-        steps, failure = _outcome(deposit, run)
-        if steps and not failure:
+        if _is_complete(deposit, run):
             return run
     raise Refused(f"--only {SMALLEST}: no run of the deposit is complete; allowed: the name of a run that has steps")
 
 
-def _outcome(deposit: Path, run: str) -> tuple[int, str]:
-    """Return the number of steps of a run, and why it is incomplete; an empty text if it is complete."""
+def _is_complete(deposit: Path, run: str) -> bool:
     try:
         refuse_traps(deposit / run)
         with netCDF4.Dataset(deposit / run) as file:
-            steps = file.dimensions.get("step")
-            return (len(steps) if steps is not None else 0), why_no_result(file.__dict__)
+            return "step" in file.dimensions and len(file.dimensions["step"]) > 0 and not why_no_result(file.__dict__)
     except (OSError, ValueError, RuntimeError) as error:  # the last one for what the library cannot read
         raise Refused(f"{run}: is not a run: {error}") from None
 

@@ -1,7 +1,6 @@
 """A client for Zenodo's deposit API (https://developers.zenodo.org), and for other servers with the same API."""
 
 import hashlib
-import ipaddress
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -34,14 +33,6 @@ class ZenodoError(Exception):
     """The server refuses a request, or cannot be reached; the message says what to do."""
 
 
-class Uploaded(NamedTuple):
-    """A file of a draft; `md5` is empty if the server does not report it."""
-
-    identifier: str
-    name: str
-    md5: str
-
-
 class Draft(NamedTuple):
     """A record that is not published yet.
 
@@ -51,14 +42,14 @@ class Draft(NamedTuple):
     page : address of its page.
     bucket : path on the server to which files are sent.
     doi : the DOI reserved for it.
-    files : the files that it has.
+    files : identifiers and MD5 of its files by their names; the MD5 is empty if the server does not report it.
     """
 
     number: str
     page: str
     bucket: str
     doi: str
-    files: tuple[Uploaded, ...]
+    files: dict[str, tuple[str, str]]
 
 
 # What can be repeated waits 0, 2, 4, 8, 16 s, or as long as the server asks for, up to five minutes.
@@ -90,16 +81,9 @@ def server_address(address: str) -> str:
     plain = not (parts.username or parts.query or parts.fragment) and parts.path.rstrip("/") in ("", "/api")
     if parts.scheme not in ("http", "https") or not parts.hostname or not plain:
         raise ValueError(f"{address!r} is not the address of a server; allowed: one such as {ZENODO}")
-    if parts.scheme == "http" and not _is_loopback(parts.hostname):
+    if parts.scheme == "http" and parts.hostname not in ("localhost", "127.0.0.1", "::1"):
         raise ValueError(f"{address!r}: over http others could read the token; allowed: https")
     return f"{parts.scheme}://{parts.netloc}"
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def md5_of(path: str | os.PathLike) -> str:
@@ -157,15 +141,10 @@ class Zenodo:
             raise ZenodoError(f"{name} has not arrived as it was sent: its MD5 is {md5}, that of the server {received}")
         return bool(received)
 
-    def remove(self, draft: Draft, file: Uploaded) -> None:
+    def remove(self, draft: Draft, name: str) -> None:
         """Remove a file of a draft."""
-        path = f"/api/deposit/depositions/{draft.number}/files/{quote(file.identifier, safe='')}"
-        try:
-            self._call("DELETE", path)
-        except ZenodoError:
-            # Zenodo has been seen to remove files and to report a failure (zenodo/zenodo#2561).
-            if any(each.name == file.name for each in self.draft(draft.number).files):
-                raise
+        identifier, _ = draft.files[name]
+        self._call("DELETE", f"/api/deposit/depositions/{draft.number}/files/{quote(identifier, safe='')}")
 
     def publish(self, draft: Draft) -> tuple[str, str]:
         """Publish a draft, which cannot be undone; return its page and DOI."""
@@ -181,11 +160,11 @@ class Zenodo:
             # The token goes to nobody else.
             raise ZenodoError(f"{self.address} wants the files to be sent to another server: {self._plain(bucket)}")
         listed = content.get("files")
-        files = tuple(
-            Uploaded(_text(file, "id"), _text(file, "filename") or _text(file, "key"), _md5(file))
+        files = {
+            _text(file, "filename") or _text(file, "key"): (_text(file, "id"), _md5(file))
             for file in (listed if isinstance(listed, list) else ())
             if isinstance(file, dict)
-        )
+        }
         doi = _text(content, "metadata", "prereserve_doi", "doi") or _text(content, "metadata", "doi")
         page = _text(content, "links", "html") or f"{self.address}/uploads/{number}"
         return Draft(number, page, bucket.removeprefix(self.address).rstrip("/"), doi, files)
@@ -211,25 +190,14 @@ class Zenodo:
         return found
 
     def _refusal(self, path: str, answer: requests.Response) -> str:
-        """Describe why the server refuses: its message, what is wrong with which field, and what to do."""
-        status = answer.status_code
-        try:
-            content = answer.json()
-        except (ValueError, RecursionError):
-            content = None
-        content = content if isinstance(content, dict) else {"message": answer.reason}
-        errors = content.get("errors")
-        lines = [content.get("message")]
-        for error in errors if isinstance(errors, list) else ():
-            if isinstance(error, dict):
-                lines.append(f"{error.get('field')}: {error.get('message') or error.get('messages')}")
-        told = "\n    ".join(self._plain(line) for line in lines if line)
-        advice = _ADVICE.get(status, "").format(self.address)
-        if status in _FAILING:
+        """Describe why the server refuses, in its own words, and what to do."""
+        advice = _ADVICE.get(answer.status_code, "").format(self.address)
+        if answer.status_code in _FAILING:
             advice = "it is busy or has failed; try again in a while"
-        elif status == 400 and path.endswith("/newversion"):
+        elif answer.status_code == 400 and path.endswith("/newversion"):
             advice = "if there is a draft of a new version already, continue it with --draft"
-        return f"{self.address} refuses {path} ({status}): {'; '.join(filter(None, (told, advice)))}"
+        told = self._plain(answer.text or answer.reason)
+        return f"{self.address} refuses {path} ({answer.status_code}): {'; '.join(filter(None, (told, advice)))}"
 
     def _plain(self, text: object) -> str:
         """Shorten text of the server, and leave out the token, should the server repeat it."""

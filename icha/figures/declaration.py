@@ -11,9 +11,9 @@ them. It raises ValueError where the campaign has no such study, run or snapshot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from pydantic import Field
 
@@ -23,29 +23,8 @@ from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
 from icha.support.values import Label, Name, Positive, Problem, Section, Seed, listed, unknown
 
-
-class Campaign(Protocol):
-    """What of a configuration figures may ask for (`icha.configuration`): its sections, and its runs."""
-
-    studies: Mapping[str, Any]
-    materials: Mapping[str, Any]
-    finite_range: Mapping[str, Any]
-    boundary_element_loops: Mapping[str, Any]
-    measurements: Mapping[str, Any]
-
-    def contacts(self, study: str) -> list[tuple[str, int, float, str]]:
-        """Surface, seed, rms slope and material of every run of a study."""
-
-    def solved(self, entry: Any) -> list[tuple[str, int, float, str]]:
-        """The same of an entry beside a study."""
-
-    def compares_models(self, study: str) -> bool:
-        """Whether the runs of a study by asperities have others by boundary elements beside them at given loads."""
-
-    def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
-        """Kind and value of all states that the runs of a study keep; None where they keep their last one."""
-
-
+# A configuration (`icha.configuration.campaign.Campaign`), which stands above this folder.
+Campaign = Any
 # Files by the names of the arguments that are read from them: one, or a list of them.
 Inputs = dict[str, str | list[str]]
 

@@ -70,14 +70,10 @@ _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 
 
 class _Way(NamedTuple):
-    """A leg of a loop: branch, reduced separation, reduced pressure and contact area; the last two also of the single
-    members where there are several seeds.
-    """
+    """A leg of a loop: its branch, separation, load and area, and of several seeds also load and area of each."""
 
     branch: str
-    reduced_separation: np.ndarray
-    reduced_pressure: np.ndarray
-    contact_area_fraction: np.ndarray
+    values: dict[str, np.ndarray]
     members: dict[str, np.ndarray]
 
 
@@ -108,11 +104,12 @@ def _ways(runs):
 
     legs = [list(branches(run)) for run in runs]
     if len(runs) == 1 or len({len(own) for own in legs}) > 1:
-        return [_Way(name, *(leg[axis].values for axis in _COLUMNS), {}) for own in legs for name, leg in own]
+        return [_Way(name, {axis: leg[axis].values for axis in _COLUMNS}, {}) for own in legs for name, leg in own]
     found = []
     for members in zip(*legs, strict=True):
         separation, values = at_common_displacements([leg for _, leg in members])
-        found.append(_Way(members[0][0], separation, *(values[name].mean(axis=0) for name in _COLUMNS[1:]), values))
+        means = {name: of_seeds.mean(axis=0) for name, of_seeds in values.items()}
+        found.append(_Way(members[0][0], means | {"reduced_separation": separation}, values))
     return found
 
 
@@ -233,7 +230,7 @@ def _draw(ax, loop, look, axis, *, turn, lines):
     """Draw a loop, a mark at its pull-off, and one where it turns first if that is wanted or the loop lacks seeds."""
     colour = look["color"]
     for way in loop.ways:
-        x, y = (getattr(way, name) for name in (axis.x, axis.y))
+        x, y = way.values[axis.x], way.values[axis.y]
         dashes = BRANCH_DASHES[way.branch]
         ax.plot(x, y, ls=dashes, color=colour, **_LOOP)
         if way.members:
@@ -267,13 +264,13 @@ def _enlarge(left, right, loops):
     from matplotlib.ticker import MaxNLocator
 
     ways = [way for loop, _ in loops for way in loop.ways]
-    pressures = np.concatenate([way.reduced_pressure for way in ways])
+    pressures = np.concatenate([way.values["reduced_pressure"] for way in ways])
     tension = -pressures.min()
     if not ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
         return
     reach = np.array([-1, 1]) * _REACH * tension
     separations, areas = (
-        np.concatenate([getattr(way, name) for way in ways]) for name in ("reduced_separation", "contact_area_fraction")
+        np.concatenate([way.values[name] for way in ways]) for name in ("reduced_separation", "contact_area_fraction")
     )
     near = (np.abs(pressures) <= reach[1]) & (areas > 0)
     separations, areas = separations[near], areas[near]

@@ -12,9 +12,8 @@ from pydantic import Field
 from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, not_unloaded, studies_problems
 from icha.figures.ensembles import points_handles
-from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model, several
+from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model
 from icha.figures.looks import legend_below
-from icha.figures.select import pick
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_panels, number, slope_label, styled, unit_for
 from icha.support.values import Problem, list_of_names
 
@@ -65,8 +64,7 @@ def figure(
     campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (), quantity: str = "pull_off_pressure"
 ) -> Figure:
     """Draw the pull-off of all runs of the studies, averaged over the seeds, against slope and largest load."""
-    pick("quantity", quantity, list(_QUANTITIES))
-    load_studies = several("load_studies", load_studies) if load_studies else []
+    load_studies = list(dict.fromkeys(load_studies))
     by_slope = detached_lines(campaign, [study], along_slopes=True)
     by_load = detached_lines(campaign, load_studies)
     loaded_slopes = {slope for (*_, slope), _ in by_load}
@@ -84,7 +82,7 @@ def figure(
         means = {key: averages_of(campaign, line, x, quantity, factor) for key, line in drawn.items()}
         for (contact, applicable), line in means.items():
             draw_averages(ax, line, **looks.look(contact, applicable=applicable) | _LINE)
-            counts += line.counts.tolist()
+            counts += line.over.count[:, 0].tolist()
         _scale(ax, np.concatenate([line.y for line in means.values()]))
         ax.set_ylabel(_QUANTITIES[quantity] + (f" ({unit})" if unit else ""))
     _label_slopes(panels[0], sorted({labels.rms_slope for line in by_slope.values() for labels in line}))

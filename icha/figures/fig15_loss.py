@@ -11,7 +11,7 @@ from pydantic import Field
 from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
 from icha.figures.ensembles import points_handles
-from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model, several
+from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model
 from icha.figures.looks import legend_below
 from icha.figures.select import NothingToDraw
 from icha.figures.style import GREY, logarithmic_axes, new_panels, styled, unit_for
@@ -78,7 +78,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     """Draw the loss of all runs of the studies, averaged over the seeds, and its parts where there is adhesion."""
     from matplotlib.patches import Patch
 
-    studies = several("studies", studies)
+    studies = list(dict.fromkeys(studies))
     runs = detached_lines(campaign, studies)
     looks = looks_of(campaign, studies, [contact for contact, _ in runs])
     sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
@@ -120,7 +120,7 @@ def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
     ax.set_xlabel(r"contact area at the largest load  $A/A_0$")
     ax.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")
-    return handles, np.concatenate([line.counts for line in drawn.values()])
+    return handles, np.concatenate([line.over.count[:, 0] for line in drawn.values()])
 
 
 def linear_fit(x: np.ndarray, y: np.ndarray) -> LinearFit | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from icha.datasets import results
 from icha.datasets.labels import place_of
+from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
@@ -23,7 +24,7 @@ from icha.figures.curves import (
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure, finite_range_error
 from icha.figures.ensembles import draw_members, mark_fewer
-from icha.figures.looks import FINITE_RANGE_MARKERS
+from icha.figures.looks import MODEL_MARKERS
 from icha.figures.select import asked_of_entry, finite_range_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
@@ -226,12 +227,9 @@ def _separations(run):
 
 def _draw_solutions(left, right, looks, entries):
     """Mark the states of boundary elements at a finite range, means over their seeds; returns loads and values."""
-    states, drawn, named = [], [], set()
-    for entry, errors in entries.items():
-        name = errors.attrs["truth"]
+    states = []
+    for errors in entries.values():
         for material in errors["material"].values.tolist():
-            again = drawn.count((name, material))
-            drawn.append((name, material))
             own, adhesive = errors.sel(material=material), float(errors["surface_energy"].sel(material=material)) > 0
             members = [
                 own[f"{quantity}_boundary_elements"].transpose("seed", ..., "reduced_pressure").values
@@ -244,16 +242,14 @@ def _draw_solutions(left, right, looks, entries):
             there = np.isfinite(area)
             # The larger ones show behind the others where the results agree, as the runs' markers do.
             look = {"ls": "none", "mew": 1.0, "ms": 8 if adhesive else 11, "zorder": 6 + adhesive}
-            look |= {"marker": FINITE_RANGE_MARKERS[again % 4], "mec": looks.colours.get(material, GREY)}
+            look |= {"marker": MODEL_MARKERS[FINITE_RANGE], "mec": looks.colours.get(material, GREY)}
             states.append((p[there], area[there], gap[there]))
             known = np.isfinite(members[0])[:, there]
-            label = f"{name}, {entry}" if again else name
             for ax, values in zip((left, right), states[-1][1:], strict=True):
                 ax.plot(states[-1][0], values, **look)
                 mark_fewer(ax, states[-1][0], values, known, look, asked[there])
-                if label not in named:
-                    ax.plot([], [], **look | {"mec": GREY, "ms": 8}, label=label)
-            named.add(label)
+    for ax in (left, right) if states else ():
+        ax.plot([], [], **look | {"mec": GREY, "ms": 8}, label=FINITE_RANGE)
     return states
 
 

@@ -13,7 +13,7 @@ from icha.figures.curves import UNLOADING
 from icha.figures.ensembles import draw_means
 from icha.figures.looks import Contact, Looks, interfaces_of
 from icha.figures.select import NothingToDraw, asked_seeds, is_applicable, shown_model, study_runs, ways_back
-from icha.support.statistics import ensemble
+from icha.support.statistics import Ensemble, ensemble
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,26 +107,30 @@ class Averages(NamedTuple):
 
     Parameters
     ----------
-    x, y : (k,) float, the means.
-    x_band, y_band : (2, k) float, lower and upper ends of their 95 % bands; NaN of a single seed.
-    counts : (k,) int, numbers of seeds.
-    same_seeds : whether all points are of the same seeds.
     members : (seeds, k, 2) float, x and y of every seed; NaN where a point lacks it.
+    over : their means, bands and counts, (k, 2) each.
+    same_seeds : whether all points are of the same seeds.
     asked : (k,) int, numbers of seeds asked for.
     """
 
-    x: np.ndarray
-    y: np.ndarray
-    x_band: np.ndarray
-    y_band: np.ndarray
-    counts: np.ndarray
-    same_seeds: bool
     members: np.ndarray
+    over: Ensemble
+    same_seeds: bool
     asked: np.ndarray
+
+    @property
+    def x(self) -> np.ndarray:
+        """Means of x."""
+        return self.over.mean[:, 0]
+
+    @property
+    def y(self) -> np.ndarray:
+        """Means of y."""
+        return self.over.mean[:, 1]
 
 
 def averages(
-    points: Sequence[Mapping[int, tuple[float, float]]], factor: float = 1.0, asked: Sequence[int] | None = None
+    points: Sequence[Mapping[int, tuple[float, float]]], factor: float = 1.0, asked: Sequence[int] = ()
 ) -> Averages:
     """Means over the seeds that all points of a line have, or over each point's own where they share none.
 
@@ -135,24 +139,13 @@ def averages(
     points : for every point of the line x and y of every seed, neither of them negative as a rule.
     factor : unit of y, which it is multiplied by.
     asked : for every point the number of seeds asked for; left out, those that there are.
-
-    Returns
-    -------
-    Averages in the order of x.
     """
     common = set.intersection(*(set(point) for point in points))
     seeds = sorted(common or set().union(*points))
-    members = np.full((len(seeds), len(points), 2), np.nan)
-    for k, point in enumerate(points):
-        for row, seed in enumerate(seeds):
-            if seed in point:
-                members[row, k] = np.array(point[seed]) * (1.0, factor)
-    over = ensemble(members)
-    low, high = over.band(positive=True)
-    order = np.argsort(over.mean[:, 0], kind="stable")
-    bands = (np.array([low[order, axis], high[order, axis]]) for axis in (0, 1))
-    asked = np.array([len(point) for point in points] if asked is None else asked)[order]
-    return Averages(*over.mean[order].T, *bands, over.count[order, 0], bool(common), members[:, order], asked)
+    members = np.array([[point.get(seed, (np.nan, np.nan)) for point in points] for seed in seeds]) * (1.0, factor)
+    order = np.argsort(ensemble(members).mean[:, 0], kind="stable")
+    members, asked = members[:, order], np.array([*(asked or map(len, points))])[order]
+    return Averages(members, ensemble(members), bool(common), asked)
 
 
 def averages_of(
@@ -165,11 +158,11 @@ def averages_of(
 
 def draw_averages(axes: Axes, line: Averages, **look):
     """Draw the points of a line, with bars of their 95 % confidence or with their seeds where these are few."""
+    low, high = line.over.band(positive=True)
     # A coordinate that all seeds share, such as a slope, has no bar.
-    x_band = line.x_band if np.any(line.x_band[1] > line.x_band[0] * (1 + 1e-9)) else None
-    return draw_means(
-        axes, (line.x, x_band), (line.y, line.y_band), line.counts, np.moveaxis(line.members, -1, 0), look, line.asked
-    )
+    x_band = (low[:, 0], high[:, 0]) if np.any(high[:, 0] > low[:, 0] * (1 + 1e-9)) else None
+    y, counts = (line.y, (low[:, 1], high[:, 1])), line.over.count[:, 0]
+    return draw_means(axes, (line.x, x_band), y, counts, np.moveaxis(line.members, -1, 0), look, line.asked)
 
 
 def looks_of(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:
@@ -183,16 +176,3 @@ def say_which_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -
     """Name above a panel the model whose runs of some studies it shows; those by the other one are not there."""
     models = dict.fromkeys(shown_model(campaign[study].to_dataset()) for study in studies)
     axes.set_title(", ".join(MODELS[model].words for model in models), loc="right")
-
-
-def several(name: str, studies: Sequence[str]) -> list[str]:
-    """The studies of an argument, each once.
-
-    Raises
-    ------
-    ValueError
-        If it is not a list, or empty.
-    """
-    if isinstance(studies, str) or not studies:
-        raise ValueError(f"{name}: {studies!r} is not a list of at least one study")
-    return list(dict.fromkeys(studies))

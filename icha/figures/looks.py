@@ -52,8 +52,6 @@ MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
 WAY_BACK_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
 # Lines of boundary elements beside those of asperities.
 BESIDE_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
-# Further solutions of the same states at a finite range, on other grids.
-FINITE_RANGE_MARKERS = ("1", "2", "3", "4")
 
 # The most that a legend names, with a colour for each; more have a scale.
 MOST_COLOURS = len(COLOURS)

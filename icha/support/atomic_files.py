@@ -8,8 +8,8 @@ and no call begins in between.
 import fcntl
 import os
 import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 
 # As much as libraries want to write at once; a disk on which less is free is full.
@@ -17,6 +17,7 @@ _PROBE = 2**20
 _ENDING = ".part"
 # For the programs that an owner starts, wherever they run: what the file says while the results are its own; the file.
 _TOLD = "ICHA_OWNER"
+_moving: Callable[[], AbstractContextManager] = nullcontext
 _SUPERSEDED = "the campaign was begun again since, and the later call makes this result; nothing was written"
 
 
@@ -30,7 +31,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
     Raises
     ------
     Superseded
-        If this process was started by an owner of results that are another's by now.
+        If files are moved only while owned, and the results are another call's by now.
     OSError
         If the folder cannot be written to. Libraries for data files have other errors for a full disk, which say
         nothing of it: whatever the block raises, this one is raised instead where that is the case.
@@ -42,7 +43,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
         yield temporary
         if lasting:
             _sync(temporary)
-        with while_owned():
+        with moving():
             os.replace(temporary, path)
         if lasting:
             # Some file systems do not know how.
@@ -57,6 +58,17 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
         raise
     finally:
         _remove(temporary)
+
+
+def move_only_while_owned() -> None:
+    """From now on, move files into place only while their owner is the one that has started this process: in jobs."""
+    global _moving
+    _moving = while_owned
+
+
+def moving() -> AbstractContextManager:
+    """The context in which files are moved into place."""
+    return _moving()
 
 
 def is_left_over(name: str) -> bool:

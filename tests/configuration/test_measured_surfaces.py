@@ -25,11 +25,6 @@ def test_section_in_si_units():
     assert MeasuredSurface.model_validate(SECTION | {"boundary": "window"}).preparation["taper"] == 0.1
 
 
-def test_a_crop_is_called_by_its_lengths():
-    section = MeasuredSurface.model_validate(SECTION | {"crop": {"x": "7 um", "y": "0 um", "side": "2.5 um"}})
-    assert repr(section.crop) == "a square of 2.5 um at x = 7 um, y = 0 m"
-
-
 def test_a_measured_surface_at_its_own_slope(load):
     campaign = load({"surfaces.rough": measured_surface(), "studies.one.rms_slopes": "measured"}).campaign
     (case,) = run_cases(campaign)

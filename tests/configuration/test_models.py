@@ -1,7 +1,6 @@
 """Key `models` of a study: by which models of contact its runs are computed."""
 
 import pytest
-from demo_configuration import measured_surface
 
 from icha.configuration.cases import run_cases, run_settings, run_sha256
 from icha.configuration.errors import ConfigurationError
@@ -20,11 +19,6 @@ def test_grids_of_4_to_8_cells_are_warned_of_only_for_boundary_elements(load):
     (warning,) = load(BOTH | coarse).campaign.warnings()
     assert "surfaces.rough.grid: 40 gives boundary elements 4 cells" in warning and "recommended: 80 or more" in warning
     assert load(BOTH).campaign.warnings() == []
-
-
-def test_periodic_measured_surfaces_are_pressed_by_both(load):
-    for boundary in ("mirror", "window"):
-        assert load(BOTH | {"surfaces.rough": measured_surface(boundary=boundary)}).campaign.warnings() == []
 
 
 def test_without_the_key_runs_are_by_asperities_and_as_they_were(load):

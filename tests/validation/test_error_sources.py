@@ -11,9 +11,9 @@ from icha.path.follow import follow
 from icha.references.finite_range import NodalState, contact_state, perimeter_correction
 from icha.surfaces.summits import Asperities, find_summits
 from validation.error_sources import chain, effects, error_sources, shape_ratio, shape_ratio_of_fourth_order
-from validation.paraboloids import fourth_order_terms, paraboloids, summit_curvatures
+from validation.paraboloids import fourth_order_terms, summit_curvatures
 from validation.spot_by_spot import CATEGORIES, contact_patches, match
-from validation.without_unions import Discs, discs_apart, union_area_fraction
+from validation.without_unions import discs_apart
 
 HARD = icha.Material(contact_modulus=2.0, surface_energy=0.0, interaction_range=1e-3)
 LAW = JKR(HARD)
@@ -51,22 +51,6 @@ def test_curvatures_and_fourth_order_of_crossed_waves():
     assert fourth_order_terms(surface, summits) == pytest.approx([(along_x + along_y) * q**4 / 64], rel=1e-9)
 
 
-def test_envelope_of_a_rough_surface_lies_above_every_paraboloid_and_touches_the_highest(surface):
-    summits = find_summits(surface)
-    curvatures = summit_curvatures(surface, summits)
-    grid = 128
-    heights = paraboloids(summits, curvatures, grid)
-    nodes = np.rint(summits.position * grid).astype(int)
-    offset = nodes / grid - summits.position
-    xx, xy, yy = curvatures.T
-    dx, dy = offset.T
-    own = summits.height + 0.5 * (xx * dx**2 + 2 * xy * dx * dy + yy * dy**2)
-    above = heights[nodes[:, 1] % grid, nodes[:, 0] % grid] - own
-    assert np.min(above) > -1e-12
-    assert above[np.argmax(summits.height)] == pytest.approx(0, abs=1e-12)
-    assert np.max(heights) <= np.max(summits.height)
-
-
 # --- contact without unions -------------------------------------------------------------------------------------
 
 
@@ -94,16 +78,6 @@ def test_without_overlaps_it_is_the_model(surface):
     assert np.sort(discs.contact_radius) == pytest.approx(np.sort(state.spots.contact_radius), rel=1e-6)
     area = np.pi * np.sum(discs.contact_radius**2) / surface.period**2
     assert area == pytest.approx(contact.area_fraction(state), rel=1e-6)
-
-
-def test_area_of_overlapping_discs_is_that_of_their_union(surface):
-    a, distance = 0.1, 0.12
-    angle = np.arccos(distance / (2 * a))
-    union = 2 * a**2 * (np.pi - angle + np.sin(angle) * np.cos(angle))
-    discs = Discs(np.array([[0.3, 0.98], [0.3, 0.98 + distance - 1]]), np.full(2, a), np.ones(2), 0.0)
-    assert union_area_fraction(discs, surface) == pytest.approx(union, rel=2e-3)
-    apart = Discs(np.array([[0.3, 0.3], [0.7, 0.7]]), np.array([0.1, 0.01]), np.ones(2), 0.0)
-    assert union_area_fraction(apart, surface) == pytest.approx(np.pi * 0.0101, rel=1e-12)
 
 
 # --- patches ----------------------------------------------------------------------------------------------------
@@ -187,15 +161,3 @@ def test_effects_add_up_to_the_error(sources):
     error = np.log(area.sel(variant="icha") / area.sel(variant="boundary_elements"))
     assert effects(sources).sum("source").values == pytest.approx(error.values, rel=1e-9)
     assert effects(sources).sizes["source"] == len(chain(sources)) - 1
-
-
-@pytest.mark.slow
-def test_with_adhesion_the_chain_is_shorter(surface):
-    sticky = icha.Material(contact_modulus=2.0, surface_energy=1e-4, interaction_range=5e-3)
-    sources = error_sources(surface, sticky, [2e-2], tolerance=1e-6)
-    names = set(sources["variant"].values)
-    assert names == {*chain(sources), "icha_fine_grid", "boundary_elements_coarse"}
-    assert "spot_count" not in sources
-    error = np.log(sources["contact_area_fraction"].sel(variant="icha"))
-    error = error - np.log(sources["contact_area_fraction"].sel(variant="boundary_elements"))
-    assert effects(sources).sum("source").values == pytest.approx(error.values, rel=1e-9)

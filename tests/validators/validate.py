@@ -378,13 +378,16 @@ def main() -> int:
             if not (folder / CRATE).is_file():
                 sys.exit(f"{name}: is no deposit: there is no {CRATE} in it")
             for file in sorted(folder.rglob("*.nc")):
-                refuse_traps(file)
+                try:
+                    refuse_traps(file)
+                except (OSError, ValueError) as error:
+                    sys.exit(f"{name}: {printable(file.relative_to(folder))}: {printable(error)}")
             stay_off_the_network()
             return 0 if validate(folder, arguments.only, sys.maxsize if arguments.all else 5) else 1
     except Damaged as damaged:
         print(*damaged.args, sep="\n")
         sys.exit(f"{name}: is not whole, so no validator has seen it")
-    except (OSError, ValueError) as error:
+    except OSError as error:
         sys.exit(f"{name}: {printable(error)}")
 
 

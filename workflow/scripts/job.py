@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from icha.support import checksums
+from icha.support.atomic_files import move_only_while_owned
 from icha.support.in_words import printable_lines
 from icha.support.program import beginning_of, end_with_parent
 
@@ -37,6 +38,7 @@ def guarded(snakemake):
     all in their message. The traceback of any other one is for the developers and is kept beside the log.
     """
     _end_with_snakemake()
+    move_only_while_owned()
     log, results = snakemake.log[0], _results(snakemake)
     outputs = [_result(results, path) for path in snakemake.output]
     terminal = os.dup(2)

@@ -126,7 +126,10 @@ def _read(path, how):
         # Two columns are x and z.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
     if heights.ndim != 2 or not heights.size:
-        raise UnfitTopography("path", f"holds an array of shape {heights.shape}; allowed: rows and columns of heights")
+        nothing = "" if heights.size else ", no heights"
+        raise UnfitTopography(
+            "path", f"holds an array of shape {heights.shape}{nothing}; allowed: rows and columns of heights"
+        )
     return name, found
 
 
