@@ -30,11 +30,19 @@ from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.build import bin_values, build, described, joined, of, stacked
 from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
+from icha.path.energy_balance import Waypoint, hysteresis
 from icha.path.follow import follow
-from icha.path.hysteresis import hysteresis
-from icha.path.limits import LEAST_PRESSURE, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
-from icha.path.targets import BETWEEN, IN_METRES, MEAN_SEPARATION, RELATIVE_LOAD, Path, Target
-from icha.path.waypoints import Waypoint
+from icha.path.targets import (
+    BETWEEN,
+    IN_METRES,
+    LEAST_PRESSURE,
+    MAX_AREA_FRACTION,
+    MAX_REDUCED_PRESSURE,
+    MEAN_SEPARATION,
+    RELATIVE_LOAD,
+    Path,
+    Target,
+)
 from icha.support.rules import ALL_MODELS, Integer
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.summits import SummitCoverage, locate_summits

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.boundary_elements import transforms
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
-from icha.path.limits import UNRESOLVED_LOSS
+from icha.path.targets import UNRESOLVED_LOSS
 from icha.support import parallel
 
 PERIOD, MODULUS = 100e-6, 25e6

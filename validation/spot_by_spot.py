@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.equilibrium.states import ContactState
+from icha.equilibrium.sites import ContactState
 from icha.references.finite_range import NodalState, perimeter_correction
 
 # What a group of spots and patches is that lie on each other.

@@ -1,6 +1,6 @@
 """Coalescence: overlapping spots become one equivalent spot (Violano & Afferrante, section II; Afferrante et al. 2012).
 
-The height follows from the equilibrium at hand (`icha.equilibrium.events.unions`).
+The height follows from the equilibrium at hand (`icha.equilibrium.unions`).
 """
 
 import numpy as np

@@ -6,8 +6,8 @@ import numpy as np
 
 from icha.checks.findings import IDENTITY_LIMIT, Finding
 from icha.contact.models import RESIDUAL_TOLERANCE, model_of
-from icha.path.limits import UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST
-from icha.path.open_work import integration_error, pressure_jump, unresolved_work
+from icha.path.energy_balance import integration_error, pressure_jump, unresolved_work
+from icha.path.targets import UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST
 
 # What the hysteresis loss of a run consists of.
 LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump", "loss_unattributed")

@@ -43,6 +43,7 @@ def about_scan(name: str, scan, *, to_scale: bool = True, by_patches: bool = Fal
     filled = f"{points} had no height and {'was' if scan.filled == 1 else 'were'} filled" if scan.filled else ""
     taken = f", `data: {printable(scan.data)}` of several" if scan.data else ""
     yield f"{name}: read as {scan.format}{taken}, {filled or 'no point is missing'}"
+    yield f"{name}: {scan.reading.partition(', ')[2]}"
     if scan.filled:
         yield f"{name}: {in_words.share(scan.filled, scan.points)} of the points are filled"
     if scan.filled > MANY_FILLED * scan.points:

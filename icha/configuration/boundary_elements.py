@@ -9,8 +9,8 @@ from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
 from icha.configuration.studies import MEASURED
 from icha.contact.models import DEFAULT_MODEL
-from icha.path.limits import STEP
 from icha.path.states import ReducedPressure
+from icha.path.targets import STEP
 from icha.support.rules import GRID, REFINEMENT, TOLERANCE
 from icha.support.values import (
     Label,

@@ -16,9 +16,8 @@ from pydantic import (
 
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.path.limits import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
-from icha.path.targets import Path
+from icha.path.targets import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP, Path
 from icha.support.rules import NUMBER, SLOPE, Real
 from icha.support.values import (
     Flag,

@@ -74,6 +74,7 @@ class State(Protocol):
 
 
 S = TypeVar("S", bound=State)
+S_in = TypeVar("S_in", bound=State, contravariant=True)
 
 
 class ContactModel(Protocol[S]):
@@ -150,16 +151,16 @@ class ContactModel(Protocol[S]):
         """What a run keeps of the states on the surface that is pressed."""
 
 
-class Observables(Protocol[S]):
+class Observables(Protocol[S_in]):
     """Observables of a contact, by the names of a run's variables (`icha.datasets.variables.run`)."""
 
     def of_contact(self) -> dict[str, Any]:
         """What holds for all states."""
 
-    def of_step(self, state: S) -> dict[str, Any]:
+    def of_step(self, state: S_in) -> dict[str, Any]:
         """What a run keeps of every state."""
 
-    def of_snapshot(self, state: S) -> dict[str, Any]:
+    def of_snapshot(self, state: S_in) -> dict[str, Any]:
         """Distributions of gap and pressure, and the spots."""
 
     def reasons_against(self, separations: Iterable[float]) -> list[str]:

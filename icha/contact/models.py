@@ -1,7 +1,7 @@
 """The contact models that a run may be computed with: everything that is known of a model without its solver.
 
 Nothing here imports a solver, so that what only names models (figures, plans, configurations) does not change with one.
-What a model costs is in `icha.planning.costs`, and how figures draw it in `icha.figures.palette`: a change there must
+What a model costs is in `icha.planning.costs`, and how figures draw it in `icha.figures.looks`: a change there must
 not compute runs again.
 """
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from icha.asperity.law import SpotLaw
 from icha.contact.model import GAPS_PER_DECADE, PRESSURE_BINS, gap_bins
-from icha.equilibrium.states import ContactState, Spots
+from icha.equilibrium.sites import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, row_blocks, windows
 from icha.support.parallel import on_cores
 from icha.surfaces.square import cell_of

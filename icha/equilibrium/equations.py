@@ -1,4 +1,4 @@
-"""The equations of equilibrium, eq. (4), and their error at given approaches.
+"""The equations of equilibrium, eq. (4), their error at given approaches, and what a solve can hold.
 
 The unknowns are the local approaches delta_i of the spots in contact:
 
@@ -15,12 +15,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from icha.asperity.law import SpotLaw
 from icha.contact.model import PRESSURE, Control
 from icha.contact.models import RESIDUAL_TOLERANCE, SMALLEST_LOAD
-from icha.equilibrium.control import held_value
-from icha.equilibrium.problem import Problem
-from icha.equilibrium.sites import Sites
+from icha.equilibrium.sites import ContactState, Problem, Sites
 from icha.half_space.interaction import Interaction
+
+
+def held_value(problem: Problem, quantity: str, a, R) -> float:
+    """Nominal pressure (Pa) or area fraction of spots of contact radii a and radii of curvature R (n,), m."""
+    if quantity == PRESSURE:
+        return float(np.sum(problem.law.force(a, R))) / problem.area
+    return float(np.sum(np.pi * a**2)) / problem.area
+
+
+def gradient_by_radius(problem: Problem, quantity: str, a, R):
+    """Its derivative with respect to the contact radii (n,)."""
+    if quantity == PRESSURE:
+        return problem.law.force_derivative(a, R) / problem.area
+    return 2 * np.pi * a / problem.area
+
+
+def derivative(problem: Problem, quantity: str, state: ContactState) -> float:
+    """Its derivative with respect to the mean separation, at unchanged contacts."""
+    sites, c = state.sites, state.in_contact
+    a, R = state.contact_radius[c], sites.radius_of_curvature[c]
+    growth = radius_response(problem.law, a, R, sites.approach[c], sites.jump_off[c]) * sites.response[c]
+    return float(np.sum(gradient_by_radius(problem, quantity, a, R) * growth))
+
+
+def radius_response(law: SpotLaw, a, R, approach, jump_off):
+    """da/d(delta), zero for spots past jump-off; bounded close to it, where it is infinite."""
+    slope = np.zeros(len(a))
+    touching = (a > 0) & (approach >= jump_off)
+    slope[touching] = law.radius_derivative(a[touching], R[touching])
+    return slope
+
 
 # Relative error of a load or an area that was asked for.
 TARGET_TOLERANCE = 1e-11
@@ -86,3 +116,17 @@ class Equations:
         # A load that is next to nothing beside the attraction and repulsion that make it up is met as well as they are.
         unit = max(abs(self.control.target), SMALLEST_LOAD * point.repulsion)
         return max(size, abs(point.miss) / unit * miss_weight)
+
+
+def stored_energy(problem: Problem, state: ContactState) -> float:
+    """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact.
+
+    Every spot has the work that would make it alone, and half that of its force against the displacement by the
+    others. Force and displacement are those of the spots' centres, as in eq. (4), which makes the interaction of
+    spots of unlike size only nearly reciprocal: along a path without events the energy changes by the work done but
+    for a part of the order of (a/r)^2 of that interaction.
+    """
+    spots, law = state.spots, problem.law
+    a, R = spots.contact_radius, spots.radius_of_curvature
+    displaced = spots.height - state.separation - spots.approach
+    return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / problem.area

@@ -16,18 +16,12 @@ import numpy as np
 
 from icha.contact.model import AREA_FRACTION, COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Control, FullContact, NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
-from icha.equilibrium.control import held_value
-from icha.equilibrium.equations import Equations, Point
-from icha.equilibrium.events.jump_in import jump_in, with_candidates
-from icha.equilibrium.events.jump_off import jump_off, let_go
-from icha.equilibrium.events.swallowing import swallow
-from icha.equilibrium.events.undoing import undo
-from icha.equilibrium.events.unions import settled, unite
+from icha.equilibrium.equations import Equations, Point, held_value
+from icha.equilibrium.jumps import jump_in, jump_off, let_go, with_candidates
 from icha.equilibrium.newton import descend, response
-from icha.equilibrium.problem import Problem
 from icha.equilibrium.search import Search
-from icha.equilibrium.sites import CONTACT, TRIAL
-from icha.equilibrium.states import ContactState
+from icha.equilibrium.sites import CONTACT, TRIAL, ContactState, Problem
+from icha.equilibrium.unions import settled, swallow, undo, unite
 
 # Error in h_rms below which jumps and unions happen; one that hangs by less than ten times the error waits.
 _EVENT_TOLERANCE = 3e-4

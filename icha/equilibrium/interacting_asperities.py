@@ -10,12 +10,10 @@ import numpy as np
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, summit_counts
-from icha.equilibrium.control import derivative, held_value
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
-from icha.equilibrium.energy import stored_energy
+from icha.equilibrium.equations import derivative, held_value, stored_energy
 from icha.equilibrium.equilibrium import equilibrium
-from icha.equilibrium.problem import Problem
-from icha.equilibrium.states import ContactState, untouched
+from icha.equilibrium.sites import ContactState, Problem, untouched
 from icha.half_space.free_square import mean_displacement
 from icha.surfaces.summits import SummitCoverage, find_summits
 from icha.surfaces.surface import Surface
@@ -80,7 +78,7 @@ class InteractingAsperities(Problem):
         return derivative(self, quantity, state)
 
     def stored_energy(self, state: ContactState) -> float:
-        """Elastic energy less that of adhesion over nominal area, J/m^2 (`icha.equilibrium.energy`)."""
+        """Elastic energy less that of adhesion over nominal area, J/m^2 (`icha.equilibrium.equations`)."""
         return stored_energy(self, state)
 
     def is_unstable(self, state: ContactState) -> bool:

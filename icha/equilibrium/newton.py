@@ -11,8 +11,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.contact.model import NotConverged
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.equilibrium.control import gradient_by_radius, radius_response
-from icha.equilibrium.equations import Equations, Point
+from icha.equilibrium.equations import Equations, Point, gradient_by_radius, radius_response
 from icha.equilibrium.sites import CONTACT
 
 _MAX_HALVINGS = 8

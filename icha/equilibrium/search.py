@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from icha.contact.model import JUMP_IN, SPLIT, Events
-from icha.equilibrium.problem import Problem
-from icha.equilibrium.sites import CONTACT, Sites
-from icha.equilibrium.states import ContactState
+from icha.equilibrium.sites import CONTACT, ContactState, Problem, Sites
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,6 @@
-"""The energy balance of a path: a part of the work done on a contact is stored, the rest is lost in jumps.
+"""The energy balance of a path, its waypoints, and the hysteresis of a whole cycle.
+
+A part of the work done on a contact is stored, the rest is lost in jumps.
 
 Between two events the stored energy changes by the work done. An event, at a given separation, changes the energy at
 once; what it sets free is lost. Over a closed path the losses of all events make up the area of the loop, the integral
@@ -7,12 +9,30 @@ of p over u.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from icha.asperity.material import Material
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State
-from icha.path.open_work import integration_error, pressure_jump, unresolved_work
+from icha.path.targets import BETWEEN, Target
+
+
+def pressure_jump(width, change, slope, end_slope):
+    """By how much a change of the pressure over a step misses that along the tangents at its ends, Pa."""
+    return change - 0.5 * width * (slope + end_slope)
+
+
+def unresolved_work(width, pressure_jump):
+    """Bound of the error of the work of a step with events: they may all lie at either of its ends, J/m^2."""
+    return 0.5 * abs(width * pressure_jump)
+
+
+def integration_error(width, slope, end_slope):
+    """Bound of the error of the work of a step where it is smooth, J/m^2."""
+    return width**2 * abs(end_slope - slope) / 24
+
 
 # Of the work of a step, the part from which on its loss is that of its jumps, and not what is not reciprocal.
 _PLAIN_LOSS = 0.1
@@ -129,3 +149,69 @@ class EnergyBalance:
     def after_load_jump(self, work: float, gained: float) -> EnergyBalance:
         """The balance after a jump under load control, in which a constant pressure does work."""
         return replace(self, work=self.work + work, load_jump=self.load_jump + work - gained)
+
+
+@dataclass(frozen=True, eq=False)
+class Waypoint:
+    """An equilibrium on a path: what it was asked to reach, and on which leg (0 the first loading, 1 back, …).
+
+    balance: of the energy, on a cyclic path.
+    """
+
+    target: Target
+    state: State
+    leg: int = 0
+    balance: EnergyBalance | None = None
+
+    @property
+    def loading(self) -> bool:
+        """Whether the surfaces are being pressed together."""
+        return self.leg % 2 == 0
+
+
+def between_stops(state: State, leg: int) -> Waypoint:
+    """The waypoint of an equilibrium between the stops."""
+    return Waypoint(Target(BETWEEN, state.separation), state, leg)
+
+
+_LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
+
+
+def hysteresis(
+    steps: Sequence[Mapping[str, float]],
+    pull_off: int,
+    material: Material,
+    largest_tension: float,
+    unattributed: float,
+) -> dict[str, float]:
+    """Pull-off, detachment and losses, by the names of their variables.
+
+    Parameters
+    ----------
+    steps : the path's equilibria in order, each with pressure, separation, area and energies by their names.
+    pull_off : which of them has the largest tension of the last unloading.
+    material : half-space and interface.
+    largest_tension : Pa, of all asperities at once.
+    unattributed : what is in no class of losses, J/m^2.
+    """
+    last, adhesive = steps[-1], material.surface_energy > 0
+    touching = steps[max((k for k, step in enumerate(steps) if step["spot_count"]), default=0)]
+    tension = max(0.0, -steps[pull_off]["nominal_pressure"])
+    # Nothing is stored at either end.
+    loss = last["work"]
+    losses = {f"loss_{name}": last[f"dissipated_{name}"] for name in _LOSSES}
+    strength = 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range
+    return {
+        "pull_off_pressure": tension,
+        "pull_off_separation": steps[pull_off]["mean_separation"],
+        "pull_off_over_strength": tension / strength if adhesive else 0.0,
+        "pull_off_over_summits": tension / largest_tension if adhesive else 0.0,
+        "detachment_pressure": touching["nominal_pressure"],
+        "detachment_separation": touching["mean_separation"],
+        "hysteresis_loss": loss,
+        "hysteresis_loss_over_surface_energy": loss / material.surface_energy if adhesive else 0.0,
+        **losses,
+        "loss_unattributed": unattributed,
+        "largest_contact_area_fraction": max(step["contact_area_fraction"] for step in steps),
+        "largest_reduced_pressure": max(step["reduced_pressure"] for step in steps),
+    }

@@ -1,17 +1,59 @@
 """A path, followed from first contact: down to given separations, loads or areas, all of them hit exactly, and back."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 
 from icha.contact.model import ContactModel
-from icha.path.course import Course
 from icha.path.cycle import cycle
-from icha.path.energy_balance import EnergyBalance, Step
-from icha.path.load_control import under_load
-from icha.path.loading import first_loading
-from icha.path.stops import Stop
-from icha.path.targets import LOAD_CONTROL, REDUCED_PRESSURE, RELATIVE_LOAD, Path
-from icha.path.waypoints import Waypoint
+from icha.path.energy_balance import EnergyBalance, Step, Waypoint, between_stops
+from icha.path.loading import Course, first_loading
+from icha.path.stops import SAME_EXCESS, Stop
+from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, RELATIVE_LOAD, Path, Target
+
+
+def under_load(
+    contact: ContactModel, cycle: Generator[Waypoint, Stop | None, None], pressure_unit: float
+) -> Iterator[Waypoint]:
+    """Those states of a path under separation control that load control visits, with their balances.
+
+    Where the pressure would have to go back, the state jumps at constant pressure to where the curve goes on; with the
+    last contact, to where nothing touches any more. The path is told to meet that pressure again, and goes on from
+    there: the events of a state are then those of the states before it, and its own. pressure_unit: of reduced
+    pressures, Pa.
+    """
+    visited = hidden = again = None
+    balance = EnergyBalance()
+    level = 0.0
+    while True:
+        try:
+            waypoint = cycle.send(again)
+        except StopIteration:
+            break
+        state = waypoint.state
+        pressure = contact.pressure(state)
+        ahead = pressure >= level if waypoint.loading else pressure <= level
+        # Of two stops at one load the second may have a little less.
+        ahead |= waypoint.target.kind != BETWEEN and abs(pressure - level) <= SAME_EXCESS * abs(level)
+        landed = again is not None and waypoint.target is again.target
+        # The turning point itself begins the next leg; without contact there is nothing yet to jump from.
+        if visited is not None and not ahead and not landed:
+            hidden = waypoint
+            again = again or Stop(Target(REDUCED_PRESSURE, level / pressure_unit), contact, pressure_unit)
+            continue
+        if hidden is not None:
+            balance = _after_jump(contact, balance, visited, state, level)
+        elif visited is not None:
+            balance = balance.after(contact, Step.between(contact, visited, state))
+        yield replace(between_stops(state, waypoint.leg) if landed else waypoint, balance=balance)
+        visited, hidden, again, level = state, None, None, pressure
+    if hidden is not None:
+        yield replace(hidden, balance=_after_jump(contact, balance, visited, hidden.state, level))
+
+
+def _after_jump(contact, balance, before, after, pressure):
+    """The balance after a jump at a constant pressure, Pa, from one state to another."""
+    work = -pressure * (after.separation - before.separation)
+    return balance.after_load_jump(work, contact.stored_energy(after) - contact.stored_energy(before))
 
 
 def follow(

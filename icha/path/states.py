@@ -2,7 +2,7 @@
 
 from pydantic import Field, model_validator
 
-from icha.path.limits import STATES
+from icha.path.targets import STATES
 from icha.support.values import Length, Positive, Section, exactly_one, number
 
 ReducedPressure = number(STATES["reduced_pressure"])

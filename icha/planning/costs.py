@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from icha.datasets.results import COMPRESSED_SIZES, LEFT_IN_FILE
-from icha.path.limits import DEFAULT_STEP
+from icha.path.targets import DEFAULT_STEP
 from icha.support.parallel import LARGE_GRID
 
 MiB = 2**20
@@ -83,7 +83,8 @@ LAWS = {
     "boundary_elements, adhesion, cycle": PowerLaw(0.14, 0.023, {"nodes": 0.65, "spots": 0.73}),
     "finite range": PowerLaw(0, 7.9e-8, {"nodes": 1.55, "load": 0.3}),
     "finite range, adhesion": PowerLaw(0, 1.2e-8, {"nodes": 1.56, "load": -0.5}),
-    "finite range, cycle": PowerLaw(0, 1.4e-6, {"nodes": 1.72, "step": -0.1}),
+    "finite range, cycle": PowerLaw(0, 2.8e-7, {"nodes": 1.72, "step": -0.1}),
+    "finite range, adhesion, cycle": PowerLaw(0, 1.4e-6, {"nodes": 1.72, "step": -0.1}),
     "theories": PowerLaw(0.28, 0, {}),
     "dataset": PowerLaw(0.07, 0.015, {"runs": 1}),
     "comparison": PowerLaw(0.07, 0.003, {"runs": 1}),
@@ -93,6 +94,11 @@ LAWS = {
     "map": PowerLaw(0, 9.5e-8, {"nodes": 1}),
     "report": PowerLaw(0.25, 0.01, {"runs": 1}),
 }
+
+
+def _law(solver: str, *, adhesive: bool, cycle: bool = False) -> PowerLaw:
+    """The law of a solver with adhesion or without, of loading alone or of a cycle."""
+    return LAWS[", ".join([solver, *["adhesion"] * adhesive, *["cycle"] * cycle])]
 
 
 class Recorded(NamedTuple):
@@ -194,7 +200,7 @@ def run_cost(
     max_step : longest step of the mean separation, in h_rms.
     """
     most, nodes = spots(summits, load), grid**2
-    law = LAWS[", ".join([model, *["adhesion"] * adhesive, *["cycle"] * bool(legs)])]
+    law = _law(model, adhesive=adhesive, cycle=bool(legs))
     seconds = law.seconds(nodes=nodes, spots=most, stops=stops)
     steps: float = stops
     if legs:
@@ -213,15 +219,14 @@ def run_cost(
 
 def solution_cost(nodes: int, reduced_pressure: float, *, adhesive: bool) -> Cost:
     """Boundary elements at a finite range, of `nodes` a side, at one load."""
-    law = LAWS["finite range, adhesion" if adhesive else "finite range"]
-    seconds = law.seconds(nodes=nodes**2, load=reduced_pressure)
+    seconds = _law("finite range", adhesive=adhesive).seconds(nodes=nodes**2, load=reduced_pressure)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
 def loop_cost(nodes: int, separation_step: float, *, adhesive: bool) -> Cost:
     """Boundary elements at a finite range, of `nodes` a side, in loading and unloading."""
-    # Without adhesion there are no jumps, at which steps are divided.
-    seconds = LAWS["finite range, cycle"].seconds(nodes=nodes**2, step=separation_step) * (1 if adhesive else 0.2)
+    law = _law("finite range", adhesive=adhesive, cycle=True)
+    seconds = law.seconds(nodes=nodes**2, step=separation_step)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 33e3)
 
 

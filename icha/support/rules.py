@@ -1,7 +1,7 @@
 """Rules for values, said once: unit and bounds of whatever arguments and configurations give.
 
 Functions and classes hold an argument against its rule by `checked`; the types of a configuration's values
-(`icha.support.values`) are made of the same rules. Those of a path's states stand in `icha.path.limits`.
+(`icha.support.values`) are made of the same rules. Those of a path's states stand in `icha.path.targets`.
 """
 
 import math

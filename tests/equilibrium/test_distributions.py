@@ -14,7 +14,7 @@ from icha.asperity.jkr import JKR
 from icha.contact.model import GAP_BINS, PRESSURE_BINS, gap_bins
 from icha.equilibrium.distributions import _gap_bin, contact_cover, gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.equilibrium.states import Spots
+from icha.equilibrium.sites import Spots
 from icha.half_space.grid_displacement import row_blocks
 from icha.surfaces.summits import find_summits
 

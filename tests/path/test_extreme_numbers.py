@@ -7,9 +7,9 @@ from few_asperities import HEIGHT, contact_of
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.checks.run import check_run
 from icha.contact.model import NotConverged
-from icha.path import course
-from icha.path.course import Course
+from icha.path import loading
 from icha.path.follow import follow
+from icha.path.loading import Course
 from icha.path.stops import Stop
 
 WAVES = np.add.outer(*[np.cos(np.linspace(0, 2 * np.pi, 16, endpoint=False))] * 2)
@@ -77,7 +77,7 @@ def test_at_the_ends_of_the_ranges_runs_are_finite_and_pass_their_checks(height,
 
 
 def test_a_path_that_does_not_get_on_ends_and_says_so(monkeypatch):
-    monkeypatch.setattr(course, "_MOST_EQUILIBRIA", 10)
+    monkeypatch.setattr(loading, "_MOST_EQUILIBRIA", 10)
     contact = contact_of([HEIGHT])
     state, here = contact.untouched(), Course(contact, 1, longest=1.0)
     for _ in range(11):

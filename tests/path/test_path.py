@@ -10,7 +10,7 @@ from icha.contact.model import NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
-from icha.path.limits import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
+from icha.path.targets import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
 from icha.surfaces.summits import find_summits
 
 PERIOD, MODULUS = 100e-6, 25e6

@@ -42,10 +42,9 @@ import icha
 from icha import Material, Path
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, NotConverged
 from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.path.cycle import Account, Stride, resolved
 from icha.path.follow import follow
-from icha.path.limits import MAX_REDUCED_PRESSURE
-from icha.path.resolution import Account, Stride, resolved
-from icha.path.targets import LOAD_CONTROL
+from icha.path.targets import LOAD_CONTROL, MAX_REDUCED_PRESSURE
 from icha.surfaces.summits import find_summits
 from validation.surfaces import paraboloid
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from icha.support.atomic_files import in_the_way, is_left_over, whole_file, why_not_writable
+from icha.support.atomic_files import in_the_way, is_left_over, take_over, whole_file, why_not_writable
 
 
 def test_what_is_where_a_folder_is_to_be_is_named(tmp_path):
@@ -43,3 +43,14 @@ def test_whatever_a_killed_program_leaves_is_known_by_its_name(tmp_path, monkeyp
     left = [file.name for file in tmp_path.iterdir()]
     assert len(left) == 2 and all(map(is_left_over, left))
     assert not is_left_over("a.txt") and not is_left_over(".snakemake_timestamp")
+
+
+def test_an_owner_writes_other_files_from_wherever_it_is(tmp_path, monkeypatch):
+    """As the program does at its end, in another folder than that of the campaign."""
+    monkeypatch.setenv("ICHA_OWNER", "")
+    monkeypatch.chdir(tmp_path)
+    take_over(".snakemake/tiny.owner")
+    monkeypatch.chdir("/")
+    with whole_file(tmp_path / "kept.json") as temporary:
+        temporary.write_text("{}")
+    assert (tmp_path / "kept.json").read_text() == "{}"

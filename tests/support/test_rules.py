@@ -3,7 +3,7 @@
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from icha.path.limits import STATES
+from icha.path.targets import STATES
 from icha.support import rules, values
 
 OUTSIDE = [

@@ -231,9 +231,9 @@ def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
 @pytest.mark.parametrize(
     ("heights", "key", "words"),
     [
-        (np.empty((0, 0)), "path", "no heights"),
-        (np.empty((0, 12)), "path", "no heights"),
-        (np.empty((12, 0)), "path", "no heights"),
+        (np.empty((0, 0)), "path", "of shape"),
+        (np.empty((0, 12)), "path", "of shape"),
+        (np.empty((12, 0)), "path", "of shape"),
         (np.ones((1, 1)), "path", "leaves 1 x 1 points"),
         (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points; allowed: a topography"),
         (np.arange(12.0)[:, None], "path", "is a line scan"),

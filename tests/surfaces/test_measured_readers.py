@@ -31,7 +31,7 @@ def test_matrix_of_text(tmp_path, separator, first_axis, stored):
     assert_read(scan(tmp_path / "scan.txt", height_unit=NM, size=SIZE, first_axis=first_axis))
 
 
-@pytest.mark.parametrize("text", ["0,1;0,2;0,3", "0,1 0,2 0,3"])
+@pytest.mark.parametrize("text", ["0,1, 0,2, 0,3, 0,4", "0,1 0,2 0,3"])
 def test_decimal_commas_are_not_taken_for_columns(tmp_path, text):
     (tmp_path / "scan.txt").write_text("\n".join([text] * 9))
     with pytest.raises(UnfitTopography, match="decimal"):

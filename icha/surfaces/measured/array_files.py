@@ -28,6 +28,8 @@ _WITHOUT_SIGNATURE = ("hgt", "nms")
 # Formats that are no evidence of an instrument: of any text with numbers, of which other fields are dropped, and
 # of any file of a certain length.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
+# Attributes of packed numbers, and what they are if they are left out.
+_PACKING = {"scale_factor": 1.0, "add_offset": 0.0}
 # Formats of arrays that say nothing about themselves.
 _ARRAYS = ("mat", "npz")
 _UNKNOWN = (
@@ -39,7 +41,7 @@ _ALLOWED = "allowed: a square array of at least 8 x 8 finite heights (.npy, or .
 
 def read_npy(file, how: Preparation) -> Found:
     """An array of NumPy's, without names or units."""
-    return Found(with_y_first(_whole_npy(file.path), how))
+    return Found(with_y_first(_whole_npy(file.path), how), data_known=False)
 
 
 def _whole_npy(path: Path) -> np.ndarray:
@@ -109,7 +111,7 @@ def _side(coordinate, count):
 
 
 def read_hdf5(source, how: Preparation) -> Found:
-    """The dataset `data`, or the only one of two dimensions; its attribute `units` or `unit`, if there is one.
+    """The dataset `data`, or the only one of two dimensions, with its attributes, which mean what they do in netCDF.
 
     MATLAB (from version 7.3) stores columns, so that HDF5 has the transpose of what MATLAB shows.
     """
@@ -133,11 +135,24 @@ def read_hdf5(source, how: Preparation) -> Found:
         name = str(asked) if asked in shapes else chosen_name(asked, plane, (), "dataset")
         chosen = file[name]
         _require_room(chosen)
-        heights = chosen[...].reshape(chosen.shape[-2:])
+        heights = _unpacked(chosen).reshape(chosen.shape[-2:])
         if source.path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
             heights = heights.T
         unit = _unit_of(dict(chosen.attrs))
         return Found(with_y_first(heights, how), unit, data=name if len(plane) > 1 else "")
+
+
+def _unpacked(dataset):
+    """The numbers of a dataset, nan where they are missing, by the attributes with which netCDF packs numbers."""
+    stored, about = dataset[...], dataset.attrs
+    fills = [value for name in ("_FillValue", "missing_value") if name in about for value in np.ravel(about[name])]
+    # Zero is what HDF5 fills with if nobody says otherwise.
+    fills += [dataset.fillvalue] if dataset.fillvalue else []
+    scale, offset = (float(np.ravel(about.get(name, usual))[0]) for name, usual in _PACKING.items())
+    if not fills and (scale, offset) == (1.0, 0.0):
+        return stored
+    missing = np.isin(stored, np.array(fills, dtype=float).astype(stored.dtype))
+    return np.where(missing, np.nan, stored * scale + offset)
 
 
 def format_of_hdf5(path: Path) -> str | None:

@@ -50,8 +50,8 @@ class ScanResolution:
 
     measured : the scan as a square, without filter, edges and changes of its grid. used : the prepared surface.
     cutoff : nesting index of its filter, m; None: it has none. format : as which the file was read. data : the array or
-    channel that was taken, empty if the file has only one. filled : number of points that had no height. points :
-    number of points that were used.
+    channel that was taken, empty if the file has only one. reading : how the file was read, in words. filled : number
+    of points that had no height. points : number of points that were used.
     """
 
     measured: Surface
@@ -59,6 +59,7 @@ class ScanResolution:
     cutoff: float | None
     format: str = ""
     data: str = ""
+    reading: str = ""
     filled: int = 0
     points: int = 1
 
@@ -136,6 +137,7 @@ def scan_resolution(path: str | os.PathLike, preparation: Mapping) -> ScanResolu
         cutoff=preparation.get("cutoff"),
         format=used.format,
         data=used.data,
+        reading=used.reading,
         filled=used.filled,
         points=used.points,
     )

@@ -13,7 +13,7 @@ from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
 from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
-from icha.surfaces.measured.text_tables import SourceFile
+from icha.surfaces.measured.text_tables import SourceFile, reason_against_table
 
 READERS = {
     "npy": read_npy,
@@ -78,11 +78,13 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     if size is None:
         raise UnfitTopography("size", "is missing, and the file does not say it; allowed: a length, such as '90 um'")
     rows, columns = found.heights.shape
-    said = f"{name}, {columns} x {rows} points over {size[0]:.6g} m x {size[1]:.6g} m, heights in {unit:.6g} m"
-    if found.remark:
-        said += f"; {found.remark}"
+    said = f"{name}, {rows} rows x {columns} columns of points"
     if found.data:
         said += f", data {printable(found.data)} of several"
+    sides = [in_words.length(float(side)) for side in size]
+    pixel = [in_words.length(size[0] / columns), in_words.length(size[1] / rows)]
+    said += f"; pixels of {' x '.join(pixel)}, {' x '.join(sides)} in all; heights in {in_words.length(unit)}"
+    said += "".join(f"; {remark}" for remark in (found.remark, _replaced(how, found)) if remark)
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     scan = Scan(found.heights.astype(float) * unit, tuple(size), (said,), coordinate_unit, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
@@ -92,9 +94,19 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     return scan
 
 
+def _replaced(how, found):
+    """Say which size and unit of the file are not used, because others are given; empty if there are none."""
+    replaced = []
+    if how.size and found.size and not np.allclose(how.size, found.size, rtol=1e-3, atol=0):
+        replaced.append(f"its size {' x '.join(map(in_words.length, found.size))}")
+    if how.height_unit and found.unit and not np.isclose(how.height_unit, found.unit, rtol=1e-3, atol=0):
+        replaced.append(f"its unit of heights {in_words.length(found.unit)}")
+    return f"the file has, and you replace, {' and '.join(replaced)}" if replaced else ""
+
+
 def _read(path, how):
     """The format of a file, and what its reader finds, if that are heights."""
-    file, name = SourceFile(path), how.format
+    file, name = SourceFile(path, how.data), how.format
     try:
         with bounded_memory():
             refuse_traps(path)
@@ -108,6 +120,8 @@ def _read(path, how):
         with bounded_memory():
             if name == "text":
                 name = format_of_text(file) or "instrument"
+                if name == "instrument" and file.instrument is None and (reason := reason_against_table(path)):
+                    raise UnfitTopography("path", reason)
             found = READERS[name](file, how)
     except UnfitTopography:
         raise
@@ -119,6 +133,10 @@ def _read(path, how):
             f"cannot be read as {name}{_own_reason(error)}: the file is damaged or of another format; allowed: a file "
             "that is, or another `format`",
         ) from None
+    if how.data is not None and not found.data_known:
+        raise UnfitTopography(
+            "data", f"is given, and a file that is read as {name} has one array without a name; allowed: leave it out"
+        )
     heights = found.heights
     if heights.dtype.kind not in "iuf":
         raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; allowed: heights")

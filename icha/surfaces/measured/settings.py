@@ -70,7 +70,8 @@ class Found:
 
     coordinates: size (x, y) in units of length that the file does not tell. format: name of the instrument's format.
     remark: what was left out of the file, in words.
-    data: name of the array or channel that was taken, empty if the file has only one.
+    data: name of the array or channel that was taken, empty if the file has only one. data_known: whether it was looked
+    for by the name that is asked for.
     """
 
     heights: np.ndarray
@@ -80,6 +81,7 @@ class Found:
     format: str = ""
     remark: str = ""
     data: str = ""
+    data_known: bool = True
 
 
 def with_y_first(heights: np.ndarray, how: Preparation) -> np.ndarray:

@@ -21,22 +21,28 @@ from icha.surfaces.measured.settings import (
     regular_ticks,
     with_y_first,
 )
-from icha.surfaces.measured.text_tables import SourceFile, without_scales
+from icha.surfaces.measured.text_tables import AMBIGUOUS_COMMA, WIDTH, SourceFile, without_scales
 
 # A surface has at least so many columns of heights.
 _FEWEST_COLUMNS = 8
-# How Gwyddion begins the line with the width of an image that it exports, in the languages of its menus. The line with
-# its height follows.
-WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
 _VALUE = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 _LENGTH = re.compile(rf"{_VALUE}\s*(\S+)?$")
 _TWO_LENGTHS = re.compile(rf"{_VALUE}\s*(\S+)?\s*[x×*]\s*{_VALUE}\s*(\S+)?$")
 # A line of a heading: a name, a colon, an equals sign, a delimiter or blanks, and a value.
 _LINE = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
+# Title of a column: its name and, in brackets, its unit.
+_TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE)
+_NAMES_OF_Z = ("z", "h", "height")
 # Names in small letters, without punctuation.
 _SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
 _PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
 _UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
+_ROWS = ("nrows", "rows", "lines", "number of rows", "number of lines")
+_COLUMNS = ("ncols", "cols", "columns", "samples", "number of columns")
+# ESRI's grids have this one if their headings give no other.
+_ESRI_MISSING = "-9999"
+# Numbers that are written with seven digits, or were of single precision, agree to this part.
+_FEW_DIGITS = 1e-6
 _MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
 # The spectrum, its conjugate, their difference, the heights, and what is where.
 _BYTES_OF_NODE = 64
@@ -44,15 +50,37 @@ _BYTES_OF_NODE = 64
 
 def read_matrix(file: SourceFile, how: Preparation) -> Found:
     """Read a row of heights in every line, and what a heading says of units, size and missing heights."""
-    values, lines = file.values, file.layout.heading  # type: ignore[union-attr]
-    if lines and (known := _as_instrument_file(file, how)):
-        return known
+    values, layout = file.values, file.table_layout
+    file.refuse_blocks()
     heights, steps, remark = without_scales(values)
+    _check_counts(layout.heading, (values.shape, heights.shape))
+    if layout.heading and (known := _as_instrument_file(file, how)):
+        return known
     rows, columns = heights.shape
-    heading = read_heading(lines, heights.shape)
+    heading = read_heading(layout.heading, heights.shape, layout.decimal_comma)
+    if heading.ambiguous and how.size is None:
+        raise UnfitTopography(
+            "size",
+            f"is {heading.ambiguous!r} in the file, where the comma may be decimal or separate thousands; allowed: "
+            "give it here",
+        )
     coordinates = heading.coordinates or (steps and (columns * steps[0], rows * steps[1]))
     heights = with_y_first(_without_missing(heights, heading), how)
-    return Found(heights, heading.height_unit, heading.size, coordinates, remark=remark)
+    known = bool(layout.images)
+    return Found(heights, heading.height_unit, heading.size, coordinates, "", remark, layout.data, known)
+
+
+def _check_counts(lines, shapes):
+    """Refuse a table which has other numbers of rows and columns than its heading says."""
+    said = _said(lines)
+    for axis, (names, what) in enumerate(((_ROWS, "rows"), (_COLUMNS, "columns"))):
+        counts = [int(said[name]) for name in names if said.get(name, "").isdecimal()]
+        if counts and counts[0] not in [shape[axis] for shape in shapes]:
+            raise UnfitTopography(
+                "path",
+                f"has {shapes[-1][axis]} {what} of numbers and {counts[0]} by its heading, as if cut off or damaged; "
+                "allowed: a whole table. Export it again, or correct the heading",
+            )
 
 
 def _as_instrument_file(file, how):
@@ -60,6 +88,8 @@ def _as_instrument_file(file, how):
     try:
         found = read_instrument(file, how)
     except Exception:  # whatever it raises at texts of other kinds
+        return None
+    if file.layout.images:
         return None
     if found.unit is None or found.heights.shape != file.values.shape or np.isnan(file.values).any():
         return None
@@ -70,8 +100,10 @@ def _as_instrument_file(file, how):
 
 def read_xyz(file: SourceFile, how: Preparation) -> Found:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
-    points = _columns_of_points(file.values, how)
-    heading = read_heading(file.layout.heading, points.shape)  # type: ignore[union-attr]
+    layout = file.table_layout
+    titles = _titles(layout, how.columns)
+    points = _columns_of_points(file.values, how, titles)
+    heading = read_heading(layout.heading, points.shape, layout.decimal_comma)
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
     (column, nx, dx), (row, ny, dy) = (_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
@@ -83,18 +115,48 @@ def read_xyz(file: SourceFile, how: Preparation) -> Found:
     require_room(2 * 8 * nx * ny)
     heights = np.full(nx * ny, np.nan)
     heights[place] = _without_missing(points[:, 2], heading)
-    sides, lateral = (nx * dx, ny * dy), heading.lateral_unit
-    size = (sides[0] * lateral, sides[1] * lateral) if lateral and how.lateral_unit is None else None
-    return Found(heights.reshape(ny, nx), heading.height_unit, size, coordinates=sides)
+    sides, units = (nx * dx, ny * dy), [titles[axis].unit if axis in titles else None for axis in "xyz"]
+    along_x, along_y = (unit or heading.lateral_unit for unit in units[:2])
+    size = None
+    if along_x and along_y and how.lateral_unit is None:
+        size = sides[0] * along_x, sides[1] * along_y
+    named = titles and sorted(titles, key=lambda axis: titles[axis].column) != ["x", "y", "z"]
+    remark = f"columns {', '.join(f'{axis} {titles[axis].column}' for axis in 'xyz')} by their names" if named else ""
+    known = _said(layout.heading).get("channel") == how.data
+    unit = units[2] or heading.height_unit
+    return Found(heights.reshape(ny, nx), unit, size, sides, remark=remark, data_known=known)
 
 
-def _columns_of_points(values, how):
+@dataclass(frozen=True)
+class _Title:
+    """What the line above a column says: number of the column, from 1, and metres of its unit, None if it has none."""
+
+    column: int
+    unit: float | None
+
+
+def _titles(layout, columns=None):
+    """The titles of the columns x, y and z, by these names; none if a name is not there, or if others are asked for."""
+    if not layout.heading:
+        return {}
+    fields = re.split(r"[,;\t]" if layout.delimiter else r"\s+(?![\[(])", layout.heading[-1].strip(' \t\r\n#%"'))
+    found = [_TITLE.fullmatch(field.strip(" \"'")) for field in fields]
+    names = [match[1].lower() if match else "" for match in found]
+    names = ["z" if name in _NAMES_OF_Z else name for name in names]
+    if len(names) != layout.columns or any(names.count(axis) != 1 for axis in "xyz"):
+        return {}
+    titles = {axis: _Title(names.index(axis) + 1, metres_of(found[names.index(axis)][2] or "")) for axis in "xyz"}
+    meant = columns is None or list(columns) == [titles[axis].column for axis in "xyz"]
+    return titles if meant else {}
+
+
+def _columns_of_points(values, how, titles):
     """The columns x, y and z (k, 3) of a table."""
     count = values.shape[1]
-    columns = how.columns or (1, 2, 3)
+    columns = how.columns or tuple(titles[axis].column for axis in titles) or (1, 2, 3)
     if max(columns) > count:
-        raise UnfitTopography("columns", f"is {list(columns)}, and a line has {count} numbers; allowed: 1 to {count}")
-    if how.columns is None and count != 3:
+        raise UnfitTopography("columns", f"exceeds the {count} numbers of a line; allowed: 1 to {count}")
+    if how.columns is None and not titles and count != 3:
         if not 3 < count < _FEWEST_COLUMNS:
             raise ValueError(f"{count} numbers in a line, not x y z")
         other = ", and no Fourier series, whose opposite waves have conjugate amplitudes" if count == 4 else ""
@@ -119,12 +181,16 @@ def _ticks(values, axis):
 
 def _without_missing(heights, heading):
     """Heights with nan in the place of the numbers that, by the heading, stand for missing ones."""
-    return np.where(np.isin(heights, heading.missing), np.nan, heights) if heading.missing else heights
+    for number in heading.missing:
+        heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)
+    return heights
 
 
 def format_of_text(file: SourceFile) -> str | None:
     """Format of a text file, by its columns; None if it is no table of numbers, or a format of an instrument."""
     layout = file.layout
+    if layout is not None and _titles(layout):
+        return "xyz"
     if layout is None or (layout.words and is_instrument_text(file)):
         return None
     if any(map(WIDTH.match, layout.heading)):
@@ -159,6 +225,7 @@ class Heading:
     size : (x, y) of the scan, m, None if it does not say.
     coordinates : (x, y) of the scan in a unit that the heading does not say, None if it does not say it either.
     missing : numbers that stand for a missing height.
+    ambiguous : a size with a comma that may be decimal or not, empty if there is none.
     """
 
     height_unit: float | None = None
@@ -166,19 +233,34 @@ class Heading:
     size: tuple[float, float] | None = None
     coordinates: tuple[float, float] | None = None
     missing: tuple[float, ...] = ()
+    ambiguous: str = ""
 
 
-def read_heading(lines: Sequence[str], shape: tuple[int, int]) -> Heading:
-    """Read the heading of a table of a shape (rows, columns)."""
-    said: dict[str, str] = {}
+def _said(lines):
+    """Values of the lines of a heading, by their names in small letters."""
+    said = {}
     for line in lines:
         if found := _LINE.match(line):
             said.setdefault(re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(), found[2].strip())
+    return said
+
+
+def read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool = False) -> Heading:
+    """Read the heading of a table of a shape (rows, columns), whose numbers have decimal commas or not."""
+    said = _said(lines)
+    if {"ncols", "nrows", "cellsize"} <= said.keys():
+        said.setdefault(_MISSING[0], _ESRI_MISSING)
     units = [metres_of(said[name]) for name in _UNITS if name in said]
     missing = [_value(found[1]) for name in _MISSING if name in said and (found := _LENGTH.match(said[name]))]
     size, coordinates = _sizes(lines, said, shape)
     lateral = metres_of(said["lateral units"]) if "lateral units" in said else None
-    return Heading(next((unit for unit in units if unit), None), lateral, size, coordinates, tuple(missing))
+    lengths = [said[name] for name in (*_SIZES, *_PIXELS) if name in said]
+    for line, following in itertools.pairwise(lines):
+        if WIDTH.match(line):
+            lengths += [each.partition(":")[2].strip() for each in (line, following)]
+    unclear = [text for text in lengths if not decimal_comma and AMBIGUOUS_COMMA.match(text)]
+    unit = next((unit for unit in units if unit), None)
+    return Heading(unit, lateral, size, coordinates, tuple(missing), unclear[0] if unclear else "")
 
 
 def _sizes(lines, said, shape):
@@ -251,7 +333,7 @@ def read_fourier(file: SourceFile, how: Preparation) -> Found:
         raise ValueError("opposite wave vectors have amplitudes that are not conjugate: the heights would be complex")
     spectrum[alone[np.ix_(opposite, opposite)]] = conjugate[alone[np.ix_(opposite, opposite)]]
     heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
-    return Found(heights, coordinates=(period, period))
+    return Found(heights, coordinates=(period, period), data_known=False)
 
 
 def _require_few(highest):

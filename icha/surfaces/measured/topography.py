@@ -31,6 +31,7 @@ class PreparedTopography:
     """A surface at its own heights, and what was done to the file to get it.
 
     format : as which the file was read. data : the array or channel that was taken, empty if the file has only one.
+    reading : points, pixels and units of the file and what was left out of it, in words.
     filled : number of points that had no height. points : number of points that were used.
     """
 
@@ -40,6 +41,7 @@ class PreparedTopography:
     description: str
     format: str
     data: str
+    reading: str
     filled: int
     points: int
 
@@ -78,6 +80,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         description="; ".join(steps),
         format=scan.format,
         data=scan.data,
+        reading="; ".join([scan.steps[0], *(step for step in steps if "resampled" in step)]),
         filled=missing,
         points=part.heights.size,
     )

@@ -1,6 +1,8 @@
-"""Unions: spots that overlap become one, by the rule of the law (`icha.asperity.law.SpotLaw.union`).
+"""Unions of spots, their undoing as the surfaces part, and new contacts that are taken back since others cover them.
 
-The united spot has the height with which it is in equilibrium as it is made.
+Spots that overlap become one, by the rule of the law (`icha.asperity.law.SpotLaw.union`). The united spot has the
+height with which it is in equilibrium as it is made. The equations are singular where one spot's edge runs through
+another's centre.
 """
 
 from dataclasses import replace
@@ -8,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from icha.asperity.coalescence import disjoint_pairs, equivalent_spots, overlapping_pairs
-from icha.contact.model import COALESCENCE, JUMP_IN
+from icha.contact.model import COALESCENCE, JUMP_IN, SPLIT
 from icha.equilibrium.equations import Point
 from icha.equilibrium.search import Search
 from icha.equilibrium.sites import CONTACT, TRIAL, Union
@@ -114,3 +116,63 @@ def _arrived(search, sites_on_trial):
     asperity = sites.asperity[sites_on_trial]
     holder[asperity] = sites_on_trial
     return replace(search.noting(JUMP_IN, sites.position[sites_on_trial], 1, 0.0, asperity), holder=holder)
+
+
+def undo(search: Search, point: Point) -> Search:
+    """Unions replaced by their two spots, where the united one is smaller than where they just touch."""
+    a, sites = point.a, search.sites
+    touching = np.array([0.0 if union is None else union.touching for union in sites.parts[: len(a)]])
+    apart = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
+    for site in apart.tolist():
+        search = _undone(search, site, a[site])
+    return search
+
+
+def _undone(search, site, a):
+    """With the two spots of a union, shrunk as it has, in the place of the spot of contact radius a, m."""
+    sites, law, union = search.sites, search.problem.law, search.sites.parts[site]
+    shrunk = union.contact_radius * (a / union.united_radius)
+    held = search.holder == site
+    holder = np.where(held, -1, search.holder)
+    for k, asperities in enumerate(union.asperities()):
+        holder[asperities] = len(sites) + k
+    search = search.noting(SPLIT, sites.position[[site]], sites.members[[site]])
+    sites = sites.removed(site).extended(
+        law,
+        position=union.position,
+        height=union.height,
+        radius_of_curvature=union.radius_of_curvature,
+        asperity=union.asperity,
+        members=union.members,
+        parts=union.parts,
+        approach=law.approach(shrunk, union.radius_of_curvature),
+        status=CONTACT,
+        known=True,
+        parted=search.splits,
+    )
+    # Who lay under the spot is looked at anew.
+    return replace(search, sites=sites, holder=holder, seen_at=np.where(held, np.inf, search.seen_at))
+
+
+def swallow(search: Search, point: Point) -> Search:
+    """New contacts in another's contact area taken into that."""
+    sites, a, near, known = search.sites, point.a, point.interaction.pairs, search.sites.known
+    i, j = near.target, near.source
+    inside = np.flatnonzero((near.r < a[j]) & (a[i] > 0) & ~known[i])
+    inside = inside[known[j[inside]] | (a[i[inside]] < a[j[inside]])]
+    if not len(inside):
+        return search
+    inside = inside[np.argsort((a[j] - near.r)[inside], kind="stable")]
+    i, j = i[inside], j[inside]
+    holder = search.holder.copy()
+    holder[sites.asperity[i]] = i
+    index = np.append(np.arange(len(sites)), -1)
+    index[i] = j  # the deepest comes last and stays
+    while np.any(index[index] != index):  # who takes one in may be taken in itself, by a larger one
+        index = index[index]
+    search = search.forgetting_jumps_in(sites.asperity[np.unique(i)])
+    return replace(
+        search,
+        sites=replace(sites.removed(i), approach=point.approach),
+        holder=index[holder],  # -1 looks up the last
+    )
