@@ -163,7 +163,7 @@ class Observables(Protocol[S_in]):
     def of_snapshot(self, state: S_in) -> dict[str, Any]:
         """Distributions of gap and pressure, and the spots."""
 
-    def reasons_against(self, separations: Iterable[float], pressed: S | None) -> list[str]:
+    def reasons_against(self, separations: Iterable[float], pressed: S_in | None) -> list[str]:
         """Reasons why the model does not stand for the surface in its first loading.
 
         Parameters
