@@ -36,6 +36,7 @@ from icha.contact.model import (
     gap_bins,
     summit_counts,
 )
+from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
 from icha.surfaces.summits import Asperities, locate_summits
 from icha.surfaces.surface import Surface
 
@@ -315,9 +316,13 @@ class PatchObservables:
             **self._patches(state, cells),
         }
 
-    def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """No reasons: the cells are the surface itself."""
-        return []
+    def reasons_against(self, separations: Iterable[float], pressed: CellState | None) -> list[str]:
+        """The reason why cells do not stand for the surface: too few of them for its shortest waves."""
+        asperities, grid = self.contact.asperities, self.surface.grid
+        cells = cells_per_short_wave(grid, len(asperities) + len(asperities.unsupported_height))
+        if cells >= LEAST_CELLS_PER_WAVE:
+            return []
+        return [f"about {cells:.2g} grid cells for the shortest waves (at least {LEAST_CELLS_PER_WAVE:g} expected)"]
 
     @property
     def largest_tension(self) -> float:

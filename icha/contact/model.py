@@ -168,8 +168,14 @@ class Observables(Protocol[S_in]):
     def of_snapshot(self, state: S_in) -> dict[str, Any]:
         """Distributions of gap and pressure, and the spots."""
 
-    def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """Reasons why the model does not stand for the surface at these mean separations (m) of the first loading."""
+    def reasons_against(self, separations: Iterable[float], pressed: S_in | None) -> list[str]:
+        """Reasons why the model does not stand for the surface in its first loading.
+
+        Parameters
+        ----------
+        separations : mean separations that were reached, m.
+        pressed : the state with the largest contact area; None if there is none.
+        """
 
     @property
     def largest_tension(self) -> float:
