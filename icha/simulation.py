@@ -22,6 +22,7 @@ from icha.contact.model import (
     ContactModel,
     Events,
     NotConverged,
+    State,
     gap_bins,
     summit_counts,
 )
@@ -131,25 +132,20 @@ def simulate(
         observables = contact.observables(surface)
         if kept is not None:
             contact = solver.resumable(contact, kept)
-        met = _followed(contact, observables, path, material.contact_modulus * surface.rms_slope, progress)
+        met = _followed(contact, observables, path, progress)
         loading = [step["mean_separation"] for step in met.steps if step["leg"] == 0]
-        reasons = observables.reasons_against(loading)
+        reasons = observables.reasons_against(loading, met.pressed)
         dataset = _dataset(surface, material, path, model, seed, met, observables.of_contact(), reasons)
     if met.failure:
         raise ConvergenceError(met.failure, dataset) from None
     if path.unload:
         pull_off = met.snapshots[-1]["snapshot_step"]
         loop = hysteresis(met.steps, pull_off, material, observables.largest_tension, met.unattributed)
-        dataset = dataset.assign(described(LOOP, loop | {"uphill_jump_in_count": _count_uphill_jumps_in(met.events)}))
+        dataset = dataset.assign(described(LOOP, loop | {"uphill_jump_in_count": _count_uphill_jumps_in(met)}))
     if failed := reasons_of_failure(check_run(dataset)):
         dataset = dataset.assign_attrs(failed_checks=failed)
         warnings.warn(f"The run fails checks, do not use its numbers: {failed}", stacklevel=2)
     return dataset
-
-
-def _count_uphill_jumps_in(steps: list[Events]) -> int:
-    """Number of jumps into contact that take energy by the law of the spot itself."""
-    return sum(int(np.count_nonzero((events.kind == JUMP_IN) & (events.energy < 0))) for events in steps)
 
 
 def unfollowed(
@@ -160,7 +156,8 @@ def unfollowed(
     Arguments are those of `simulate`.
     """
     met, summits = _Met([], [], [], reason), locate_summits(surface)
-    reasons = SummitCoverage.of(surface, summits).reasons_against([surface.rms_height])
+    coverage = SummitCoverage.of(surface, summits)
+    reasons = coverage.reasons_against([surface.rms_height]) if MODELS[model].by_summits else []
     return _dataset(surface, material, path, model, seed, met, summit_counts(summits), reasons)
 
 
@@ -183,7 +180,7 @@ def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
 def _applicability(name, values, met, reasons):
     """Why the model is not applicable to the run; an empty text where it is."""
     if not MODELS[name].by_summits:
-        return ""
+        return f"{MODELS[name].words} not applicable: {'; '.join(reasons)}" if reasons else ""
     largest = max((step["contact_area_fraction"] for step in met.steps), default=0.0)
     return asperity_applicability(values["full_contact_energy_ratio"], reasons, largest)
 
@@ -249,7 +246,7 @@ def _check_arguments(surface, material, path):
 class _Met(NamedTuple):
     """What a path has met: a row of values for every step and snapshot, the events of every step, why it ends early.
 
-    unattributed: loss that is in no class, J/m^2.
+    unattributed: loss that is in no class, J/m^2. pressed: state of the first loading with the largest contact area.
     """
 
     steps: list[dict]
@@ -257,22 +254,35 @@ class _Met(NamedTuple):
     events: list[Events]
     failure: str
     unattributed: float = 0.0
+    pressed: State | None = None
 
 
-def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
+def _count_uphill_jumps_in(met: _Met) -> int:
+    """Number of jumps into contact that take energy, by the law of the spot or, with all spots, by the balance."""
+    gained = np.diff([step["dissipated_by_jump_in"] for step in met.steps], prepend=0.0) < 0
+    return sum(
+        int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))
+        for events, uphill in zip(met.events, gained, strict=True)
+    )
+
+
+def _followed(contact, observables, path, progress) -> _Met:
     steps, snapshots, events, failure = [], [], [], ""
-    before = pulled = balance = None
+    before = pulled = balance = pressed = None
+    largest = 0.0
 
     def keep_snapshot(target, state, step):
         asked = {"snapshot_step": step, "snapshot_kind": target.kind, "snapshot_target": target.value}
         snapshots.append(_finite(asked | observables.of_snapshot(state)))
 
     try:
-        for waypoint in follow(contact, path, pressure_unit, progress):
+        for waypoint in follow(contact, path, progress):
             state, balance = waypoint.state, waypoint.balance
-            steps.append(_finite(_step(contact, waypoint, pressure_unit) | observables.of_step(state)))
+            steps.append(_finite(_step(contact, waypoint) | observables.of_step(state)))
             events.append(Events.joined(()) if before is None else contact.events_between(before, state))
             before = state
+            if waypoint.leg == 0 and steps[-1]["contact_area_fraction"] >= largest:
+                pressed, largest = state, steps[-1]["contact_area_fraction"]
             if waypoint.target.snapshot:
                 keep_snapshot(waypoint.target, state, len(steps) - 1)
             # The largest tension of the last leg.
@@ -283,7 +293,7 @@ def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
             keep_snapshot(Target(PULL_OFF, 0.0), *pulled[1:])
     except NotConverged as error:
         failure = f"the path ends {error}"
-    return _Met(steps, snapshots, events, failure, balance.unattributed if balance else 0.0)
+    return _Met(steps, snapshots, events, failure, balance.unattributed if balance else 0.0, pressed)
 
 
 def _finite(values: dict) -> dict:
@@ -295,7 +305,7 @@ def _finite(values: dict) -> dict:
     return values
 
 
-def _step(contact: ContactModel, waypoint: Waypoint, pressure_unit: float) -> dict:
+def _step(contact: ContactModel, waypoint: Waypoint) -> dict:
     """What every contact model has of an equilibrium on a path, by the names of the variables."""
     state, target, balance = waypoint.state, waypoint.target, waypoint.balance
     pressure = contact.pressure(state)
@@ -309,7 +319,7 @@ def _step(contact: ContactModel, waypoint: Waypoint, pressure_unit: float) -> di
         "contact_stiffness": contact.stiffness(state),
         "converged": 1,
         "leg": waypoint.leg,
-        "reduced_pressure": pressure / pressure_unit,
+        "reduced_pressure": pressure / contact.pressure_unit,
         "reduced_separation": state.separation / contact.rms_height,
         "step_kind": target.kind,
         "step_target": target.value,

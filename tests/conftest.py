@@ -34,7 +34,7 @@ settings.load_profile("fast")
 
 # Files with the longest tests of all, the longest first: begun last, they would keep one core waiting. With "worksteal"
 # one worker begins with them, and so with the campaign, while another has those after the middle.
-LONG = ("every_case_ends", "slurm", "reruns", "faults", "workflow", "finite_range", "deposit", "energy_balance")
+LONG = ("every_case_ends", "slurm", "reruns", "faults", "workflow", "finite_range", "make", "energy_balance")
 
 
 def _numbers(text):

@@ -56,11 +56,12 @@ def _command(name, command):
 
 def run_variables() -> str:
     """The variables of a run's file: of every run, of one that turns back, of one that ends in separation."""
-    from icha.datasets.variables.run import CYCLE, LOOP, PATCHES, RUN
+    from icha.contact.models import MODELS
+    from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 
     sections = {
         "Of every run": RUN,
-        "Of a run by boundary elements": PATCHES,
+        **{f"Of a run by {MODELS[name].words}": variables for name, variables in FURTHER.items() if variables},
         "Of a run that turns back": CYCLE,
         "Of a run that ends in separation": LOOP,
     }

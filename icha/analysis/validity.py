@@ -17,7 +17,8 @@ from icha.asperity.material import WU_HOLDS_FROM
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS
-from icha.surfaces.moments import cells_per_short_wave
+from icha.support.in_words import counted
+from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,6 +171,7 @@ def statements(
     if sticky:
         text = f"attraction outweighs repulsion: {named(sticky)}; errors can be many times those of the validation"
         found.append(Statement("sticky", text, False))
+    found += _resolution(cases)
     of_asperities = [case for case in cases if MODELS[case.model].by_summits]
     if of_asperities:
         found += [_surfaces(of_asperities), _accuracy(of_asperities)]
@@ -182,12 +184,28 @@ def _full_contact(cases):
     if not adhesive:
         return
     lowest = min(adhesive, key=lambda case: case.ratio)
-    text = f"U_full/dgamma is {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}); {MEANING}"
+    text = f"U_full/dgamma is about {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}); {MEANING}"
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
     if any(MODELS[case.model].by_cells and case.ratio < HIGH_PULL_OFF_BELOW for case in cases):
         text += f"; boundary elements may take up to {MOST_OVER_EXPECTED} times as long as expected"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
+
+
+def _resolution(cases):
+    """The statement on boundary elements with few grid cells for the shortest waves."""
+    few = {
+        case.surface: case.facts.get("nodes_per_short_wave", math.inf)
+        for case in cases
+        if MODELS[case.model].by_cells and error_of_cells(case.facts.get("nodes_per_short_wave", math.inf))
+    }
+    if few:
+        places = named(f"{cells:.2g} on {surface}" for surface, cells in few.items())
+        text = (
+            f"boundary elements have few grid cells for the shortest waves ({places}), with which areas are off by "
+            f"{error_of_cells(min(few.values()))}; {RESOLVED_CELLS} recommended"
+        )
+        yield Statement("resolution", text, False)
 
 
 def _surfaces(cases):
@@ -248,7 +266,20 @@ def of_dataset(campaign: xr.DataTree) -> list[Statement]:
                 found = study["stickiness"].sel(surface=surface, material=material)
                 sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
     outside = _shares_in_words(shares) if shares else None
-    return statements(models, cases, outside, in_words_if_sticky(sticky))
+    return [*statements(models, cases, outside, in_words_if_sticky(sticky)), *_not_applicable(campaign)]
+
+
+def _not_applicable(campaign):
+    """The statement on the runs to which their model is not applicable."""
+    reasons: dict[str, int] = {}
+    for node in campaign.children.values():
+        if "applicability" in node:  # which campaigns of earlier versions lack
+            for reason in filter(None, node["applicability"].values.ravel().astype(str)):
+                reasons[reason] = reasons.get(reason, 0) + 1
+    if reasons:
+        count = sum(reasons.values())
+        text = f"{counted(count, 'run')} to which the model is not applicable: {named(reasons, '. ')}"
+        yield Statement("applicability", text, False)
 
 
 def _cases(study):

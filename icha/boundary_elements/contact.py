@@ -36,6 +36,7 @@ from icha.contact.model import (
     gap_bins,
     summit_counts,
 )
+from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
 from icha.surfaces.summits import Asperities, locate_summits
 from icha.surfaces.surface import Surface
 
@@ -57,6 +58,7 @@ class BoundaryElements:
     spacing: float
     law: JKR
     rms_height: float
+    rms_slope: float
     asperities: Asperities
     space: HalfSpace
     topography: Topography
@@ -74,6 +76,11 @@ class BoundaryElements:
     def contact_modulus(self) -> float:
         """E*, Pa."""
         return self.law.material.contact_modulus
+
+    @property
+    def pressure_unit(self) -> float:
+        """E* h'_rms, Pa."""
+        return self.contact_modulus * self.rms_slope
 
     @property
     def area(self) -> float:
@@ -309,9 +316,13 @@ class PatchObservables:
             **self._patches(state, cells),
         }
 
-    def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """No reasons: the cells are the surface itself."""
-        return []
+    def reasons_against(self, separations: Iterable[float], pressed: CellState | None) -> list[str]:
+        """The reason why cells do not stand for the surface: too few of them for its shortest waves."""
+        asperities, grid = self.contact.asperities, self.surface.grid
+        cells = cells_per_short_wave(grid, len(asperities) + len(asperities.unsupported_height))
+        if cells >= LEAST_CELLS_PER_WAVE:
+            return []
+        return [f"about {cells:.2g} grid cells for the shortest waves (at least {LEAST_CELLS_PER_WAVE:g} expected)"]
 
     @property
     def largest_tension(self) -> float:
@@ -329,7 +340,7 @@ class PatchObservables:
 
     def _pressure_density(self, state, cells):
         """Density of the pressure over the nominal area, and its mean in every bin; the pressure is the patches'."""
-        edges_of_bins = PRESSURE_BINS * (self.contact.contact_modulus * self.surface.rms_slope)
+        edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
         # The force of a cell acts on the part of it that touches; what that is beside its area is the same everywhere.
         weight = state.fraction * (np.sum(cells) / (np.sum(state.fraction) or 1.0))
         pressure = state.pressure / weight
@@ -394,7 +405,9 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         )
     space = HalfSpace.of(surface.grid)
     topography = Topography.of(surface.heights / h)
-    return BoundaryElements(surface.heights, h, law, surface.rms_height, asperities, space, topography, front, summits)
+    return BoundaryElements(
+        surface.heights, h, law, surface.rms_height, surface.rms_slope, asperities, space, topography, front, summits
+    )
 
 
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> Kept:

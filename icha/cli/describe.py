@@ -67,11 +67,13 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
     from icha.contact.models import MODELS
     from icha.surfaces.measured.resolution import scan_resolution
 
-    by_patches = {case.surface for case in run_cases(campaign) if MODELS[case.model].least_cells}
+    models: dict[str, list] = {}
+    for case in run_cases(campaign):
+        models.setdefault(case.surface, []).append(MODELS[case.model])
     scans = {name: scan_resolution(section.path, section.preparation) for name, section in measured.items()}
     say("")
     for name, scan in scans.items():
-        for line in about_scan(name, scan, by_patches=name in by_patches):
+        for line in about_scan(name, scan, models=models[name]):
             say(line)
     if plot is not None:
         from icha.cli.quick_plot import draw_scans

@@ -3,11 +3,12 @@
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from icha.cli.project import Mistake
+from icha.contact.models import Model
 from icha.support import in_words
 from icha.support.in_words import printable
 from icha.support.input_files import flaw_of_path
@@ -30,13 +31,14 @@ def check_picture(path: Path | None) -> None:
         raise Mistake(f"--plot {path}: ends in {path.suffix!r}; allowed: {', '.join(PICTURES)}")
 
 
-def about_scan(name: str, scan, *, to_scale: bool = True, by_patches: bool = False) -> Iterator[str]:
+def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
     """Lines about the `icha.surfaces.measured.resolution.ScanResolution` of a surface of some name.
 
-    to_scale : whether the units of its heights and of its size are known. by_patches : whether boundary elements press
-    it.
+    to_scale : whether the units of its heights and of its size are known.
+    models : those that press it; none if that is not known yet.
     """
     from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS, slope_left
+    from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, error_of_cells
 
     used = scan.used
     points = in_words.counted(scan.filled, "point")
@@ -68,15 +70,19 @@ def about_scan(name: str, scan, *, to_scale: bool = True, by_patches: bool = Fal
             f"{name}: asperities leave out {unsupported} of them, which the nodes around do not support, as at steps, "
             "spikes, pits and plateaus"
         )
-    if reasons := scan.reasons_against_asperities:
+    models = list(models)
+    reasons = scan.reasons_against_asperities
+    if reasons and (not models or any(model.by_summits for model in models)):
+        others = ", or `models: [boundary_elements]`" if scan.cells_per_short_wave >= LEAST_CELLS_PER_WAVE else ""
         yield (
             f"{name}: warning: asperity model not applicable ({'; '.join(reasons)}); use a `cutoff` that smooths the "
-            "surface, or `models: [boundary_elements]`"
+            f"surface{others}"
         )
-    if by_patches and scan.cells_per_short_wave < RESOLVED_CELLS:
+    error = error_of_cells(scan.cells_per_short_wave)
+    if error and any(model.by_cells for model in models):
         yield (
             f"{name}: boundary elements have about {scan.cells_per_short_wave:.2g} nodes for its shortest waves, with "
-            f"which areas are off by a few per cent; recommended: {RESOLVED_CELLS}, by a longer `cutoff` or a finer "
+            f"which areas are off by {error}; recommended: {RESOLVED_CELLS}, by a longer `cutoff` or a finer "
             "`grid`"
         )
     if not to_scale:

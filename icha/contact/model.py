@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
-from icha.surfaces.summits import Asperities
-from icha.surfaces.surface import Surface
+if TYPE_CHECKING:
+    from icha.surfaces.summits import Asperities
+    from icha.surfaces.surface import Surface
 
 # Quantities that a solve can hold.
 PRESSURE, AREA_FRACTION = "pressure", "area_fraction"
@@ -89,6 +90,10 @@ class ContactModel(Protocol[S]):
         """E*, the unit of relative loads, Pa."""
 
     @property
+    def pressure_unit(self) -> float:
+        """E* h'_rms, the unit of reduced pressures, Pa."""
+
+    @property
     def rms_height(self) -> float:
         """Rms height h_rms of the surface, the unit of separations, m."""
 
@@ -163,8 +168,14 @@ class Observables(Protocol[S_in]):
     def of_snapshot(self, state: S_in) -> dict[str, Any]:
         """Distributions of gap and pressure, and the spots."""
 
-    def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """Reasons why the model does not stand for the surface at these mean separations (m) of the first loading."""
+    def reasons_against(self, separations: Iterable[float], pressed: S_in | None) -> list[str]:
+        """Reasons why the model does not stand for the surface in its first loading.
+
+        Parameters
+        ----------
+        separations : mean separations that were reached, m.
+        pressed : the state with the largest contact area; None if there is none.
+        """
 
     @property
     def largest_tension(self) -> float:

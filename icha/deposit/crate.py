@@ -32,7 +32,6 @@ LOCK = f"{_PROGRAM}uv.lock"
 PROGRAM_LICENCE = f"{_PROGRAM}LICENSE"
 
 _WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
-_BIOSCHEMAS = "https://bioschemas.org/profiles"
 # Of the run crates' own terms, the one that is used here (https://w3id.org/ro/terms/workflow-run/context).
 _TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
 _COMPLETED = "http://schema.org/CompletedActionStatus"
@@ -90,12 +89,15 @@ def write_crate(
     crate = ROCrate()
     crate.metadata.extra_terms.update(_TERMS)
     crate.metadata["conformsTo"] = [{"@id": crate.metadata.PROFILE}, {"@id": _WORKFLOW_PROFILE}]
+    for key, properties in TABLES["entities"].items():
+        crate.add(ContextEntity(crate, key, properties))
     _describe(crate, publication, campaign)
     shown = {path for path in checksums if not path.startswith(_PROGRAM)}
     shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in jobs)} & set(checksums)
     files = {path: _add_file(crate, path, Path(folder, path), checksums[path]) for path in sorted(shown)}
     _add_source(crate, files, revision)
-    engine = _engine(crate)
+    engine, number = crate.dereference("#snakemake"), version("snakemake")
+    _set(engine, name=f"Snakemake {number}", version=number)
     workflow = _describe_workflow(crate, files, engine, revision, _steps(jobs))
     _add_jobs(crate, jobs, files, workflow, engine, f"Campaign {campaign}", publication.title)
     _set(crate.root_dataset, mainEntity=workflow)
@@ -189,33 +191,11 @@ def _add_source(crate: ROCrate, files: Mapping[str, File], revision: str) -> Non
     )
 
 
-def _engine(crate: ROCrate) -> Entity:
-    """Snakemake, in the version that is installed."""
-    number = version("snakemake")
-    return _add(
-        crate,
-        "#snakemake",
-        ["SoftwareApplication", "ComputerLanguage"],
-        name=f"Snakemake {number}",
-        url="https://snakemake.github.io",
-        identifier="https://w3id.org/workflowhub/workflow-ro-crate#snakemake",
-        version=number,
-    )
-
-
 def _describe_workflow(
     crate: ROCrate, files: Mapping[str, File], engine: Entity, revision: str, steps: Sequence[Job]
 ) -> Entity:
     """What the workflow's file is besides a file: a program, with tools and steps."""
-    configuration = _add(
-        crate,
-        "#configuration",
-        "FormalParameter",
-        name="configuration",
-        additionalType="File",
-        conformsTo=_add(crate, f"{_BIOSCHEMAS}/FormalParameter/1.0-RELEASE", "CreativeWork"),
-        valueRequired=True,
-    )
+    configuration = crate.dereference("#configuration")
     _set(files[CONFIGURATION], exampleOfWork=configuration)
     tools = {job.script: files[job.script] for job in steps}
     for job in steps:
@@ -225,7 +205,7 @@ def _describe_workflow(
             name=job.rule,
             description=job.description,
             version=revision,
-            programmingLanguage=_add(crate, "#python", "ComputerLanguage", name="Python", url="https://www.python.org"),
+            programmingLanguage=crate.dereference("#python"),
         )
     workflow = files[WORKFLOW]
     _set(
@@ -233,7 +213,7 @@ def _describe_workflow(
         ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"],
         name="ICHA: adhesive rough contact by interacting and coalescing asperities",
         version=revision,
-        conformsTo=_add(crate, f"{_BIOSCHEMAS}/ComputationalWorkflow/1.0-RELEASE", "CreativeWork"),
+        conformsTo={"@id": "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"},
         license=files.get(PROGRAM_LICENCE),
         programmingLanguage=engine,
         hasPart=list(tools.values()),

@@ -15,7 +15,7 @@ from icha.equilibrium.equations import derivative, held_value, stored_energy
 from icha.equilibrium.equilibrium import equilibrium
 from icha.equilibrium.sites import ContactState, Problem, untouched
 from icha.half_space.free_square import mean_displacement
-from icha.surfaces.summits import SummitCoverage, find_summits
+from icha.surfaces.summits import LARGEST_DEPARTURE, SummitCoverage, find_summits, paraboloid_departure
 from icha.surfaces.surface import Surface
 
 # How much of the surface contact may cover: targets are met up to a quarter of it, looked for somewhat beyond.
@@ -142,9 +142,27 @@ class AsperityObservables:
             "spot_members": spots.members,
         }
 
-    def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """Reasons why asperities do not stand for the surface at these mean separations, m."""
-        return SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
+    def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
+        """Reasons why asperities do not stand for the surface in its first loading."""
+        reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
+        if pressed is not None and (departure := self._departure(pressed)) > LARGEST_DEPARTURE:
+            reasons.append(
+                "the tops are not parabolic over the contact spots: their depth at the edges differs by a factor of "
+                f"{np.exp(departure):.2g} on average, expected at most {np.exp(LARGEST_DEPARTURE):.2g}"
+            )
+        return reasons
+
+    def _departure(self, state: ContactState) -> float:
+        """Departure of the surface from the paraboloids of spots of one summit, weighted by their area."""
+        spots = state.spots
+        single = spots.members == 1
+        radius = spots.contact_radius[single]
+        if not np.any(radius > 0):
+            return 0.0
+        departure = paraboloid_departure(
+            self.surface, spots.position[single], radius, spots.radius_of_curvature[single]
+        )
+        return float(np.average(departure, weights=radius**2))
 
     @property
     def largest_tension(self) -> float:
@@ -155,4 +173,4 @@ class AsperityObservables:
 
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
     """The contact of a surface and a material; raises `ValueError` if the surface has no summits."""
-    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)

@@ -290,6 +290,50 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
     return concave, determinant, step
 
 
+# Largest departure from paraboloids, weighted by the area of the spots, up to which asperities stand for a surface.
+# Random surfaces of 4 to 12 nodes per shortest wave stay below 0.25 at p* = 1e-3 to 0.1, with areas within 25 % of
+# those of boundary elements; worn, conical and pyramidal tops, with areas up to 3 times too small, have 0.3 to 0.7.
+LARGEST_DEPARTURE = 0.3
+# Directions in which the surface around a summit is compared with its paraboloid.
+_DIRECTIONS = 16
+# Radius, in cells, below which a spot lies where the interpolated surface is the paraboloid itself.
+_SMALLEST_SPOT = 0.25
+# Smallest height of a summit above its surroundings, over that of its paraboloid, that is told from none.
+_LEAST_DROP = 1e-2
+
+
+def paraboloid_departure(
+    surface: Surface, position: np.ndarray, contact_radius: np.ndarray, radius_of_curvature: np.ndarray
+) -> np.ndarray:
+    """Return how far the surface departs from the paraboloids of its summits at the edges of their contact spots.
+
+    Parameters
+    ----------
+    surface : the surface, interpolated between its nodes by a cubic spline.
+    position : (k, 2) float, centres of the spots (x, y), m.
+    contact_radius : (k,) float, radius a of each spot, m.
+    radius_of_curvature : (k,) float, radius of curvature R of each summit, m.
+
+    Returns
+    -------
+    (k,) float, abs(ln(d / (a^2 / 2R))) with d the mean depth below the summit of the circle of radius a around it.
+    """
+    mode = "mirror" if surface.free else "grid-wrap"
+    spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)
+    x, y = (position / surface.spacing).T
+    radius = contact_radius / surface.spacing
+
+    def height(x, y):
+        return scipy.ndimage.map_coordinates(spline, [y, x], order=3, mode=mode, prefilter=False)
+
+    angles = 2 * np.pi / _DIRECTIONS * np.arange(_DIRECTIONS)
+    around = [height(x + radius * np.cos(angle), y + radius * np.sin(angle)) for angle in angles]
+    depth = height(x, y) - np.mean(around, axis=0)
+    large = radius >= _SMALLEST_SPOT
+    expected = np.where(large, contact_radius**2 / (2 * radius_of_curvature), 1.0)
+    return np.where(large, np.abs(np.log(np.maximum(depth / expected, _LEAST_DROP))), 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class SummitCoverage:
     """The highest places of a surface, and whether summits stand for them.

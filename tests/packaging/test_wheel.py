@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import tarfile
-import tomllib
 import zipfile
 from pathlib import Path
 
@@ -249,34 +248,22 @@ def test_its_deposit_holds_what_was_installed_and_computes_the_same_again(built,
     assert "identical: 2 files, every value" in said and json.loads((tmp_path / "found.json").read_text())
 
 
-def test_a_changed_program_and_other_versions_are_not_published(work, workflow):
+def test_a_changed_program_is_not_published(work, workflow):
     (installed,) = workflow.parent.glob("lib/python*/site-packages")
     deposit = work / "results/tiny/publish/tiny-1.0.0.zip"
     deposit.unlink()
-    rule, noted = installed / "icha_workflow/workflow/rules/runs.smk", work / "results/tiny/made_with.txt"
-    kept, versions = rule.read_bytes(), noted.read_text()
+    rule = installed / "icha_workflow/workflow/rules/runs.smk"
+    kept = rule.read_bytes()
     rule.write_bytes(kept + b"# changed\n")
-    noted.write_text(versions + "scipy==0.1\n")
-    try:
-        said = call(workflow / "icha", "run", "tiny", "publish", cwd=work, status=1)
-    finally:
-        rule.write_bytes(kept)
-        noted.write_text(versions)
-    assert "changed: icha_workflow/workflow/rules/runs.smk" in said and "scipy 0.1" in said
-    assert not deposit.exists()
-
-
-RENDER = """
-import sys
-from rattler_build import Stage0Recipe, VariantConfig
-
-for each in Stage0Recipe.from_file(sys.argv[1]).render(VariantConfig()):
-    print(each.recipe.package.name, each.recipe.package.version)
-"""
+    said = call(workflow / "icha", "run", "tiny", "publish", cwd=work, status=1)
+    rule.write_bytes(kept)
+    assert "changed: icha_workflow/workflow/rules/runs.smk" in said and not deposit.exists()
 
 
 def test_the_recipe_for_conda_is_one(tmp_path):
-    program = [UV, "run", "--quiet", "--no-project", "--with", "py-rattler-build==0.73.0", "python", "-c", RENDER]
-    said = call(*program, REPOSITORY / "recipe/recipe.yaml", cwd=tmp_path)
-    version = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["version"]
-    assert said.split() == ["icha", version, "icha-workflow", version]
+    render = "import sys; from rattler_build import Stage0Recipe, VariantConfig; "
+    render += (
+        "print(*(each.recipe.package.name for each in Stage0Recipe.from_file(sys.argv[1]).render(VariantConfig())))"
+    )
+    program = [UV, "run", "--quiet", "--no-project", "--with", "py-rattler-build==0.73.0", "python", "-c", render]
+    assert call(*program, REPOSITORY / "recipe/recipe.yaml", cwd=tmp_path).split() == ["icha", "icha-workflow"]

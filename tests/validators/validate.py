@@ -210,26 +210,14 @@ def _conventions_of(path: Path) -> list[Conformance]:
     return answers
 
 
+@functools.cache
 def remember_answers() -> None:
     """Have compliance-checker remember its answers about a file, which does not change meanwhile."""
     from compliance_checker.cf import util
 
-    def remembered(ask):
-        answers = {}
-
-        @functools.wraps(ask)
-        def answer(data):
-            # The file is kept, too, so that no other one can have its id.
-            if id(data) not in answers:
-                answers[id(data)] = data, ask(data)
-            return copy.copy(answers[id(data)][1])
-
-        return answer
-
     for name in ASKED:
-        ask = getattr(util, f"get_{name}")
-        if not hasattr(ask, "__wrapped__"):
-            setattr(util, f"get_{name}", remembered(ask))
+        remembered = functools.cache(getattr(util, f"get_{name}"))
+        setattr(util, f"get_{name}", lambda data, remembered=remembered: copy.copy(remembered(data)))
 
 
 def flat_files(path: Path, folder: Path) -> Iterator[tuple[str, Path]]:

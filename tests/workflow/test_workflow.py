@@ -101,7 +101,7 @@ def test_no_paths_users_hosts_or_times_in_results(smoke):
     assert traces(files, [f"{each}/".encode() for each in (smoke, REPOSITORY, Path.home())], (now - 86400, now)) == []
 
 
-def test_a_second_call_does_nothing(smoke):
+def test_a_second_call_does_nothing(smoke, tmp_path):
     def times():
         # Where a job has several outputs Snakemake touches them at its end, and their records get the new time.
         files = (smoke / "results").rglob("*")
@@ -109,6 +109,7 @@ def test_a_second_call_does_nothing(smoke):
 
     before = times()
     again = snakemake(smoke, "all", "references", "publish", "--snakefile", "workflow/Snakefile")
+    assert "report_page" in snakemake(smoke, "-n", "-d", str(tmp_path), "--snakefile", "workflow/Snakefile").stdout
     assert again.returncode == 0 and "Nothing to be done" in again.stdout
     assert times() == before
 

@@ -1,0 +1,46 @@
+"""Tables of the pages on the model's error and on hysteresis, from datasets whose numbers are known."""
+
+import compared_campaign as compared
+import numpy as np
+import pytest
+import separate_asperities as separate
+
+from icha.analysis.model_error import model_error
+from validation import hysteresis
+from validation.model_error import errors_by_load, tables
+
+
+@pytest.fixture(scope="module")
+def entries():
+    def truth(entry, material, seeds=(1, 2, 3)):
+        return compared.solutions(entry, lambda labels: labels.material == material and labels.seed in seeds)
+
+    grids = [*truth("adhesionless", "hertz"), *truth("coarse", "hertz", (2,)), *truth("fine", "hertz", (2,))]
+    ranges = [*truth("adhesive", "soft"), *truth("ranges", "soft"), *truth("shortest_range", "soft", (1,))]
+    found = model_error(compared.tree(), [*grids, *ranges], runs=compared.patches())
+    entries = {name: entry.to_dataset() for name, entry in found.children.items()}
+    return entries | {"short_range": entries["one"]}
+
+
+def test_every_table_of_the_models_error_can_be_written(entries):
+    found = tables(entries, compared.tree(), "one", [])
+    assert len(found) == 12
+    for name, table in found.items():
+        assert "nan" not in str(table) and all(len(row) == len(table.head) for row in table.rows), name
+
+
+def test_errors_are_in_per_cent_with_their_scatter():
+    _, (row,), _ = errors_by_load(compared.errors()["adhesive"].to_dataset(), "area_error")
+    each = [100 * (1 / factor - 1) for factor in compared.AREA_FACTORS.values()]
+    assert row == ["`rough`", *[f"{np.mean(each):+.1f} ± {np.std(each, ddof=1):.1f}"] * 2]
+
+
+def test_pull_off_and_loss_are_means_over_the_seeds():
+    attrs = {"units": "1", "long_name": "test"}
+    study = [
+        (labels, run.assign(stickiness=((), 0.5, attrs)))
+        for labels, run in separate.study("slopes", depth=0.0, slopes=(1.0,))
+    ]
+    head, (row,), _ = hysteresis.summary(separate.tree(study)["slopes"].to_dataset())
+    pull_off = [float(separate.run("sticky", 1.0, seed, 0.0).pull_off_pressure) for seed in (1, 2)]
+    assert row[head.index("pull-off, Pa")] == f"{np.mean(pull_off):.3g} ± {np.std(pull_off, ddof=1):.3g}"
