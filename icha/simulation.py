@@ -132,7 +132,7 @@ def simulate(
         observables = contact.observables(surface)
         if kept is not None:
             contact = solver.resumable(contact, kept)
-        met = _followed(contact, observables, path, material.contact_modulus * surface.rms_slope, progress)
+        met = _followed(contact, observables, path, progress)
         loading = [step["mean_separation"] for step in met.steps if step["leg"] == 0]
         reasons = observables.reasons_against(loading, met.pressed)
         dataset = _dataset(surface, material, path, model, seed, met, observables.of_contact(), reasons)
@@ -266,7 +266,7 @@ def _count_uphill_jumps_in(met: _Met) -> int:
     )
 
 
-def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
+def _followed(contact, observables, path, progress) -> _Met:
     steps, snapshots, events, failure = [], [], [], ""
     before = pulled = balance = pressed = None
     largest = 0.0
@@ -276,9 +276,9 @@ def _followed(contact, observables, path, pressure_unit, progress) -> _Met:
         snapshots.append(_finite(asked | observables.of_snapshot(state)))
 
     try:
-        for waypoint in follow(contact, path, pressure_unit, progress):
+        for waypoint in follow(contact, path, progress):
             state, balance = waypoint.state, waypoint.balance
-            steps.append(_finite(_step(contact, waypoint, pressure_unit) | observables.of_step(state)))
+            steps.append(_finite(_step(contact, waypoint) | observables.of_step(state)))
             events.append(Events.joined(()) if before is None else contact.events_between(before, state))
             before = state
             if waypoint.leg == 0 and steps[-1]["contact_area_fraction"] >= largest:
@@ -305,7 +305,7 @@ def _finite(values: dict) -> dict:
     return values
 
 
-def _step(contact: ContactModel, waypoint: Waypoint, pressure_unit: float) -> dict:
+def _step(contact: ContactModel, waypoint: Waypoint) -> dict:
     """What every contact model has of an equilibrium on a path, by the names of the variables."""
     state, target, balance = waypoint.state, waypoint.target, waypoint.balance
     pressure = contact.pressure(state)
@@ -319,7 +319,7 @@ def _step(contact: ContactModel, waypoint: Waypoint, pressure_unit: float) -> di
         "contact_stiffness": contact.stiffness(state),
         "converged": 1,
         "leg": waypoint.leg,
-        "reduced_pressure": pressure / pressure_unit,
+        "reduced_pressure": pressure / contact.pressure_unit,
         "reduced_separation": state.separation / contact.rms_height,
         "step_kind": target.kind,
         "step_target": target.value,

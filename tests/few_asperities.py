@@ -52,12 +52,14 @@ def contact_of(heights, positions=((0.5, 0.5),), radii=None, *, period=FAR, mate
     heights = np.array(heights, float)
     positions = np.array(positions, float) + period / 2
     radii = np.ones(len(heights)) if radii is None else np.array(radii, float)
-    return InteractingAsperities(JKR(material), Asperities(positions, heights, radii, period), RMS_HEIGHT)
+    return InteractingAsperities(
+        JKR(material), Asperities(positions, heights, radii, period), RMS_HEIGHT, 1e3 / period**2
+    )
 
 
 def travelled(contact, stops, **settings):
     """All waypoints of a path; reduced pressures are loads over 1000."""
-    return list(follow(contact, Path(stops, **settings), 1e3 / contact.area))
+    return list(follow(contact, Path(stops, **settings)))
 
 
 def load(contact, waypoint):

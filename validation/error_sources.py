@@ -138,9 +138,8 @@ def error_sources(
 
 def _model(surface, material, path):
     """The contact problem, and the model's states at the stops of the path."""
-    contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
-    unit = material.contact_modulus * surface.rms_slope
-    met = {waypoint.target: waypoint.state for waypoint in follow(contact, path, unit)}
+    contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)
+    met = {waypoint.target: waypoint.state for waypoint in follow(contact, path)}
     return contact, [met[target] for target in path.targets]
 
 

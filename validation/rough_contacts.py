@@ -130,9 +130,8 @@ def loop(surface: Surface, largest_pressure: float, step: float, material: Mater
     contact = contact_of(surface, material)
     path = Path(reduced_pressures=[largest_pressure], unload=True, max_step=step, snapshots=[])
     unit = material.surface_energy or material.contact_modulus * surface.rms_height
-    pressure_unit = material.contact_modulus * surface.rms_slope
     most, steps = 0.0, 0
-    for waypoint in follow(contact, path, pressure_unit):
+    for waypoint in follow(contact, path):
         balance, steps = waypoint.balance, steps + 1
         most = max(most, balance.work)
     parts = ("jump_in", "jump_off", "coalescence", "load_jump", "unattributed")

@@ -34,7 +34,7 @@ def main():
     material = icha.Material(task.contact_modulus, task.surface_energy, task.interaction_range)
     with threadpool_limits(1):
         contact = contact_of(code, surface, material)
-        for waypoint in follow(contact, path, unit):
+        for waypoint in follow(contact, path):
             state = waypoint.state
             task.answer_stop(
                 pressure=contact.pressure(state),

@@ -184,7 +184,7 @@ def _full_contact(cases):
     if not adhesive:
         return
     lowest = min(adhesive, key=lambda case: case.ratio)
-    text = f"U_full/dgamma is {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}); {MEANING}"
+    text = f"U_full/dgamma is about {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}); {MEANING}"
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
     if any(MODELS[case.model].by_cells and case.ratio < HIGH_PULL_OFF_BELOW for case in cases):

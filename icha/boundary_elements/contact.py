@@ -58,6 +58,7 @@ class BoundaryElements:
     spacing: float
     law: JKR
     rms_height: float
+    rms_slope: float
     asperities: Asperities
     space: HalfSpace
     topography: Topography
@@ -75,6 +76,11 @@ class BoundaryElements:
     def contact_modulus(self) -> float:
         """E*, Pa."""
         return self.law.material.contact_modulus
+
+    @property
+    def pressure_unit(self) -> float:
+        """E* h'_rms, Pa."""
+        return self.contact_modulus * self.rms_slope
 
     @property
     def area(self) -> float:
@@ -334,7 +340,7 @@ class PatchObservables:
 
     def _pressure_density(self, state, cells):
         """Density of the pressure over the nominal area, and its mean in every bin; the pressure is the patches'."""
-        edges_of_bins = PRESSURE_BINS * (self.contact.contact_modulus * self.surface.rms_slope)
+        edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
         # The force of a cell acts on the part of it that touches; what that is beside its area is the same everywhere.
         weight = state.fraction * (np.sum(cells) / (np.sum(state.fraction) or 1.0))
         pressure = state.pressure / weight
@@ -399,7 +405,9 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         )
     space = HalfSpace.of(surface.grid)
     topography = Topography.of(surface.heights / h)
-    return BoundaryElements(surface.heights, h, law, surface.rms_height, asperities, space, topography, front, summits)
+    return BoundaryElements(
+        surface.heights, h, law, surface.rms_height, surface.rms_slope, asperities, space, topography, front, summits
+    )
 
 
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> Kept:

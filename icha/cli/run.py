@@ -340,7 +340,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
         say(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}{beside}")
     incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
     if incomplete:
-        _heading(f"{counted(len(incomplete), 'run')} could not be computed to the end:")
+        _heading(f"{counted(len(incomplete), 'run')} without a result:")
         for path, reason in incomplete.items():
             _reason(path, [reason])
     failed = [job for job in watch.failed if not stopped or reason_of(job, folder)]

@@ -8,7 +8,7 @@ import typer
 from icha.cli.project import Mistake, say
 from icha.cli.scans import check_picture
 from icha.datasets.attributes import why_no_result
-from icha.support.in_words import printable
+from icha.support.in_words import counted, printable
 
 _BARS = " ▁▂▃▄▅▆▇█"
 _WIDTH = 60
@@ -162,6 +162,12 @@ def _show_campaign(tree, file) -> None:
             values = study[variable].values
             if (known := values[values == values]).size:
                 say(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
+        if "applicability" in study and (count := int((study["applicability"] != "").sum())):
+            reasons = dict.fromkeys(filter(None, study["applicability"].values.ravel().astype(str)))
+            say(
+                f"  model not applicable to {counted(count, 'run')}: {printable('. '.join(list(reasons)[:3]))}",
+                fg="red",
+            )
         if "failure" in study:
             for where in zip(*(study["failure"] != "").values.nonzero(), strict=True):
                 labels = map(str, labels_at(study, where, study["failure"].dims))

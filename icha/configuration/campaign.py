@@ -22,8 +22,6 @@ from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections of entries that belong to a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
-# Keys whose values are compared with slopes of runs, or with paths that have them.
-_OF_SLOPES = ("rms_slope", "known_failures")
 # Each of these looks at all runs of its study.
 _FEW = Field(max_length=100)
 # Cells per shortest wavelength: with fewer, boundary elements are refused and asperities warned of; those to recommend.
@@ -198,8 +196,11 @@ class Campaign(Section):
         """
         unknown_slopes = any(MEASURED in study.rms_slopes for study in self.studies.values())
         for place, value, reason in self._problems():
-            if not (unknown_slopes and any(str(part).startswith(_OF_SLOPES) for part in place)):
+            if not (unknown_slopes and any(str(part).startswith("rms_slope") for part in place)):
                 yield place, value, reason
+        if not unknown_slopes:
+            # Runs are called by their slopes.
+            yield from _within(("publication",), self.publication.problems(self))
 
     def _problems(self):
         for label, study in self.studies.items():
@@ -212,7 +213,6 @@ class Campaign(Section):
             if label in self.studies and self.compares_models(label):
                 reason = "is the name of a study that has boundary elements of its own; allowed: another name"
                 yield ("finite_range", label), label, reason
-        yield from _within(("publication",), self.publication.problems(self))
         for label, figure in self.figures.drawn().items():
             yield from _within(("figures", label), figure.problems(self))
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
-from icha.surfaces.summits import Asperities
-from icha.surfaces.surface import Surface
+if TYPE_CHECKING:
+    from icha.surfaces.summits import Asperities
+    from icha.surfaces.surface import Surface
 
 # Quantities that a solve can hold.
 PRESSURE, AREA_FRACTION = "pressure", "area_fraction"
@@ -87,6 +88,10 @@ class ContactModel(Protocol[S]):
     @property
     def contact_modulus(self) -> float:
         """E*, the unit of relative loads, Pa."""
+
+    @property
+    def pressure_unit(self) -> float:
+        """E* h'_rms, the unit of reduced pressures, Pa."""
 
     @property
     def rms_height(self) -> float:

@@ -173,4 +173,4 @@ class AsperityObservables:
 
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
     """The contact of a surface and a material; raises `ValueError` if the surface has no summits."""
-    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)

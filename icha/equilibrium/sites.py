@@ -17,13 +17,15 @@ from icha.surfaces.summits import Asperities
 class Problem:
     """Asperities in contact with a half-space.
 
-    law: of one spot. rms_height: the length that makes errors of an equilibrium dimensionless, m. jump_in:
+    law: of one spot. rms_height: the length that makes errors of an equilibrium dimensionless, m. rms_slope: of the
+    surface. jump_in:
     the asperities' jump-in approaches (n,), m.
     """
 
     law: SpotLaw
     asperities: Asperities
     rms_height: float
+    rms_slope: float = 1.0
     jump_in: np.ndarray = field(init=False)
 
     def __post_init__(self):
@@ -44,6 +46,11 @@ class Problem:
     def contact_modulus(self) -> float:
         """E*, Pa."""
         return self.law.material.contact_modulus
+
+    @property
+    def pressure_unit(self) -> float:
+        """E* h'_rms, Pa."""
+        return self.contact_modulus * self.rms_slope
 
 
 # Status of a site: in contact; without adhesion, one that may come into contact; one that is no more.

@@ -8,7 +8,7 @@ steps become short enough that the work lost in it is known, whatever the longes
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -18,7 +18,7 @@ from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.energy_balance import Step, Waypoint, between_stops
 from icha.path.loading import Course, halved
 from icha.path.stops import CLOSE_TO_A_JUMP, SAME_EXCESS, SAME_SEPARATION, InsideJump, Queue, Stop, first_passed
-from icha.path.targets import LOADS, MEAN_SEPARATION, UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST, Path, Target
+from icha.path.targets import LOADS, MEAN_SEPARATION, UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST, Path
 
 # Where nothing jumps, the part of the work so far that may be unknown after a step.
 UNRESOLVED_WORK = 2e-4
@@ -194,16 +194,13 @@ class Position:
     stations: tuple[float, ...] = ()
 
 
-def cycle(
-    contact: ContactModel, path: Path, stop_at: Callable[[Target], Stop], longest: float, course: Course
-) -> Generator[Waypoint, Stop | None, None]:
+def cycle(contact: ContactModel, path: Path, longest: float, course: Course) -> Generator[Waypoint, Stop | None, None]:
     """All equilibria of a path that goes on after the first loading, without their balances.
 
     A stop that is sent in answer to one of them is met, too, if it comes before the others, as one that is no target.
 
     Parameters
     ----------
-    stop_at : makes a stop of a target.
     longest : step of the separation, m.
 
     Raises
@@ -211,7 +208,7 @@ def cycle(
     NotConverged
         As `icha.path.follow.follow`.
     """
-    start, stops = contact.untouched(), [stop_at(target) for target in path.targets]
+    start, stops = contact.untouched(), [Stop(target, contact) for target in path.targets]
     for stop in _above(start, stops):  # nothing touches up there
         state = contact.equilibrium(start, stop.target.value)
         stops.remove(stop)
@@ -225,7 +222,7 @@ def cycle(
     if here.course.missed:
         raise here.course.ended(here.state, True)
     for leg, turn in enumerate(path.turning_points, start=1):
-        stop = stop_at(turn)
+        stop = Stop(turn, contact)
         if (stop.excess(here.state) > 0) != (leg % 2 == 1):
             behind = NotConverged(f"the turning point {turn.named()} lies behind where leg {leg} begins")
             raise here.course.ended(here.state, leg % 2 == 0, behind)
@@ -233,7 +230,7 @@ def cycle(
         here.course.tell(f"turning point {turn.named()}", here.state)
     if path.unload:
         leg = len(path.turning_points) + (len(path.turning_points) % 2 == 0)
-        stops = [stop_at(replace(target, snapshot=False)) for target in path.targets]
+        stops = [Stop(replace(target, snapshot=False), contact) for target in path.targets]
         passed = [stop for stop in stops if stop.excess(here.state) > SAME_EXCESS]
         here = yield from _Leg(contact, leg, longest).follow(here, passed, apart=True)
         here.course.tell("apart", here.state)
@@ -297,13 +294,13 @@ class _Leg:
             if self._is_worth_a_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if stop is None:
-                sent = yield between_stops(met, self.number)
+                sent = yield between_stops(met, self.number, step)
                 continue
             if stop is not sent:
                 waiting.remove(stop)
                 if self.number == 0:
                     here = replace(here, course=here.course.met(stop.target, met))
-            sent = yield Waypoint(stop.target, met, self.number)
+            sent = yield Waypoint(stop.target, met, self.number, step)
         return _with_stations(here, visited) if self.loading else here
 
     def _one_step(self, here, most):
@@ -368,5 +365,5 @@ def _never_so_far(stop, account):
     """That the surfaces come apart before a turning point; of a load, what tension they bear."""
     reason = f"the surfaces are apart before the turning point {stop.target.named()}"
     if stop.target.kind in LOADS:
-        reason += f"; the largest tension is {max(0.0, -account.lowest / stop.pressure_scale):.4g}"
+        reason += f"; the largest tension is {max(0.0, -account.lowest / stop.target.quantity.scale(stop.contact)):.4g}"
     return reason

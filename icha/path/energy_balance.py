@@ -155,12 +155,13 @@ class EnergyBalance:
 class Waypoint:
     """An equilibrium on a path: what it was asked to reach, and on which leg (0 the first loading, 1 back, …).
 
-    balance: of the energy, on a cyclic path.
+    step: to it from the waypoint before, and balance: of the energy, on a cyclic path.
     """
 
     target: Target
     state: State
     leg: int = 0
+    step: Step | None = None
     balance: EnergyBalance | None = None
 
     @property
@@ -169,9 +170,9 @@ class Waypoint:
         return self.leg % 2 == 0
 
 
-def between_stops(state: State, leg: int) -> Waypoint:
+def between_stops(state: State, leg: int, step: Step | None = None) -> Waypoint:
     """The waypoint of an equilibrium between the stops."""
-    return Waypoint(Target(BETWEEN, state.separation), state, leg)
+    return Waypoint(Target(BETWEEN, state.separation), state, leg, step)
 
 
 _LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")

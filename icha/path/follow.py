@@ -5,21 +5,18 @@ from dataclasses import replace
 
 from icha.contact.model import ContactModel
 from icha.path.cycle import cycle
-from icha.path.energy_balance import EnergyBalance, Step, Waypoint, between_stops
+from icha.path.energy_balance import EnergyBalance, Waypoint, between_stops
 from icha.path.loading import Course, first_loading
 from icha.path.stops import SAME_EXCESS, Stop
-from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, RELATIVE_LOAD, Path, Target
+from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Target
 
 
-def under_load(
-    contact: ContactModel, cycle: Generator[Waypoint, Stop | None, None], pressure_unit: float
-) -> Iterator[Waypoint]:
+def under_load(contact: ContactModel, cycle: Generator[Waypoint, Stop | None, None]) -> Iterator[Waypoint]:
     """Those states of a path under separation control that load control visits, with their balances.
 
     Where the pressure would have to go back, the state jumps at constant pressure to where the curve goes on; with the
     last contact, to where nothing touches any more. The path is told to meet that pressure again, and goes on from
-    there: the events of a state are then those of the states before it, and its own. pressure_unit: of reduced
-    pressures, Pa.
+    there: the events of a state are then those of the states before it, and its own.
     """
     visited = hidden = again = None
     balance = EnergyBalance()
@@ -38,12 +35,12 @@ def under_load(
         # The turning point itself begins the next leg; without contact there is nothing yet to jump from.
         if visited is not None and not ahead and not landed:
             hidden = waypoint
-            again = again or Stop(Target(REDUCED_PRESSURE, level / pressure_unit), contact, pressure_unit)
+            again = again or Stop(Target(REDUCED_PRESSURE, level / contact.pressure_unit), contact)
             continue
         if hidden is not None:
             balance = _after_jump(contact, balance, visited, state, level)
-        elif visited is not None:
-            balance = balance.after(contact, Step.between(contact, visited, state))
+        elif waypoint.step is not None:
+            balance = balance.after(contact, waypoint.step)
         yield replace(between_stops(state, waypoint.leg) if landed else waypoint, balance=balance)
         visited, hidden, again, level = state, None, None, pressure
     if hidden is not None:
@@ -59,7 +56,6 @@ def _after_jump(contact, balance, before, after, pressure):
 def follow(
     contact: ContactModel,
     path: Path,
-    pressure_unit: float,
     progress: Callable[[str], None] | None = None,
 ) -> Iterator[Waypoint]:
     """Follow the path and yield its waypoints in the order in which they are met.
@@ -70,7 +66,6 @@ def follow(
     ----------
     contact : the contact problem.
     path : its stops.
-    pressure_unit : E* h'_rms in Pa, the unit of reduced pressures.
     progress : called with a line of text at every stop.
 
     Raises
@@ -79,26 +74,20 @@ def follow(
         If an equilibrium is not found even with short steps, or a target lies beyond what the model covers. Stops that
         lie inside a jump are left out; on the first loading those after them are yielded before the error is raised.
     """
-    scale = {REDUCED_PRESSURE: pressure_unit, RELATIVE_LOAD: contact.contact_modulus}
-
-    def stop_at(target):
-        return Stop(target, contact, scale.get(target.kind, 1.0))
-
     longest = path.max_step * contact.rms_height
     course = Course(contact, len(path.targets), longest, progress)
     if not path.cyclic:
-        return first_loading(contact, [stop_at(target) for target in path.targets], longest, course)
-    waypoints = cycle(contact, path, stop_at, longest, course)
+        return first_loading(contact, [Stop(target, contact) for target in path.targets], longest, course)
+    waypoints = cycle(contact, path, longest, course)
     if path.control == LOAD_CONTROL:
-        return under_load(contact, waypoints, pressure_unit)
+        return under_load(contact, waypoints)
     return _balanced(contact, waypoints)
 
 
 def _balanced(contact, waypoints):
     """The same waypoints with their balances."""
-    before, balance = None, EnergyBalance()
+    balance = EnergyBalance()
     for waypoint in waypoints:
-        if before is not None:
-            balance = balance.after(contact, Step.between(contact, before, waypoint.state))
-        before = waypoint.state
+        if waypoint.step is not None:
+            balance = balance.after(contact, waypoint.step)
         yield replace(waypoint, balance=balance)

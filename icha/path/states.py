@@ -2,11 +2,11 @@
 
 from pydantic import Field, model_validator
 
-from icha.path.targets import STATES
+from icha.path.targets import QUANTITIES
 from icha.support.values import Length, Positive, Section, exactly_one, number
 
-ReducedPressure = number(STATES["reduced_pressure"])
-AreaFraction = number(STATES["area_fraction"])
+ReducedPressure = number(QUANTITIES["reduced_pressure"].rule)
+AreaFraction = number(QUANTITIES["area_fraction"].rule)
 
 
 class Snapshot(Section):

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.contact.model import AREA_FRACTION as AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, NotConverged, State
-from icha.path.targets import AREA_FRACTION, LEAST_PRESSURE, MEAN_SEPARATION, Target
+from icha.path.targets import LEAST_PRESSURE, MEAN_SEPARATION, Target
 
 # Relative excess over a target that is rounding.
 SAME_EXCESS = 1e-9
@@ -16,33 +15,25 @@ SAME_EXCESS = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """A target turned into a function of the state that is zero at the target and rises on loading.
-
-    pressure_scale: of a load, the pressure (Pa) that is its unit.
-    """
+    """A target turned into a function of the state that is zero at the target and rises on loading."""
 
     target: Target
     contact: ContactModel
-    pressure_scale: float
 
     def excess(self, state: State) -> float:
         """Relative excess of the state over the target; of no load, in units of the least that can be asked for."""
-        kind, value = self.target.kind, self.target.value
-        if kind == MEAN_SEPARATION:
+        quantity, value = self.target.quantity, self.target.value
+        if quantity.held is None:
             return (value - state.separation) / self.contact.rms_height
-        if kind == AREA_FRACTION:
-            return self.contact.area_fraction(state) / value - 1
-        pressure = self.contact.pressure(state) / self.pressure_scale
-        return (pressure - value) / (abs(value) or LEAST_PRESSURE)
+        found = quantity.of(self.contact, state)
+        if quantity.held == PRESSURE:
+            return (found - value) / (abs(value) or LEAST_PRESSURE)
+        return found / value - 1
 
     @property
     def control(self) -> Control | None:
         """What a solve has to hold to meet the target; None for a separation."""
-        if self.target.kind == MEAN_SEPARATION:
-            return None
-        if self.target.kind == AREA_FRACTION:
-            return Control(AREA, self.target.value)
-        return Control(PRESSURE, self.target.value * self.pressure_scale)
+        return self.target.quantity.control(self.contact, self.target.value)
 
     def expected_separation(self, state: State) -> float:
         """The separation at which the target may be met: load and area grow about exponentially; -inf if unknown."""

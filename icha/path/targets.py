@@ -4,6 +4,8 @@ import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from icha.contact.model import AREA_FRACTION as HELD_AREA
+from icha.contact.model import PRESSURE, ContactModel, Control, State
 from icha.support.rules import LENGTH, NUMBER, POSITIVE, Real
 
 # Beyond these the spots have lost their identity: soon after, the computed mean planes of a surface without
@@ -24,33 +26,77 @@ UNRESOLVED_REST = 1e-10
 # Of the work so far, the part by which work and energy may disagree in a step without events that is not short.
 UNBALANCED_WORK = 3e-6
 
-# By the kind of quantity.
-STATES = {
-    "reduced_pressure": Real(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True),
-    "relative_load": POSITIVE,
-    "area_fraction": Real(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True),
-    "mean_separation": LENGTH,
-}
 STEP = Real("h_rms", least=MIN_STEP, most=MAX_STEP)
 
 
-REDUCED_PRESSURE = "reduced_pressure"
-RELATIVE_LOAD = "relative_load"
-AREA_FRACTION = "area_fraction"
-MEAN_SEPARATION = "mean_separation"
-KINDS = (REDUCED_PRESSURE, RELATIVE_LOAD, AREA_FRACTION, MEAN_SEPARATION)
-LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
-# The arguments that list the stops of a path.
-LISTS = {
-    REDUCED_PRESSURE: "reduced_pressures",
-    AREA_FRACTION: "area_fractions",
-    MEAN_SEPARATION: "mean_separations",
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity that a path can be asked to meet.
+
+    Parameters
+    ----------
+    name : of one value, in targets and in files.
+    unit : of its values.
+    rule : values that a stop may have.
+    listed : argument of `Path` that lists stops of it; empty where there is none.
+    held : what a solve holds to meet it; None for the mean separation, which is imposed.
+    unit_of_held : attribute of the contact that is the unit of that, Pa; empty where it has none.
+    """
+
+    name: str
+    unit: str
+    rule: Real
+    listed: str = ""
+    held: str | None = None
+    unit_of_held: str = ""
+
+    def scale(self, contact: ContactModel) -> float:
+        """The unit of its values, in that of what is held."""
+        return getattr(contact, self.unit_of_held) if self.unit_of_held else 1.0
+
+    def of(self, contact: ContactModel, state: State) -> float:
+        """The value of a state."""
+        if self.held == PRESSURE:
+            return contact.pressure(state) / self.scale(contact)
+        return state.separation if self.held is None else contact.area_fraction(state)
+
+    def control(self, contact: ContactModel, value: float) -> Control | None:
+        """What a solve has to hold to meet a value; None for a separation."""
+        return None if self.held is None else Control(self.held, value * self.scale(contact))
+
+
+REDUCED_PRESSURE, RELATIVE_LOAD = "reduced_pressure", "relative_load"
+AREA_FRACTION, MEAN_SEPARATION = "area_fraction", "mean_separation"
+QUANTITIES = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity(
+            REDUCED_PRESSURE,
+            "1",
+            Real(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True),
+            "reduced_pressures",
+            PRESSURE,
+            "pressure_unit",
+        ),
+        Quantity(RELATIVE_LOAD, "1", POSITIVE, held=PRESSURE, unit_of_held="contact_modulus"),
+        Quantity(
+            AREA_FRACTION,
+            "1",
+            Real(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True),
+            "area_fractions",
+            HELD_AREA,
+        ),
+        Quantity(MEAN_SEPARATION, "m", LENGTH, "mean_separations"),
+    )
 }
+LOADS = tuple(name for name, quantity in QUANTITIES.items() if quantity.held == PRESSURE)
+# By the kind of their values, the arguments that list the stops of a path.
+LISTS = {name: quantity.listed for name, quantity in QUANTITIES.items() if quantity.listed}
 # What an equilibrium between the stops of a path is asked to reach: its mean separation.
 BETWEEN = "path"
 
 # Kinds of which values are in m; those of all others have no unit.
-IN_METRES = (MEAN_SEPARATION, BETWEEN)
+IN_METRES = (*(name for name, quantity in QUANTITIES.items() if quantity.unit == "m"), BETWEEN)
 
 SEPARATION_CONTROL, LOAD_CONTROL = "separation", "load"
 CONTROLS = (SEPARATION_CONTROL, LOAD_CONTROL)
@@ -63,6 +109,11 @@ class Target:
     kind: str
     value: float
     snapshot: bool = False
+
+    @property
+    def quantity(self) -> Quantity:
+        """What is to be met."""
+        return QUANTITIES[self.kind]
 
     def named(self, digits: int | None = None) -> str:
         """Kind and value in words."""
@@ -157,7 +208,7 @@ def _wanted(snapshots):
     """Kinds and values of the snapshots."""
     wanted = {}
     for label, kind, value in _pairs("snapshots", snapshots):
-        value = STATES[kind].checked(label, value)
+        value = QUANTITIES[kind].rule.checked(label, value)
         if (kind, value) in wanted:
             raise ValueError(f"{label}: {kind} {value!r} is given twice")
         wanted[kind, value] = None
@@ -189,8 +240,8 @@ def _pairs(name, pairs):
             kind, value = pair
         except (TypeError, ValueError):
             raise ValueError(f"{label}: {pair!r} is not a pair (kind, value)") from None
-        if kind not in KINDS:
-            raise ValueError(f"{label}: kind {kind!r} must be one of {', '.join(KINDS)}")
+        if kind not in QUANTITIES:
+            raise ValueError(f"{label}: kind {kind!r} must be one of {', '.join(QUANTITIES)}")
         yield label, kind, value
 
 
@@ -199,7 +250,7 @@ def _turns(turning_points, last):
     turns, before = [], last
     for k, (label, kind, value) in enumerate(_pairs("turning_points", turning_points)):
         tensile = kind in LOADS and k % 2 == 0
-        value = (NUMBER if tensile else STATES[kind]).checked(label, value)
+        value = (NUMBER if tensile else QUANTITIES[kind].rule).checked(label, value)
         if tensile and 0 < abs(value) < LEAST_PRESSURE and kind == REDUCED_PRESSURE:
             raise ValueError(
                 f"{label}: {value!r} is next to no load; allowed: 0, or an absolute value of at least "
@@ -228,7 +279,7 @@ def _stops(name, kind, given):
         raise ValueError(f"{name}: {given!r} is not a list of numbers")
     if not values:
         raise ValueError(f"{name}: the list is empty")
-    values = [STATES[kind].checked(f"{name}[{i}]", v) for i, v in enumerate(values)]
+    values = [QUANTITIES[kind].rule.checked(f"{name}[{i}]", v) for i, v in enumerate(values)]
     for i, (one, next_one) in enumerate(itertools.pairwise(values)):
         if not (next_one < one if kind == MEAN_SEPARATION else next_one > one):
             order = "decreasing" if kind == MEAN_SEPARATION else "increasing"

@@ -89,7 +89,7 @@ def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
 def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project):
     done = run(project, "dataset")
     assert done.returncode == 1, done.stdout
-    assert "1 run could not be computed to the end:\n  load/rough/seed1/slope1/sticky\n    the path ends" in done.stdout
+    assert "1 run without a result:\n  load/rough/seed1/slope1/sticky\n    the path ends" in done.stdout
     assert "Verdict on the checks" in done.stdout
     assert "dataset: results/tiny/dataset/tiny.nc" in done.stdout and "Traceback" not in done.stdout
     lines = [line for line in done.stdout.splitlines() if line.startswith("[")]

@@ -69,45 +69,27 @@ def campaigns(page):
         yield line, current
 
 
-DATA = {
-    "surface.2048x2048.ASCII.dat": "matrix",
-    "surface.0512x0512.ASCII.xyz.dat": "xyz",
-    "surface.8192x8192.h5": "hdf5",
-    "surface.Fourier.ASCII.dat": "fourier",
-    "heights.npy": "npy",
-    "rubber.csv": "table",
-}
-
-
 def write_data(folder):
-    """Small files of the names that the pages use."""
+    """Small files of the names that the pages use, in the units that they give: those of the challenge are 0.1 mm."""
     import h5py
 
     spectrum = icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=40e-6, short_wavelength=12e-6, hurst=0.8)
     heights = spectrum.realise(grid=36, seed=1).scaled_to_rms_slope(0.2).heights
     y, x = np.indices(heights.shape) / len(heights)
     folder.mkdir(parents=True, exist_ok=True)
-    for name, kind in DATA.items():
-        # In the units that the pages give: those of the challenge are 0.1 mm.
-        z = heights / (1e-4 if name.startswith("surface") else 1e-6)
-        match kind:
-            case "matrix":
-                np.savetxt(folder / name, z)
-            case "xyz":
-                np.savetxt(folder / name, np.column_stack([x.ravel(), y.ravel(), z.ravel()]))
-            case "hdf5":
-                with h5py.File(folder / name, "w") as file:
-                    file["surface"] = z
-            case "fourier":
-                modes = np.fft.fft2(z, norm="forward")
-                numbers = np.fft.fftfreq(len(z), 1 / len(z)).astype(int)
-                qy, qx = np.meshgrid(numbers, numbers, indexing="ij")
-                kept = (np.abs(qx) < 9) & (np.abs(qy) < 9)
-                np.savetxt(folder / name, np.column_stack([qx[kept], qy[kept], modes.real[kept], modes.imag[kept]]))
-            case "npy":
-                np.save(folder / name, z)
-            case "table":
-                (folder / name).write_text("pressure,area\n0.8,0.12\n2.4,0.37\n", encoding="utf-8")
+    np.save(folder / "heights.npy", heights / 1e-6)
+    (folder / "rubber.csv").write_text("pressure,area\n0.8,0.12\n2.4,0.37\n", encoding="utf-8")
+    z = heights / 1e-4
+    np.savetxt(folder / "surface.2048x2048.ASCII.dat", z)
+    np.savetxt(folder / "surface.0512x0512.ASCII.xyz.dat", np.column_stack([x.ravel(), y.ravel(), z.ravel()]))
+    with h5py.File(folder / "surface.8192x8192.h5", "w") as file:
+        file["surface"] = z
+    modes = np.fft.fft2(z, norm="forward")
+    numbers = np.fft.fftfreq(len(z), 1 / len(z)).astype(int)
+    qy, qx = np.meshgrid(numbers, numbers, indexing="ij")
+    few = (np.abs(qx) < 9) & (np.abs(qy) < 9)
+    columns = [qx[few], qy[few], modes.real[few], modes.imag[few]]
+    np.savetxt(folder / "surface.Fourier.ASCII.dat", np.column_stack(columns))
 
 
 @pytest.fixture(scope="module")
@@ -253,18 +235,6 @@ def check_icha(arguments):
         command.make_context(arguments[0], list(arguments[1:]))
 
 
-def check_snakemake(arguments):
-    wanted = []
-    position = 0
-    while position < len(arguments):
-        if arguments[position].startswith("-"):
-            position += 1 if arguments[position] in ("-n", "--dry-run") else 2
-        else:
-            wanted.append(arguments[position])
-            position += 1
-    assert set(wanted) <= workflow_targets()
-
-
 @EVERY
 def test_every_command_exists(page):
     known = {"git", "cd", "source", "cp", "mkdir", "export", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
@@ -280,7 +250,7 @@ def test_every_command_exists(page):
         elif program == "make":
             assert {each for each in arguments if "=" not in each} <= make_targets(), where
         elif program == "snakemake":
-            check_snakemake(arguments)
+            assert arguments[0].startswith("-") or arguments[0] in workflow_targets(), where
         else:
             assert program in known, where
         for word in arguments:

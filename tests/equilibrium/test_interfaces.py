@@ -29,11 +29,11 @@ class Only:
 
 
 def model(law):
-    return InteractingAsperities(law, find_summits(SURFACE), SURFACE.rms_height)
+    return InteractingAsperities(law, find_summits(SURFACE), SURFACE.rms_height, SURFACE.rms_slope)
 
 
 def last(contact, loads, **path):
-    return list(follow(contact, Path(reduced_pressures=loads, **path), MODULUS * SURFACE.rms_slope))[-1].state
+    return list(follow(contact, Path(reduced_pressures=loads, **path)))[-1].state
 
 
 @pytest.mark.parametrize("energy", [0.0, 0.05])

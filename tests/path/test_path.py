@@ -30,7 +30,7 @@ def large():
 
 
 def contact_of(surface, material, model=InteractingAsperities):
-    return model(JKR(material), find_summits(surface), surface.rms_height)
+    return model(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)
 
 
 @pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
@@ -154,7 +154,7 @@ def test_no_step_is_longer_than_asked(surface):
             return reached
 
     contact = contact_of(surface, BARE, Watched)
-    for _ in follow(contact, Path(reduced_pressures=[1e-2], max_step=0.07), MODULUS):
+    for _ in follow(contact, Path(reduced_pressures=[1e-2], max_step=0.07)):
         pass
     assert 0.069 < max(seen) <= 0.07 * (1 + 1e-9)
 
@@ -171,7 +171,7 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface):
             return super().equilibrium(state, separation, control)
 
     path = Path(reduced_pressures=[1e-3, 1e-1])
-    stops = follow(contact_of(surface, BARE, Failing), path, MODULUS * surface.rms_slope)
+    stops = follow(contact_of(surface, BARE, Failing), path)
     assert next(stops).target.value == 1e-3
     with pytest.raises(NotConverged, match=r"after 1 of 2 stops: on purpose"):
         next(stops)
@@ -225,7 +225,7 @@ def test_bad_paths_are_refused_by_name(arguments, message):
 def test_the_way_to_first_contact_costs_nothing(surface):
     """A stop a metre up is met, without a step for every tenth of h_rms on the way down."""
     path = Path(mean_separations=[1.0, 1.5 * surface.rms_height], snapshots=[])
-    stops = [(w.target, w.state) for w in follow(contact_of(surface, BARE), path, MODULUS)]
+    stops = [(w.target, w.state) for w in follow(contact_of(surface, BARE), path)]
     assert [len(state.spots) > 0 for _, state in stops] == [False, True]
     reached = [state.separation for _, state in stops]
     assert reached == pytest.approx([1.0, 1.5 * surface.rms_height], rel=1e-12)

@@ -3,7 +3,7 @@
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from icha.path.targets import STATES
+from icha.path.targets import QUANTITIES
 from icha.support import rules, values
 
 OUTSIDE = [
@@ -12,13 +12,13 @@ OUTSIDE = [
     (rules.TOLERANCE, 1e-3, "must lie in [1e-12, 1e-4]", "a number in [1e-12, 1e-4]"),
     (rules.NUMBER, float("inf"), "is not finite", "a number"),
     (
-        STATES["area_fraction"],
+        QUANTITIES["area_fraction"].rule,
         0.3,
         "lies beyond the range of the asperity model",
         "a number in [1e-9, 0.25], where the asperity model holds",
     ),
     (
-        STATES["reduced_pressure"],
+        QUANTITIES["reduced_pressure"].rule,
         0.0,
         "must lie in [1e-12, 0.15]",
         "a number in [1e-12, 0.15], where the asperity model holds",

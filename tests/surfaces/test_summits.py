@@ -5,8 +5,8 @@ import pytest
 import scipy.optimize
 from scipy.spatial import cKDTree
 
-from icha import SelfAffineSpectrum, Surface
-from icha.surfaces.summits import SummitCoverage, find_summits, locate_summits
+from icha import Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.surfaces.summits import SummitCoverage, find_summits, locate_summits, paraboloid_departure
 
 PERIOD = 100e-6
 SPECTRUM = SelfAffineSpectrum(PERIOD, 20e-6, PERIOD / 16, 0.8)
@@ -231,3 +231,54 @@ def test_summits_that_all_lack_support_are_refused_with_what_to_do():
     assert len(locate_summits(surface)) == 0 and len(locate_summits(surface).unsupported_height)
     with pytest.raises(ValueError, match=r"heights: none of the \d+ summits .* supported .* boundary_elements"):
         find_summits(surface)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_tops_depart_from_paraboloids_as_their_shapes_do(boundary):
+    grid, at, radius = 64, np.array([[0.5, 0.5]]) * PERIOD, 8e-6
+    y, x = (np.mgrid[:grid, :grid] / grid - 0.5) * PERIOD
+    distance = np.hypot(x, y)
+
+    def departure(heights, contact_radius, radius_of_curvature):
+        surface = Surface(heights - heights.mean(), PERIOD, boundary=boundary)
+        return paraboloid_departure(surface, at, np.array([contact_radius]), np.array([radius_of_curvature]))[0]
+
+    assert departure(-(distance**2) / 2e-5, radius, 1e-5) < 1e-3
+    # A cone falls by a times its slope: here half of what the paraboloid does.
+    assert departure(-0.2 * distance, radius, 1e-5) == pytest.approx(np.log(2), abs=0.02)
+    assert departure(-(distance**2) / 2e-5, 0.1 * PERIOD / grid, 1e-5) == 0
+
+
+def _worn(seed):
+    heights = SelfAffineSpectrum(PERIOD, 25e-6, 12.5e-6, 0.8, 0.3).realise(64, seed).heights
+    top = 0.8 * heights.std()
+    return np.where(heights > top, top + 0.2 * (heights - top), heights)
+
+
+def _conical(seed):
+    y, x = np.mgrid[:64, :64] / 64
+    rough = SelfAffineSpectrum(PERIOD, 25e-6, 12.5e-6, 0.8, 0.01).realise(64, seed).heights
+    return rough - 1e-5 * np.hypot((4 * x) % 1 - 0.5, (4 * y) % 1 - 0.5)
+
+
+def _smooth(seed):
+    return SelfAffineSpectrum(PERIOD, 25e-6, 12.5e-6, 0.8, 0.3).realise(64, seed).heights
+
+
+@pytest.mark.parametrize(
+    ("make", "energy", "marked"), [(_worn, 5e-3, True), (_conical, 0.0, True), (_smooth, 5e-3, False)]
+)
+def test_runs_on_tops_that_are_not_parabolic_are_marked(make, energy, marked):
+    material = Material(2e6, energy, 2e-9)
+    for seed in (1, 2, 3):
+        surface = Surface(make(seed), PERIOD).scaled_to_rms_slope(0.3)
+        run = simulate(surface, material, Path(reduced_pressures=[1e-3, 1e-2], snapshots=[]))
+        assert ("not parabolic" in run.attrs["applicability"]) == marked
+
+
+def test_boundary_elements_are_marked_where_cells_are_too_few():
+    white = np.random.default_rng(1).standard_normal((32, 32)) * 1e-7
+    for heights, marked in ((white, True), (_smooth(1), False)):
+        surface = Surface(heights, PERIOD).scaled_to_rms_slope(0.3)
+        run = simulate(surface, Material(2e6, 0.0, 2e-9), Path(reduced_pressures=[1e-2]), model="boundary_elements")
+        assert ("grid cells for the shortest waves" in run.attrs["applicability"]) == marked

@@ -68,9 +68,9 @@ def test_a_lone_summit_is_hertz_and_its_images(field_shape):
 
 
 def test_without_overlaps_it_is_the_model(surface):
-    contact = InteractingAsperities(LAW, find_summits(surface), surface.rms_height)
+    contact = InteractingAsperities(LAW, find_summits(surface), surface.rms_height, surface.rms_slope)
     unit = 2.0 * surface.rms_slope
-    (waypoint,) = follow(contact, icha.Path(reduced_pressures=[5e-4]), unit)
+    (waypoint,) = follow(contact, icha.Path(reduced_pressures=[5e-4]))
     state = waypoint.state
     assert np.all(state.spots.members == 1)
     discs = discs_apart(contact.asperities, LAW, 5e-4 * unit, surface.rms_height)
