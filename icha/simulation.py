@@ -126,6 +126,15 @@ def simulate(
     if kept is not None and not MODELS[model].resumable:
         raise ValueError(f"kept: equilibria of the model {model} cannot be kept; allowed: None")
     seed = Integer(-1).checked("seed", seed)
+    dataset = _computed(solver, surface, material, path, model, seed, progress, kept)
+    if failed := reasons_of_failure(check_run(dataset)):
+        dataset = dataset.assign_attrs(failed_checks=failed)
+        warnings.warn(f"The run fails checks, do not use its numbers: {failed}", stacklevel=2)
+    return dataset
+
+
+def _computed(solver, surface, material, path, model, seed, progress, kept):
+    """The dataset of a run, unchecked; raises `ConvergenceError` with what there is of it."""
     # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
     with threadpool_limits(1):
         contact = solver.contact_of(surface, material)
@@ -142,9 +151,6 @@ def simulate(
         pull_off = met.snapshots[-1]["snapshot_step"]
         loop = hysteresis(met.steps, pull_off, material, observables.largest_tension, met.unattributed)
         dataset = dataset.assign(described(LOOP, loop | {"uphill_jump_in_count": _count_uphill_jumps_in(met)}))
-    if failed := reasons_of_failure(check_run(dataset)):
-        dataset = dataset.assign_attrs(failed_checks=failed)
-        warnings.warn(f"The run fails checks, do not use its numbers: {failed}", stacklevel=2)
     return dataset
 
 

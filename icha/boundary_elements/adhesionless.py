@@ -6,7 +6,7 @@ import numpy as np
 
 from icha.boundary_elements.elasticity import Contact, Topography, pressures_for
 from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.regions import merged
+from icha.boundary_elements.patches import merged
 from icha.contact.model import FullContact, NotConverged
 
 # Error of the displacement in contact over the surface's largest height, at last. While cells still come and go, what

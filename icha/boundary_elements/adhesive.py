@@ -11,7 +11,7 @@ from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import front_at_rest
-from icha.boundary_elements.regions import region
+from icha.boundary_elements.patches import region
 from icha.boundary_elements.windows import relaxed_in_windows
 from icha.contact.model import FullContact, NotConverged
 

@@ -19,9 +19,17 @@ from icha.boundary_elements.front import COMPLIANCE, Front, adhesive_areas, repo
 from icha.boundary_elements.held_load import under_control
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.newton import COARSE, FINE, FRONT_TOLERANCE, front_residual, tangent
-from icha.boundary_elements.patch_events import patch_events
-from icha.boundary_elements.patches import BEYOND_EDGES, centres, edges, labelled, labels_at
-from icha.boundary_elements.states import CellState, packed, unpacked
+from icha.boundary_elements.patches import (
+    BEYOND_EDGES,
+    CellState,
+    centres,
+    edges,
+    labelled,
+    labels_at,
+    packed,
+    patch_events,
+    unpacked,
+)
 from icha.contact.kept import Kept
 from icha.contact.model import (
     COALESCENCE,

@@ -24,7 +24,7 @@ from icha.boundary_elements.elasticity import (
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace
 from icha.boundary_elements.nearby import Tiles
-from icha.boundary_elements.regions import among, beside, merged, surroundings
+from icha.boundary_elements.patches import among, beside, merged, surroundings
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.boundary_elements.kernel import HalfSpace, Nearly, Whole
-from icha.boundary_elements.regions import among, merged
+from icha.boundary_elements.patches import among, merged
 from icha.contact.model import NotConverged
 from icha.support.parallel import blocks, on_cores
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from icha.boundary_elements.newton import FRONT_TOLERANCE
-from icha.boundary_elements.states import CellState
+from icha.boundary_elements.patches import CellState
 from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control, Events, NotConverged
 from icha.contact.models import HELD_CELLS, HELD_PART
 

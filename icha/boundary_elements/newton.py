@@ -19,7 +19,7 @@ from icha.boundary_elements.elastic_equilibrium import Held, held, intensity
 from icha.boundary_elements.elasticity import NOTHING, Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, adhesive_areas, neighbour_weights
 from icha.boundary_elements.kernel import HalfSpace, Whole
-from icha.boundary_elements.regions import adjacent, merged, region
+from icha.boundary_elements.patches import adjacent, merged, region
 from icha.contact.model import FullContact, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL
 

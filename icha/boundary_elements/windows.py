@@ -18,8 +18,7 @@ from icha.boundary_elements.elasticity import Contact, Topography
 from icha.boundary_elements.front import COMPLIANCE, Front, neighbours
 from icha.boundary_elements.kernel import HalfSpace, in_both_precisions
 from icha.boundary_elements.newton import front_at_rest
-from icha.boundary_elements.patches import labelled
-from icha.boundary_elements.regions import BLOCK, among, blocks_around, merged, surroundings
+from icha.boundary_elements.patches import BLOCK, among, blocks_around, labelled, merged, surroundings
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
