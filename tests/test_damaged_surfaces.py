@@ -11,7 +11,7 @@ import pytest
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 
 GRID, PERIOD = 64, 32e-6
-CASES_IN_SERIES, QUICK = 60, 18
+CASES_IN_SERIES, QUICK = 60, 9
 # Ratio of contact areas by both models, from which on a run must be marked. Of undamaged surfaces it is 1.2 at most.
 LARGEST_RATIO = 1.6
 MATERIAL = Material(contact_modulus=1e6, surface_energy=0.0, interaction_range=2e-9)

@@ -31,9 +31,6 @@ VALIDATION = {
 }
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
-# Runs by boundary elements of sticky surfaces, at 50 mJ/m^2, took 4 to 21 times as long as expected.
-MOST_OVER_EXPECTED = 20
-
 _RATIO = "full_contact_energy_ratio"
 
 # Of single spots so many may lie outside the range of Wu's formula before it is said where: of every surface some do.
@@ -187,8 +184,6 @@ def _full_contact(cases):
     text = f"U_full/dgamma is about {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}); {MEANING}"
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
-    if any(MODELS[case.model].by_cells and case.ratio < HIGH_PULL_OFF_BELOW for case in cases):
-        text += f"; boundary elements may take up to {MOST_OVER_EXPECTED} times as long as expected"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
 
 

@@ -159,16 +159,19 @@ def full_contact_energy(campaign: Campaign, surface: str) -> float:
     return campaign.topography(surface).full_contact_energy
 
 
+def energy_ratio(campaign: Campaign, contact) -> float:
+    """U_full/dgamma of a contact: a case with its surface, rms slope and material."""
+    material = campaign.materials[contact.material]
+    energy = full_contact_energy(campaign, contact.surface) * contact.rms_slope**2
+    return full_contact_energy_ratio(energy, material.contact_modulus, material.surface_energy)
+
+
 def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
     """The stickiest run of asperities of every study in which full contact has the lower energy."""
     for name, study in campaign.studies.items():
         if DEFAULT_MODEL not in study.models:
             continue
-        ratios = {}
-        for contact in campaign.contacts(name):
-            material = campaign.materials[contact.material]
-            energy = full_contact_energy(campaign, contact.surface) * contact.rms_slope**2
-            ratios[contact] = full_contact_energy_ratio(energy, material.contact_modulus, material.surface_energy)
+        ratios = {contact: energy_ratio(campaign, contact) for contact in campaign.contacts(name)}
         lowest = min(ratios, key=ratios.get)
         if ratios[lowest] < FULL_CONTACT_BELOW:
             place = f"{lowest.material} on {lowest.surface} at rms slope {lowest.rms_slope:.3g}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,12 +75,13 @@ def _rounded(slope: float) -> float:
     return float(f"{slope:.6g}")
 
 
-def read_scan(path: str | os.PathLike, **keywords: Any) -> Surface:
+def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **keywords: Any) -> Surface:
     """Read a measured topography and prepare it as a campaign does.
 
     Parameters
     ----------
     path : file of the topography.
+    confirmed : names of keywords whose values are meant though they are unusual; "height_unit" also confirms the slope.
     keywords : keys of a measured surface in a configuration, with values as they are written there, such as
         `size="32 um"`, `height_unit="nm"` and `boundary="window"`. `boundary` is needed; `size` and `height_unit` are
         needed unless the file has them.
@@ -87,15 +89,17 @@ def read_scan(path: str | os.PathLike, **keywords: Any) -> Surface:
     Raises
     ------
     ConfigurationError
-        A ValueError, if a key is missing or wrong, or the file cannot be read or prepared as asked.
+        A ValueError, if a key is missing or wrong, the file cannot be read or prepared as asked, or a size or slope
+        is unusual and not confirmed.
     """
     section = {"kind": "measured", "path": os.fspath(path), **keywords}
+    from icha.configuration.plausibility import unusual_topography, unusual_values
     from icha.surfaces.measured.settings import UnfitTopography
     from icha.surfaces.measured.topography import prepared_topography
     from icha.surfaces.surface import MISFIT_OF_EDGES, EdgeWarning, edges_fit
 
     try:
-        preparation = MeasuredSurface.model_validate(section).preparation
+        measured = MeasuredSurface.model_validate(section)
     except ValidationError as error:
         content = {"surfaces": {"scan": section}}
         problems = [
@@ -104,13 +108,27 @@ def read_scan(path: str | os.PathLike, **keywords: Any) -> Surface:
         ]
         lines = [line("read_scan", location[2:], value, reason) for location, value, reason in problems]
         raise ConfigurationError("\n".join(lines)) from None
+    _refuse_unusual(unusual_values({"surfaces": {"scan": section}}), confirmed)
     try:
-        surface = prepared_topography(path, preparation).surface
+        surface = prepared_topography(path, measured.preparation).surface
     except UnfitTopography as error:
         value = section.get(error.key)
         raise ConfigurationError(
             line("read_scan", (error.key,), NOTHING if value is None else value, str(error))
         ) from None
+    _refuse_unusual(unusual_topography(("surfaces", "scan"), measured, surface.period, surface.rms_slope), confirmed)
     if not surface.free and not edges_fit(surface.heights):
         warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=2)
     return surface
+
+
+def _refuse_unusual(found, confirmed):
+    """Raise ConfigurationError if unusual values of a scan are not confirmed."""
+    reason = "is unusual{}; usual: {}; allowed: another value, or, if it is meant, this one with `confirmed=[{!r}]`"
+    lines = [
+        line("read_scan", (key,), each.value, reason.format(each.how, each.usual, key))
+        for each in found
+        if (key := each.location[2]) not in confirmed
+    ]
+    if lines:
+        raise ConfigurationError("\n".join(lines))

@@ -153,25 +153,28 @@ def spots(summits: float, load: float) -> float:
 
 @dataclass(frozen=True)
 class RunSize:
-    """Memory and disk of the runs of a model.
+    """What runs of a model take besides the time of their power law.
 
     Parameters
     ----------
     arrays : arrays of the grid that a run holds at a time.
     summit : bytes that a run holds for every summit.
     maps : bytes in the file for every cell and snapshot, compressed.
+    sticky : U_full/dgamma below which a run takes longer, as the inverse of it.
     minutes : after which a run is taken for stuck: of a loading, of a cycle, of one that gets several cores.
     """
 
     arrays: int
     summit: int = 0
     maps: float = 0.0
+    sticky: float = 0.0
     minutes: tuple[int, int, int] = (30, 120, 240)
 
 
 RUN_SIZES = {
     "asperities": RunSize(arrays=1, summit=9 * 1024),
-    "boundary_elements": RunSize(arrays=20, maps=1.5, minutes=(240, 960, 1440)),
+    # At U_full/dgamma = 1.8, 0.72 and 0.14 runs took 1.5, 4.3 and up to 21 times as long as at 7.
+    "boundary_elements": RunSize(arrays=20, maps=1.5, sticky=3.0, minutes=(240, 960, 1440)),
 }
 
 
@@ -186,6 +189,7 @@ def run_cost(
     adhesive: bool,
     legs: int = 0,
     max_step: float = DEFAULT_STEP,
+    energy_ratio: float = math.inf,
 ) -> Cost:
     """A run of `icha.simulate`.
 
@@ -198,10 +202,13 @@ def run_cost(
     adhesive : whether the surface energy is not zero.
     legs : legs after the first loading: 0, or 1 and more for unloading and loading again.
     max_step : longest step of the mean separation, in h_rms.
+    energy_ratio : elastic energy of full contact over the work of adhesion, U_full/dgamma.
     """
     most, nodes = spots(summits, load), grid**2
     law = _law(model, adhesive=adhesive, cycle=bool(legs))
     seconds = law.seconds(nodes=nodes, spots=most, stops=stops)
+    size = RUN_SIZES[model]
+    seconds *= max(1.0, size.sticky / energy_ratio)
     steps: float = stops
     if legs:
         # Every spot comes and goes, and with adhesion each of its jumps is resolved.
@@ -211,7 +218,6 @@ def run_cost(
     kept = snapshots + bool(legs)
     disk = 60e3 + 57 * most * max(kept, 1) + 160 * steps + 20e3 * bool(legs)
     memory = _memory_before(grid) + 9 * MiB * (1 + bool(legs))
-    size = RUN_SIZES[model]
     memory += size.arrays * _DOUBLE * nodes + size.summit * summits
     disk += size.maps * nodes * kept
     return Cost(seconds, memory, disk, Recorded(steps, kept, most * kept))

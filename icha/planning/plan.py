@@ -10,6 +10,7 @@ from pathlib import Path
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_settings, run_sha256
+from icha.configuration.plausibility import energy_ratio
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
@@ -102,7 +103,8 @@ def _computed(campaign, results, files) -> Iterator[Item]:
             state, reason = DAMAGED, ""
         grid = campaign.grid(case.surface)
         sweep = _sweep_of(run_settings(campaign, case), case.rms_slope)
-        cost = run_cost(case.model, grid, summits(case.surface), **sweep)
+        ratio = energy_ratio(campaign, case) if sweep["adhesive"] else math.inf
+        cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, **sweep)
         part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
         yield Item(part, path, state, cost, costs.job_threads(grid), reason)
     for path in files.theories:

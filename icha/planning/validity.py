@@ -5,12 +5,11 @@ from functools import cache
 from pathlib import Path
 
 from icha.analysis.validity import Case, Statement, in_words_if_sticky, named, of_dataset, statements
-from icha.asperity.full_contact import full_contact_energy_ratio
 from icha.asperity.material import WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
-from icha.configuration.plausibility import full_contact_energy
+from icha.configuration.plausibility import energy_ratio
 from icha.configuration.surfaces import MeasuredSurface, SelfAffineSurface
 from icha.contact.models import MODELS
 from icha.surfaces.moments import (
@@ -122,8 +121,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
         section = campaign.materials[case.material]
-        energy = full_contact_energy(campaign, case.surface) * case.rms_slope**2
-        ratio = full_contact_energy_ratio(energy, section.contact_modulus, section.surface_energy)
+        ratio = energy_ratio(campaign, case)
         # Only of asperities it matters how far a surface is from those of the validation.
         own = facts(case.surface) if MODELS[case.model].by_summits else {}
         cases.append(Case(case.model, case.surface, case.material, {**own, "full_contact_energy_ratio": ratio}))

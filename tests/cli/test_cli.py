@@ -255,6 +255,7 @@ def test_a_scan_is_looked_at_before_anything_is_computed(project):
     lines = written.output.splitlines()
     assert Path("scan.png").read_bytes()[:4] == b"\x89PNG"
     assert "scan: read as matrix, no point is missing" in lines
+    assert any(re.match(r"scan: \d+ rows x \d+ columns of points; pixels of \S+ \S+ x ", line) for line in lines)
     noise = next(line for line in lines if "noise floor" in line)
     rms, wavelength = re.search(r"noise floor of (\S+) nm rms; waves shorter than (\S+) um are", noise).groups()
     assert float(rms) == pytest.approx(20, rel=0.1) and 0.5 < float(wavelength) < 2

@@ -57,6 +57,15 @@ def test_wrong_keys_are_named(file, keys, words):
         icha.read_scan(file, **keys)
 
 
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(("keys", "key"), [({"size": "16 m"}, "size"), ({"height_unit": "um"}, "height_unit")])
+def test_implausible_scans_need_to_be_confirmed(file, keys, key):
+    with pytest.raises(ValueError, match=rf"read_scan: {key}: .* is unusual.*`confirmed=\['{key}'\]`"):
+        icha.read_scan(file, **KEYS | keys, boundary="window")
+    if key == "height_unit":
+        assert icha.read_scan(file, **KEYS | keys, boundary="window", confirmed=[key]).rms_slope > 5
+
+
 def test_importing_the_package_loads_no_reader():
     script = "import icha, sys; print(not {'numpy', 'pydantic', 'h5py', 'SurfaceTopography'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout.strip() == "True"

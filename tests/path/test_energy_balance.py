@@ -257,6 +257,7 @@ def test_work_is_stored_or_lost_at_every_step(which):
         assert np.all(np.diff(count)[changed] > 0)
 
 
+@pytest.mark.slow
 def test_the_step_does_not_matter(monkeypatch):
     """Half the longest step, and half of all that is left unresolved, change pull-off and loss by less than 1 %."""
     coarse = united_run()
@@ -269,6 +270,7 @@ def test_the_step_does_not_matter(monkeypatch):
         assert float(fine[name]) == pytest.approx(float(coarse[name]), rel=0.01), name
 
 
+@pytest.mark.slow
 def test_next_to_no_adhesion_is_no_more_work_than_a_little():
     """Where jumps set next to nothing free, it need not be known where they happen to more than the work is known."""
     surface = icha.SelfAffineSpectrum(1e-4, 5e-5, 1.25e-5, 0.8, 1.0).realise(64, 1)

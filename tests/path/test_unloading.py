@@ -175,11 +175,11 @@ def value_of(kind, contact, waypoint):
 @pytest.mark.parametrize(
     ("kind", "back", "forth", "control"),
     [
-        ("reduced_pressure", 0.0, 0.012, "separation"),
+        pytest.param("reduced_pressure", 0.0, 0.012, "separation", marks=pytest.mark.slow),
         ("reduced_pressure", -0.002, 0.004, "load"),
-        ("relative_load", -0.003 * 1e3 / 3600, 5.0 / 3600, "separation"),
+        pytest.param("relative_load", -0.003 * 1e3 / 3600, 5.0 / 3600, "separation", marks=pytest.mark.slow),
         ("area_fraction", 0.002, 0.006, "separation"),
-        ("mean_separation", HEIGHT - 0.5, HEIGHT - 3.0, "separation"),
+        pytest.param("mean_separation", HEIGHT - 0.5, HEIGHT - 3.0, "separation", marks=pytest.mark.slow),
     ],
 )
 def test_turning_points_are_hit_exactly(kind, back, forth, control):
@@ -240,7 +240,7 @@ def scattered(count, seed):
     return contact_of(heights, 10 * side * (rng.random((count, 2)) - 0.5), period=13 * side)
 
 
-@pytest.mark.parametrize("control", ["separation", "load"])
+@pytest.mark.parametrize("control", [pytest.param("separation", marks=pytest.mark.slow), "load"])
 def test_every_state_has_the_history_of_the_states_before_it(control):
     waypoints = travelled(scattered(4, 0), [0.02], unload=True, control=control)
     for before, after in pairwise(waypoints):
@@ -410,7 +410,7 @@ class Touchy(InteractingAsperities):
 
 def touchy(lengths, farthest=np.inf):
     one = contact_of([HEIGHT], material=BARE)
-    contact = Touchy(one.law, one.asperities, one.rms_height)
+    contact = Touchy(one.law, one.asperities, one.rms_height, one.rms_slope)
     object.__setattr__(contact, "lengths", lengths)
     object.__setattr__(contact, "farthest", farthest)
     return contact

@@ -8,7 +8,7 @@ import own_slopes_campaign as crops
 import pytest
 
 from icha.contact.model import GAP_BINS, PRESSURE_BINS
-from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
+from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import count_cells
 from icha.planning import costs
@@ -60,6 +60,8 @@ def test_costs_grow_with_what_is_asked_for(model):
     assert cost(load=0.1).seconds > cost().seconds
     assert cost(legs=3).seconds > cost(legs=1).seconds > 3 * cost().seconds
     assert cost(legs=1).seconds > cost(legs=1, adhesive=False).seconds
+    sticky = cost(energy_ratio=0.138).seconds / cost(energy_ratio=10.0).seconds
+    assert 10 < sticky < 30 if MODELS[model].by_cells else sticky == 1
     assert cost(legs=1, max_step=0.01).seconds > cost(legs=1).seconds
     assert cost(grid=1024).memory > 1.1 * cost().memory
     assert cost(snapshots=9).disk > cost().disk

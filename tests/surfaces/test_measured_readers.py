@@ -159,6 +159,21 @@ def test_hdf5(tmp_path, first_axis, stored):
     assert_read(scan(path, size=SIZE, first_axis=first_axis, data="scans/first"))
 
 
+@pytest.mark.parametrize("how", ["_FillValue", "missing_value", "fillvalue"])
+@pytest.mark.parametrize("scale", [{}, {"scale_factor": 0.5, "add_offset": 3.0}])
+def test_hdf5_packed_as_netcdf(tmp_path, how, scale):
+    factor, offset = scale.get("scale_factor", 1.0), scale.get("add_offset", 0.0)
+    stored = np.rint(HEIGHTS * 1e4).astype("i4")
+    stored[3, 7] = -99999
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        data = file.create_dataset("z", data=stored, fillvalue=-99999 if how == "fillvalue" else None)
+        data.attrs.update(scale | {"units": "nm"} | ({} if how == "fillvalue" else {how: -99999}))
+    heights = scan(tmp_path / "scan.h5", size=SIZE).heights
+    assert np.argwhere(np.isnan(heights)).tolist() == [[3, 7]]
+    known = np.isfinite(heights)
+    np.testing.assert_allclose(heights[known], (stored[known] * factor + offset) * NM, rtol=1e-12)
+
+
 def waves():
     """Some waves (kx, ky, amplitude) of a real series, one of every pair of opposite ones."""
     rng = np.random.default_rng(5)

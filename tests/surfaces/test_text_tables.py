@@ -1,5 +1,6 @@
 """Texts as people and instruments write them: the heights that they hold, or the line and what to do."""
 
+import bz2
 import gzip
 
 import numpy as np
@@ -148,6 +149,182 @@ def test_a_damaged_row_is_named_by_its_line(tmp_path, damage):
     with pytest.raises(UnfitTopography, match=r"line 11") as raised:
         read(written(tmp_path, text(fields, heading=["# a remark"])))
     assert raised.value.key == "path" and "remove the line" in str(raised.value)
+
+
+# --- coordinates, commas, several images, counts, damage -------------------------------------------------------------
+
+
+def with_coordinates(along, row, column, corner):
+    fields = [[each, *line] for each, line in zip(along, rows(), strict=True)] if column else rows()
+    return [[corner, *along] if column else list(along), *fields] if row else fields
+
+
+@pytest.mark.parametrize(("row", "column", "corner"), [(1, 0, ""), (0, 1, ""), (1, 1, ""), (1, 1, "y/x")])
+@pytest.mark.parametrize(("step", "write"), [(7.5 / 128, "{:.3f}"), (1 / 3, "{:.1f}"), (0.0586, "{:.1f}")])
+def test_rounded_coordinates_are_no_heights(tmp_path, step, write, row, column, corner):
+    along = [write.format(step * k) for k in range(GRID)]
+    prepared = read(written(tmp_path, text(with_coordinates(along, row, column, corner))))
+    assert_heights(prepared)
+    left_out = " and ".join(["row"] * row + ["column"] * column)
+    assert f"first {left_out} left out" in prepared.reading
+
+
+def test_an_empty_corner_between_blanks(tmp_path):
+    along = [f"{k / 3:.2f}" for k in range(GRID)]
+    assert_heights(read(written(tmp_path, text(with_coordinates(along, 1, 1, ""), " "), "scan.txt")))
+
+
+@pytest.mark.parametrize("place", [(1, 0), (0, 1)])
+def test_unequal_coordinates_are_asked_about(tmp_path, place):
+    along = [f"{k**1.2:.3f}" for k in range(GRID)]
+    with refused("path", r"unequal steps.*Remove the"):
+        read(written(tmp_path, text(with_coordinates(along, *place, ""))))
+
+
+def test_numbers_in_the_last_column_are_refused(tmp_path):
+    with refused("path", "last column"):
+        read(written(tmp_path, text([[*row, str(k)] for k, row in enumerate(rows())])))
+
+
+def images(*channels, remark="# "):
+    """Several images in one text, as Gwyddion exports them; the first is the heights, others differ."""
+    parts = []
+    for k, (channel, unit) in enumerate(channels):
+        heading = (f"Channel: {channel}", "Width: 12.00 µm", "Height: 12.00 µm", f"Value units: {unit}")
+        heights = HEIGHTS if k == 0 else HEIGHTS[: GRID - k, : GRID - k] ** 2
+        parts.append(text(rows(heights), "\t", [remark + line for line in heading]))
+    return "\n".join(parts)
+
+
+def test_of_several_images_in_a_text_one_is_read(tmp_path):
+    path = written(tmp_path, images(("Topography", "nm"), ("Phase", "nm")), "scan.txt")
+    own = {"height_unit": None, "size": None}
+    for data in (None, "Topography"):
+        prepared = read(path, data=data, **own)
+        assert_heights(prepared)
+        assert prepared.data == "Topography" and "data Topography of several" in prepared.reading
+    other = read(path, data="Phase", **own)
+    assert other.surface.grid == GRID - 1 and other.data == "Phase"
+    with refused("data", "allowed: Topography, Phase"):
+        read(path, data="Nonsense", **own)
+    with refused("data", "allowed: Topography$"):
+        read(written(tmp_path, images(("Topography", "nm")), "scan.txt"), data="Nonsense", **own)
+
+
+def test_arrays_without_names_have_no_data(tmp_path):
+    np.save(tmp_path / "scan.npy", HEIGHTS)
+    for path in (tmp_path / "scan.npy", written(tmp_path, text(rows()))):
+        with refused("data", "leave it out"):
+            read(path, data="Nonsense")
+
+
+@pytest.mark.parametrize("between", ["\n", "# Channel B\n"])
+def test_blocks_of_rows_are_refused_but_not_empty_lines_between_all_rows(tmp_path, between):
+    with refused("path", r"2 blocks of rows, the second from line 26"):
+        read(written(tmp_path, text(rows()) + between + text(rows())))
+    assert_heights(read(written(tmp_path, between.join(text([row]) for row in rows()))))
+
+
+def decimal(write, heights=HEIGHTS):
+    return rows(heights, lambda height: write.format(height).replace(".", ","))
+
+
+@pytest.mark.parametrize(
+    ("write", "delimiter"), [('"{:.3f}"', ","), ("{:.3f}", ";"), ('"{:.3f}"', ";"), ("{:.3f}", "\t")]
+)
+def test_decimal_commas_that_are_clear(tmp_path, write, delimiter):
+    assert_heights(read(written(tmp_path, text(decimal(write), delimiter))))
+
+
+@pytest.mark.parametrize(("write", "delimiter"), [("{:.2f}", ","), ("{:.1f}", ","), ("{:.3f}", ", "), ("{:.2f}", " ")])
+def test_decimal_commas_between_commas_are_refused(tmp_path, write, delimiter):
+    with refused("path", "decimal"):
+        read(written(tmp_path, text(decimal(write), delimiter)))
+
+
+def test_integers_between_commas_are_no_decimals(tmp_path):
+    for heights in (np.rint(HEIGHTS), np.rint(HEIGHTS) + 5000, np.rint(HEIGHTS / 20) + 5):
+        assert read(written(tmp_path, text(rows(heights, "{:.0f}".format)))).surface.grid == GRID
+
+
+@pytest.mark.parametrize("delimiter", ["\t", ";"])
+def test_commas_before_three_digits_are_ambiguous(tmp_path, delimiter):
+    """1,234 is a thousand or a bit more than one; 0,234 and 1234,567 are decimal."""
+    with refused("path", "separate thousands"):
+        read(written(tmp_path, text(rows(1e4 + 10 * HEIGHTS, "{:,.0f}".format), delimiter)))
+    assert_heights(read(written(tmp_path, text(decimal("{:.3f}", HEIGHTS + 1e4), delimiter))))
+
+
+def test_a_size_with_three_digits_behind_a_comma_is_ambiguous(tmp_path):
+    heading = ["# Channel: Z", "# Width: 1,250 um", "# Height: 1,250 um", "# Value units: nm"]
+    path = written(tmp_path, text(rows(), " ", heading), "scan.txt")
+    with refused("size", "1,250 um.*thousands"):
+        read(path, size=None)
+    assert_heights(read(path))
+
+
+@pytest.mark.parametrize("line", ["nrows 30", "ncols 12", "Lines: 30", "Columns: 25"])
+def test_counts_of_a_heading_are_checked(tmp_path, line):
+    with refused("path", f"24 (rows|columns) of numbers and {line[-2:]} by its heading"):
+        read(written(tmp_path, text(rows(), " ", [line])))
+    assert_heights(read(written(tmp_path, text(rows(), " ", [f"{line[:-2]}24"]))))
+
+
+@pytest.mark.parametrize(
+    ("said", "stored"), [("-3.4028234663852886e+38", "-3.402823e+38"), ("-9999.000", "-9999"), (None, "-9999")]
+)
+def test_missing_values_agree_to_the_digits_that_are_written(tmp_path, said, stored):
+    heading = ["ncols 24", "nrows 24", "cellsize 500"] + ([f"NODATA_value {said}"] if said else [])
+    fields = rows()
+    fields[3][4] = stored
+    assert_heights(read(written(tmp_path, text(fields, " ", heading), "scan.asc")), missing=1)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-32"])
+def test_wide_characters_without_a_mark(tmp_path, encoding):
+    assert_heights(read(written(tmp_path, text(rows(), "\t"), "scan.txt", encoding)))
+
+
+def test_what_is_wrong_with_a_file_is_named(tmp_path):
+    content = text(rows(), " ").encode()
+    for damaged, words in (
+        (gzip.compress(content)[:-200], "damaged or cut off"),
+        (bz2.compress(content), "compressed by bzip2"),
+        (
+            text([[f"L{k}", *row] for k, row in enumerate(rows())]).encode(),
+            "labels in the first column.*'L0' in line 1",
+        ),
+        (
+            text([["x" * 3, *row] for row in rows()], heading=["a,b", ""]).encode(),
+            "labels in the first column.* line 3",
+        ),
+        (text(rows()).replace("\n", "]\n").encode(), r"\]' in line 1, column 24"),
+    ):
+        (tmp_path / "scan.txt").write_bytes(damaged)
+        with refused("path", words):
+            read(tmp_path / "scan.txt")
+    with refused("columns", r"^exceeds the 3 numbers of a line"):
+        read(written(tmp_path, text(points(), " "), "scan.xyz"), columns=(1, 2, 9))
+
+
+@pytest.mark.parametrize(
+    ("heading", "order"),
+    [("x [um],y [um],z [nm]", (0, 1, 2)), ("Y(um),X(um),Z(nm)", (1, 0, 2)), ("z [nm],x [um],y [um]", (2, 0, 1))],
+)
+def test_titles_of_columns_give_their_order_and_units(tmp_path, heading, order):
+    lines = [[line[k] for k in order] for line in points()]
+    path = written(tmp_path, text(lines, ",", [heading]))
+    for unit in (None, NM):
+        assert_heights(read(path, height_unit=unit, size=None))
+    wide = read(path, size=None, lateral_unit=2 * UM)
+    np.testing.assert_allclose(wide.surface.period, 2 * SIDE)
+
+
+def test_what_is_given_instead_of_what_the_file_says_is_printed(tmp_path):
+    heading = ["Unit: um", "Scan size: 10 um x 10 um"]
+    reading = read(written(tmp_path, text(rows(), " ", heading), "scan.txt")).reading
+    assert "24 rows x 24 columns" in reading and "pixels of 500 nm x 500 nm" in reading
+    assert "its size 10 um x 10 um and its unit of heights 1 um" in reading
 
 
 # --- two hundred tables, damaged at random -------------------------------------------------------------------------
