@@ -47,7 +47,7 @@ def test_a_campaign_with_the_lowest_version(tmp_path):
             (pytest.fail if os.environ.get("ICHA_REQUIRE_SNAKEMAKE") == "1" else pytest.skip)(done.stderr)
     (tmp_path / "small.yaml").write_text(CAMPAIGN)
     command = [python, "-m", "snakemake", "--snakefile", REPOSITORY / "Snakefile", "--directory", tmp_path, "dataset"]
-    for said in (f"Snakemake version: {lowest.partition('==')[2]}", "Nothing to be done"):
+    for said in ("12 of 12 steps", "Nothing to be done"):
         done = subprocess.run(
             [*map(str, command), "report", "--configfile", str(tmp_path / "small.yaml")],
             env=os.environ | {"PYTHONPATH": modules_of(REPOSITORY)},
