@@ -153,16 +153,12 @@ class AsperityObservables:
         return reasons
 
     def _departure(self, state: ContactState) -> float:
-        """Departure of the surface from the paraboloids of spots of one summit, weighted by their area."""
+        """Departure of the surface from the paraboloids of the spots of one summit."""
         spots = state.spots
         single = spots.members == 1
-        radius = spots.contact_radius[single]
-        if not np.any(radius > 0):
-            return 0.0
-        departure = paraboloid_departure(
-            self.surface, spots.position[single], radius, spots.radius_of_curvature[single]
+        return paraboloid_departure(
+            self.surface, spots.position[single], spots.contact_radius[single], spots.radius_of_curvature[single]
         )
-        return float(np.average(departure, weights=radius**2))
 
     @property
     def largest_tension(self) -> float:

@@ -241,7 +241,7 @@ def test_tops_depart_from_paraboloids_as_their_shapes_do(boundary):
 
     def departure(heights, contact_radius, radius_of_curvature):
         surface = Surface(heights - heights.mean(), PERIOD, boundary=boundary)
-        return paraboloid_departure(surface, at, np.array([contact_radius]), np.array([radius_of_curvature]))[0]
+        return paraboloid_departure(surface, at, np.array([contact_radius]), np.array([radius_of_curvature]))
 
     assert departure(-(distance**2) / 2e-5, radius, 1e-5) < 1e-3
     # A cone falls by a times its slope: here half of what the paraboloid does.
