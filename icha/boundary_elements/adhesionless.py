@@ -20,7 +20,7 @@ def pressed(
     topography: Topography,
     contact: Contact,
     *,
-    separation: float | None = None,
+    separation: float = 0.0,
     load: float | None = None,
 ) -> tuple[Contact, np.ndarray, float]:
     """The contact at a separation (cells), or under a mean pressure (E*); the gap, (n, n), and the separation in cells.
@@ -38,7 +38,6 @@ def pressed(
         If the contact does not settle.
     """
     heights, exact = topography.double, _EXACT * topography.largest
-    separation = separation or 0.0
     cells, pressure, rough = contact.cells, contact.pressure, True
     if not len(cells):
         cells = np.flatnonzero(heights > separation)

@@ -80,11 +80,7 @@ def settled(
     """
     opening = COMPLIANCE * front.strength
     margin = _CLEARLY * opening
-    stages = [(_IN_SIGHT, margin), (_NEARLY_AT_REST, 0.0), (tolerance, 0.0)]
-    if tolerance > _NEARLY_AT_REST:
-        stages[1:] = [(tolerance, margin)]
-    if near:
-        del stages[:2]
+    stages = _stages(tolerance, margin, near)
 
     def in_windows(contact, gap, restless):
         return relaxed_in_windows(space, front, separation, contact, gap, restless)
@@ -119,6 +115,14 @@ def settled(
                 break
             contact = held(space, topography, separation, relaxed, _ROUGHLY * opening, since=contact)
             made, new, _ = _new_contact(summits, contact, margin, tried)
+
+
+def _stages(tolerance, margin, near):
+    """Accuracies to which fronts come to rest, in order, and how clearly new contact is within reach then."""
+    stages = [(_IN_SIGHT, margin), (_NEARLY_AT_REST, 0.0), (tolerance, 0.0)]
+    if tolerance > _NEARLY_AT_REST:
+        stages[1:] = [(tolerance, margin)]
+    return stages[2:] if near else stages
 
 
 def _new_contact(summits, state, margin, tried):
