@@ -1,17 +1,21 @@
 """Scans: what is told of them before anything is computed, and their section in a new campaign."""
 
+from __future__ import annotations
+
 import json
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from icha.cli.project import Mistake
-from icha.contact.models import Model
 from icha.support import in_words
 from icha.support.in_words import printable
 from icha.support.input_files import flaw_of_path
+
+if TYPE_CHECKING:
+    from icha.contact.models import Model
 
 # Endings of the pictures that can be drawn.
 PICTURES = (".png", ".pdf", ".svg")

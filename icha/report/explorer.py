@@ -134,7 +134,7 @@ def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[l
     for contact, runs in contacts.items():
         kind = contact._replace(seed=0)
         rank[kind] = rank.get(kind, -1) + 1
-        ranked.append((rank[kind], sorted(runs, key=lambda run: MODELS.index(run.model))))
+        ranked.append((rank[kind], sorted(runs, key=lambda run: list(MODELS).index(run.model))))
     return [runs for _, runs in sorted(ranked, key=lambda pair: pair[0])]
 
 

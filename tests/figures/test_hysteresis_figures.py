@@ -244,7 +244,7 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree, quantity):
     assert not bars(sticky, 1)
     dots = next(line for line in left.get_lines() if line.get_marker() == ".")
     np.testing.assert_allclose(sorted(dots.get_ydata()), sorted(values.ravel()))
-    assert left.get_title("right") == "interacting asperities"
+    assert left.get_title("right") == "asperities"
     assert np.all(bare[0].get_ydata() == 0) and bare[0].get_markerfacecolor() == "white"
 
     sticky, bare = right.containers
