@@ -9,8 +9,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import numpy as np
-
 # Largest error of an equilibrium of asperities, in units of h_rms.
 RESIDUAL_TOLERANCE = 1e-9
 # Of what a load is made up of, the part below which it counts as none when its error is measured.
@@ -79,7 +77,7 @@ class Model:
     references: str
     module: str
     folder: str = ""
-    variables: Mapping[str, tuple[tuple[str, ...], str, str, type]] = field(default_factory=dict)
+    variables: Mapping[str, tuple[tuple[str, ...], str, str, str]] = field(default_factory=dict)
     stiffness_error: float = 1e-6
     by_summits: bool = False
     by_cells: bool = False
@@ -121,11 +119,11 @@ MODELS = {
                 "1",
                 "largest deviation from 1, along the edges of contact, of sqrt(energy release rate over surface "
                 "energy)",
-                float,
+                "float64",
             ),
-            "gap_residual": (("step",), "1", "largest gap in contact, or overlap out of contact, over h_rms", float),
-            "contact_map": (_MAP, "1", "part of the cell that is in contact", np.float32),
-            "contact_pressure": (_MAP, "Pa", "pressure in the cell, negative in tension", np.float32),
+            "gap_residual": (("step",), "1", "largest gap in contact, or overlap out of contact, over h_rms", "float64"),
+            "contact_map": (_MAP, "1", "part of the cell that is in contact", "float32"),
+            "contact_pressure": (_MAP, "Pa", "pressure in the cell, negative in tension", "float32"),
         },
         stiffness_error=1e-4,
         by_cells=True,

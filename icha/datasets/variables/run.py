@@ -127,7 +127,7 @@ RUN = {
 
 # Besides, what the runs of a model have ...
 FURTHER = {
-    name: {key: Variable(*description) for key, description in model.variables.items()}
+    name: {key: Variable(*own, np.dtype(kind).type) for key, (*own, kind) in model.variables.items()}
     for name, model in MODELS.items()
 }
 OF_MODELS = {key: description for table in FURTHER.values() for key, description in table.items()}
