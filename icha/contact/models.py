@@ -121,7 +121,12 @@ MODELS = {
                 "energy)",
                 "float64",
             ),
-            "gap_residual": (("step",), "1", "largest gap in contact, or overlap out of contact, over h_rms", "float64"),
+            "gap_residual": (
+                ("step",),
+                "1",
+                "largest gap in contact, or overlap out of contact, over h_rms",
+                "float64",
+            ),
             "contact_map": (_MAP, "1", "part of the cell that is in contact", "float32"),
             "contact_pressure": (_MAP, "Pa", "pressure in the cell, negative in tension", "float32"),
         },
