@@ -200,7 +200,7 @@ def _resolution(cases):
             f"boundary elements have few grid cells for the shortest waves ({places}), with which areas are off by "
             f"{error_of_cells(min(few.values()))}; {RESOLVED_CELLS} recommended"
         )
-        yield Statement("resolution", text, False)
+        yield Statement("grid", text, False)
 
 
 def _surfaces(cases):

@@ -40,7 +40,7 @@ def error_of_cells(cells_per_short_wave: float) -> str:
     Measured against grids four times as fine, on random surfaces at p* = 1e-3 and 1e-2: up to 93 % at 1.1 cells (white
     noise), 23 % at 2, 15 % at 3, 11 % at 5.
     """
-    if cells_per_short_wave >= RESOLVED_CELLS:
+    if cells_per_short_wave >= 0.9 * RESOLVED_CELLS:  # the number of summits gives it to a tenth
         return ""
     if cells_per_short_wave >= 4:
         return "a few per cent"
