@@ -57,6 +57,14 @@ def test_words_for_missing_points(tmp_path, word, delimiter):
     assert_heights(read(written(tmp_path, text(fields, delimiter))), missing=1)
 
 
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_an_empty_field_in_every_row_keeps_its_place(tmp_path, delimiter):
+    fields = rows()
+    for k, row in enumerate(fields):
+        row[-1 - k] = ""
+    assert_heights(read(written(tmp_path, text(fields, delimiter))), missing=GRID)
+
+
 @pytest.mark.parametrize("step", [1, 0.5])
 @pytest.mark.parametrize("corner", [None, "", "0", "y/x"])
 def test_numbers_and_coordinates_of_rows_and_columns_are_no_heights(tmp_path, step, corner):

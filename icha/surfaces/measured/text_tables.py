@@ -255,7 +255,10 @@ def _are_halves(rows):
     Those behind have no sign, and in each column one number of digits. That tells them from integers if some of them
     begin with a zero, or if those before have another number of digits.
     """
-    if len(rows[0]) < 6 or len(rows[0]) % 2:
+    # A row whose last field is empty is shorter.
+    width = max(map(len, rows))
+    rows = [row for row in rows if len(row) == width]
+    if width < 6 or width % 2:
         return False
     columns = list(zip(*rows, strict=True))
     evidence = False
