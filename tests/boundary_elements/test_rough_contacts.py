@@ -116,7 +116,9 @@ def sphere(grid, centre):
     return icha.Surface(-(np.add.outer(y**2, x**2)) * (1e-4 / grid) ** 2 / 4e-4, 1e-4)
 
 
-@pytest.mark.parametrize("centre", [(0.0, 0.0), (0.5, 0.5)], ids=["at a node", "between four"])
+@pytest.mark.parametrize(
+    "centre", [pytest.param((0.0, 0.0), marks=pytest.mark.slow), (0.5, 0.5)], ids=["at a node", "between four"]
+)
 def test_sphere_in_the_middle_of_a_cell_can_be_pulled_off(centre):
     """Symmetric cells come to their limits together: the front must be let run when its equilibrium is lost."""
     material = icha.Material(contact_modulus=1e6, surface_energy=1e-2, interaction_range=20e-9)
@@ -159,7 +161,7 @@ def test_an_area_of_few_cells_is_met_to_two_of_them():
     assert caught.value.dataset.step_target == [0.02]
 
 
-@pytest.mark.parametrize("slope", [1.0, 1e-9])
+@pytest.mark.parametrize("slope", [pytest.param(1.0, marks=pytest.mark.slow), 1e-9])
 def test_no_load_is_as_little_on_flat_surfaces_as_on_steep_ones(slope):
     steep = rough(48, 6)
     factor = slope / steep.rms_slope
