@@ -7,6 +7,7 @@ campaign is run, after it, and on top of its report.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +16,7 @@ import numpy as np
 from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, MEANING
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.contact.models import DEFAULT_MODEL, MODELS
+from icha.datasets.attributes import reasons_not_applicable
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS
 from icha.support.in_words import counted
@@ -190,9 +192,9 @@ def _full_contact(cases):
 def _resolution(cases):
     """The statement on boundary elements with few grid cells for the shortest waves."""
     few = {
-        case.surface: case.facts.get("nodes_per_short_wave", math.inf)
+        case.surface: cells
         for case in cases
-        if MODELS[case.model].by_cells and error_of_cells(case.facts.get("nodes_per_short_wave", math.inf))
+        if MODELS[case.model].by_cells and error_of_cells(cells := case.facts.get("nodes_per_short_wave", math.inf))
     }
     if few:
         places = named(f"{cells:.2g} on {surface}" for surface, cells in few.items())
@@ -266,14 +268,9 @@ def of_dataset(campaign: xr.DataTree) -> list[Statement]:
 
 def _not_applicable(campaign):
     """The statement on the runs to which their model is not applicable."""
-    reasons: dict[str, int] = {}
-    for node in campaign.children.values():
-        if "applicability" in node:  # which campaigns of earlier versions lack
-            for reason in filter(None, node["applicability"].values.ravel().astype(str)):
-                reasons[reason] = reasons.get(reason, 0) + 1
+    reasons = sum(map(reasons_not_applicable, campaign.children.values()), Counter())
     if reasons:
-        count = sum(reasons.values())
-        text = f"{counted(count, 'run')} to which the model is not applicable: {named(reasons, '. ')}"
+        text = f"{counted(reasons.total(), 'run')} to which the model is not applicable: {named(reasons, '. ')}"
         yield Statement("applicability", text, False)
 
 

@@ -42,6 +42,7 @@ from icha.contact.model import (
     Events,
     NotConverged,
     gap_bins,
+    largest_tension,
     summit_counts,
 )
 from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
@@ -334,9 +335,9 @@ class PatchObservables:
 
     @property
     def largest_tension(self) -> float:
-        """Tension of all asperities pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
-        sum_of_radii = float(np.sum(self.contact.asperities.radius_of_curvature))
-        return 1.5 * np.pi * self.contact.law.material.surface_energy * sum_of_radii / self.contact.area
+        """Tension of all summits pulling their most at once, Pa."""
+        contact = self.contact
+        return largest_tension(contact.asperities, contact.law.material.surface_energy, contact.area)
 
     def _gap_density(self, state, cells):
         """Density of the gap over the nominal area, outside contact: with the area, it is whole."""

@@ -72,8 +72,7 @@ def check_loop(run) -> Iterator[Finding]:
         "pull-off pressure against the largest tension of the last unloading, over the largest pressure there",
     )
     # What asperities unite by a rule patches do by themselves, and as they came.
-    united = model_of(run.attrs).unites and int(run["coalescence_count"][-1]) > 0
-    if float(run["surface_energy"]) == 0 and not united:
+    if float(run["surface_energy"]) == 0 and not _has_united(run):
         yield (
             "loop closes",
             abs(loss) / scale,
@@ -82,12 +81,16 @@ def check_loop(run) -> Iterator[Finding]:
         )
 
 
+def _has_united(run):
+    """Whether spots have united by a rule, which may cost or gain a little energy."""
+    return model_of(run.attrs).unites and int(run["coalescence_count"][-1]) > 0
+
+
 def _losses(run, scale):
     """Findings on the loss of a loop and its parts: a passive contact gives back no more work than was put in."""
     unknown = IDENTITY_LIMIT + (_left_open(run) + _error_of_work(run)) / scale
     tolerance = min(unknown, LARGEST_UNKNOWN_WORK)
-    united = model_of(run.attrs).unites and int(run["coalescence_count"][-1]) > 0
-    with_unions = max(tolerance, UNION_LIMIT) if united else tolerance
+    with_unions = max(tolerance, UNION_LIMIT) if _has_united(run) else tolerance
 
     def gain(loss):
         return -min(loss, 0.0) / scale

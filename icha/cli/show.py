@@ -7,7 +7,7 @@ import typer
 
 from icha.cli.project import Mistake, say
 from icha.cli.scans import check_picture
-from icha.datasets.attributes import why_no_result
+from icha.datasets.attributes import reasons_not_applicable, why_no_result
 from icha.support.in_words import counted, printable
 
 _BARS = " ▁▂▃▄▅▆▇█"
@@ -162,12 +162,9 @@ def _show_campaign(tree, file) -> None:
             values = study[variable].values
             if (known := values[values == values]).size:
                 say(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
-        if "applicability" in study and (count := int((study["applicability"] != "").sum())):
-            reasons = dict.fromkeys(filter(None, study["applicability"].values.ravel().astype(str)))
-            say(
-                f"  model not applicable to {counted(count, 'run')}: {printable('. '.join(list(reasons)[:3]))}",
-                fg="red",
-            )
+        if reasons := reasons_not_applicable(study):
+            some = printable(". ".join(list(reasons)[:3]))
+            say(f"  model not applicable to {counted(reasons.total(), 'run')}: {some}", fg="red")
         if "failure" in study:
             for where in zip(*(study["failure"] != "").values.nonzero(), strict=True):
                 labels = map(str, labels_at(study, where, study["failure"].dims))

@@ -187,6 +187,11 @@ def summit_counts(asperities: Asperities) -> dict[str, int]:
     return {"asperity_count": len(asperities), "unsupported_summit_count": len(asperities.unsupported_height)}
 
 
+def largest_tension(asperities: Asperities, surface_energy: float, area: float) -> float:
+    """Tension of all summits pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
+    return 1.5 * np.pi * surface_energy * float(np.sum(asperities.radius_of_curvature)) / area
+
+
 # Bins in which gaps and pressures are counted, the same for every model.
 #
 # Of the gap in units of h_rms: one from zero, then 20 per decade. Of the pressure in units of E* h'_rms: linear in the

@@ -63,7 +63,7 @@ class Model:
     folder : of its runs, beside those of the default model; ends with a slash unless it is empty.
     variables : what its runs have besides those of all models: dimensions, unit, long name and type by name.
     stiffness_error : largest relative error of the contact stiffness.
-    by_summits : whether it stands for a surface by its summits: then a run says where it is not applicable.
+    by_summits : whether summits stand for the surface.
     by_cells : whether contact is counted in cells of the grid: its runs then have a map of the contact.
     unites : whether spots unite by a rule, which may cost or gain a little energy.
     periodic_only : whether it cannot press a square with free edges.

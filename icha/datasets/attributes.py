@@ -1,10 +1,11 @@
-"""Global attributes of every file, so that it can be found and understood by itself; and the paper of the model.
+"""Global attributes of every file, so that it can be found and understood by itself, and what they say of runs.
 
 They are those of the CF conventions, section 2.6.2, and of the Attribute Convention for Data Discovery (ACDD 1.3) as
 far as they apply. Those of place and time do not; who made a file and when is said of a publication as a whole. So ACDD
 is not among the conventions that a file claims to follow.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 
@@ -24,6 +25,13 @@ INPUT, COMPUTED, COLLECTED, DERIVED, THEORY = (
 def why_no_result(attrs: Mapping) -> str:
     """Return why a run is no result, by its attributes: it ended early, or its checks failed; "" if it is one."""
     return str(attrs.get("incomplete") or attrs.get("failed_checks", ""))
+
+
+def reasons_not_applicable(study: Mapping) -> Counter[str]:
+    """Count the runs of a study to which their model is not applicable, by the reason; none in earlier versions."""
+    if "applicability" not in study:
+        return Counter()
+    return Counter(filter(None, study["applicability"].values.ravel().astype(str).tolist()))
 
 
 def discovery(

@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, summit_counts
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, largest_tension, summit_counts
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.equations import derivative, held_value, stored_energy
 from icha.equilibrium.equilibrium import equilibrium
@@ -162,9 +162,9 @@ class AsperityObservables:
 
     @property
     def largest_tension(self) -> float:
-        """Tension of all asperities pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
-        sum_of_radii = float(np.sum(self.contact.asperities.radius_of_curvature))
-        return 1.5 * np.pi * self.contact.law.material.surface_energy * sum_of_radii / self.contact.area
+        """Tension of all summits pulling their most at once, Pa."""
+        contact = self.contact
+        return largest_tension(contact.asperities, contact.law.material.surface_energy, contact.area)
 
 
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:

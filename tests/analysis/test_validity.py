@@ -147,3 +147,15 @@ def test_the_data_say_where_spots_lay_outside():
     found = {each.about: each for each in of_dataset(campaign_tree(runs, attrs=small.tree().attrs))}
     assert found["jump-in"].text.endswith("; outside: soft on rough (40 % of single spots)")
     assert not found["jump-in"].good
+
+
+def test_the_data_say_to_which_runs_their_model_is_not_applicable():
+    assert "applicability" not in {each.about for each in of_dataset(small.tree())}
+    runs = [
+        (labels, run.assign_attrs(applicability=f"{labels.material} surface") if labels.seed == 1 else run)
+        for labels, run in small.runs()
+    ]
+    marked = [labels.material for labels, _ in runs if labels.seed == 1]
+    found = {each.about: each for each in of_dataset(campaign_tree(runs, attrs=small.tree().attrs))}["applicability"]
+    assert not found.good and found.text.startswith(f"{len(marked)} runs to which the model is not applicable: ")
+    assert all(f"{material} surface" in found.text for material in marked)
