@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from icha.cli.project import Mistake
 from icha.support import in_words
 from icha.support.in_words import printable
-from icha.support.input_files import flaw_of_path
+from icha.support.input_files import problem_with_path
 
 if TYPE_CHECKING:
     from icha.contact.models import Model
@@ -174,8 +174,8 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
 
 
 def _check_file(path):
-    if flaw := flaw_of_path(path):
-        raise Mistake(f"--measured {path}: {flaw}; allowed: a file that holds a topography")
+    if problem := problem_with_path(path):
+        raise Mistake(f"--measured {path}: {problem}; allowed: a file that holds a topography")
     with path.open("rb") as file:
         if not file.read(_BEGINNING).strip():
             raise Mistake(f"--measured {path}: the file is empty; allowed: one that holds a topography")

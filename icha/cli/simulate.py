@@ -8,7 +8,7 @@ import typer
 from icha.cli.project import FAILED, Mistake
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import why_no_result
-from icha.support.input_files import flaw_of_path
+from icha.support.input_files import problem_with_path
 
 
 def _length(value: str | None) -> float | None:
@@ -84,8 +84,8 @@ def simulate(
     holds the stops that were reached, and says why there are no more.
     """
     for path in (output, surface):
-        if path is not None and path.exists() and (flaw := flaw_of_path(path)):
-            raise Mistake(f"{path}: {flaw}; allowed: a file")
+        if path is not None and path.exists() and (problem := problem_with_path(path)):
+            raise Mistake(f"{path}: {problem}; allowed: a file")
     if output.exists() and not force:
         raise Mistake(f"{output} is there already; --force replaces it")
     if not output.absolute().parent.is_dir():
