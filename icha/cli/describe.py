@@ -10,14 +10,14 @@ from icha.cli.project import (
     Config,
     Cores,
     Folder,
-    Mistake,
+    UserError,
     configuration_path,
     core_count,
+    echo,
     markup,
     profile_settings,
     project,
     read_configuration,
-    say,
     shown,
     workflow_folder,
 )
@@ -62,7 +62,7 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
     measured = {name: section for name, section in pressed.items() if isinstance(section, MeasuredSurface)}
     if not measured:
         if plot is not None:
-            raise Mistake("--plot: draws measured surfaces; the campaign presses none")
+            raise UserError("--plot: draws measured surfaces; the campaign presses none")
         return
     from icha.contact.models import MODELS
     from icha.surfaces.measured.resolution import scan_resolution
@@ -71,15 +71,15 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
     for case in run_cases(campaign):
         models.setdefault(case.surface, []).append(MODELS[case.model])
     scans = {name: scan_resolution(section.path, section.preparation) for name, section in measured.items()}
-    say("")
+    echo("")
     for name, scan in scans.items():
         for line in about_scan(name, scan, models=models[name]):
-            say(line)
+            echo(line)
     if plot is not None:
         from icha.cli.quick_plot import draw_scans
 
         draw_scans(scans, plot)
-        say(f"drawn: {shown(plot)}")
+        echo(f"drawn: {shown(plot)}")
 
 
 def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: bool = False, profile=None) -> None:

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from icha.cli.project import Mistake
+from icha.cli.project import UserError
 from icha.support import formatting
 from icha.support.formatting import format_count, printable
-from icha.support.input_files import flaw_of_path
+from icha.support.input_files import problem_with_path
 
 if TYPE_CHECKING:
     from icha.contact.models import Model
@@ -30,9 +30,9 @@ _BEGINNING = 2**16
 
 
 def check_picture(path: Path | None) -> None:
-    """Raise `Mistake` unless the path, if there is one, ends as a picture."""
+    """Raise `UserError` unless the path, if there is one, ends as a picture."""
     if path is not None and path.suffix not in PICTURES:
-        raise Mistake(f"--plot {path}: ends in {path.suffix!r}; allowed: {', '.join(PICTURES)}")
+        raise UserError(f"--plot {path}: ends in {path.suffix!r}; allowed: {', '.join(PICTURES)}")
 
 
 def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
@@ -136,7 +136,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
 
     Raises
     ------
-    Mistake
+    UserError
         If it can be read by no setting, or has no topography that can be used.
     """
     import numpy as np
@@ -153,7 +153,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     try:
         resolution = scan_resolution(path, how)
     except UnfitTopography as error:
-        raise Mistake(f"--measured {path}: {error.key} {error}") from None
+        raise UserError(f"--measured {path}: {error.key} {error}") from None
 
     taken = data if data is not None else scan.data
     lines = [f"data: {json.dumps(taken)}"] if taken else []
@@ -174,11 +174,11 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
 
 
 def _check_file(path):
-    if flaw := flaw_of_path(path):
-        raise Mistake(f"--measured {path}: {flaw}; allowed: a file that holds a topography")
+    if problem := problem_with_path(path):
+        raise UserError(f"--measured {path}: {problem}; allowed: a file that holds a topography")
     with path.open("rb") as file:
         if not file.read(_BEGINNING).strip():
-            raise Mistake(f"--measured {path}: the file is empty; allowed: one that holds a topography")
+            raise UserError(f"--measured {path}: the file is empty; allowed: one that holds a topography")
 
 
 def _read(path, data):
@@ -194,7 +194,7 @@ def _read(path, data):
         except UnfitTopography as error:
             if error.key not in _GUESSES or error.key in assumed:
                 how = "; say which by --data NAME" if error.key == "data" else ""
-                raise Mistake(f"--measured {path}: {error.key} {error}{how}") from None
+                raise UserError(f"--measured {path}: {error.key} {error}{how}") from None
             assumed[error.key] = _GUESSES[error.key]
             missing[error.key] = str(error)
     if "size" in missing:
