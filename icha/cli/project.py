@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from icha.support.in_words import printable_lines
-from icha.support.input_files import flaw_of_path
+from icha.support.formatting import printable_lines
+from icha.support.input_files import problem_with_path
 from icha.support.program import own_workflow
 
 Config = Annotated[
@@ -163,7 +163,7 @@ def configuration_path(asked: str | None) -> Path:
     if asked in there:
         return shown(there[asked])
     if Path(asked).exists():
-        raise UserError(f"{asked}: {flaw_of_path(asked)}; allowed: a YAML file, or the name of a campaign")
+        raise UserError(f"{asked}: {problem_with_path(asked)}; allowed: a YAML file, or the name of a campaign")
     raise UserError(
         f"{asked}: no such file and no campaign of that name; there are: {', '.join(sorted(there))}. `icha new NAME` "
         "writes a campaign to start from"
