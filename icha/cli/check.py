@@ -7,7 +7,7 @@ import typer
 
 from icha.cli.project import FAILED, WRONG, echo
 from icha.deposit.verify import CHECKSUMS
-from icha.support.in_words import counted, printable
+from icha.support.formatting import format_count, printable
 
 
 def check(
@@ -40,11 +40,11 @@ def check(
             found, tested = [f"is of another format: {error!r}"], 0
         if found:
             status = max(status, FAILED)
-            echo(f"{file}: {kind}, {counted(len(found), 'flaw')}", fg="red")
+            echo(f"{file}: {kind}, {format_count(len(found), 'flaw')}", fg="red")
             for flaw in found:
                 echo(f"    {printable(flaw)}")
         else:
-            numbers = f" ({counted(tested, 'check')} of its numbers)" if tested else ""
+            numbers = f" ({format_count(tested, 'check')} of its numbers)" if tested else ""
             echo(f"{file}: {kind}, all is well{numbers}")
     if status:
         raise typer.Exit(status)

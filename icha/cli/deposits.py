@@ -16,8 +16,8 @@ import typer
 
 from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirmed, echo, shown
 from icha.cli.run import run
-from icha.support import in_words
-from icha.support.in_words import counted, printable
+from icha.support import formatting
+from icha.support.formatting import format_count, printable
 
 TOKEN = "ZENODO_TOKEN"
 _MOST_PROBLEMS = 100
@@ -41,7 +41,7 @@ def verify(deposit: Deposit, large: Large = False) -> None:
             echo(f"{printable(deposit)}: whole: {_size_of(folder)}")
     except Damaged as damaged:
         echo(_listed(damaged.args))
-        echo(f"{printable(deposit)}: not whole: {counted(len(damaged.args), 'problem')}", err=True, fg="red")
+        echo(f"{printable(deposit)}: not whole: {format_count(len(damaged.args), 'problem')}", err=True, fg="red")
         raise typer.Exit(FAILED) from None
 
 
@@ -60,7 +60,9 @@ def _size_of(folder: Path) -> str:
     from icha.deposit.verify import files_of
 
     files = files_of(folder)
-    return f"{counted(len(files), 'file')}, {in_words.size(sum((folder / file).stat().st_size for file in files))}"
+    return (
+        f"{format_count(len(files), 'file')}, {formatting.size(sum((folder / file).stat().st_size for file in files))}"
+    )
 
 
 def _listed(problems: tuple[str, ...]) -> str:
@@ -165,7 +167,7 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
         )
     echo(f"is run:     the ICHA that is installed, {version('icha')}; nothing in the deposit is executed")
     if changed := changed_files(original):
-        echo(f"            (the deposit's source differs from it in {counted(changed, 'file')})", fg="yellow")
+        echo(f"            (the deposit's source differs from it in {format_count(changed, 'file')})", fg="yellow")
     echo(f"can touch:  {shown(folder) if folder else 'a temporary folder'}")
 
 
@@ -188,7 +190,7 @@ def _report(comparison) -> bool:
     from icha.deposit.compare import DIFFERENT, IDENTICAL, TOLERANCE, table
 
     echo(f"\nthe deposit, and what was computed again:\n\n{table(comparison)}\n")
-    files = counted(len(comparison.files), "file")
+    files = format_count(len(comparison.files), "file")
     if not comparison.files or comparison.verdict == DIFFERENT:
         echo("different: not everything is reproduced", fg="red")
         return False
@@ -254,7 +256,7 @@ def upload(
             rows = {"to": f"{address}, {place}", **summary_of(metadata)}
             for path in files:
                 size = path.stat().st_size
-                rows[path.name] = f"{in_words.size(size)} ({size:,} bytes)"
+                rows[path.name] = f"{formatting.size(size)} ({size:,} bytes)"
             _refuse_foreign_doi(metadata, draft)
             echo("\n".join(f"{name + ':':<11}{printable(value or 'none')}" for name, value in rows.items()))
             if not yes and not sys.stdin.isatty():

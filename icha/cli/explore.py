@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import UserError, echo
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 
 
 def explore(
@@ -53,11 +53,11 @@ def explore(
         raise UserError(str(reason)) from None
     except ValueError as error:
         raise UserError(f"{error}; `icha run` computes what is missing") from None
-    echo(f"{page}: {counted(written.shown, 'contact')}, {written.size / 1e6:.1f} MB")
+    echo(f"{page}: {format_count(written.shown, 'contact')}, {written.size / 1e6:.1f} MB")
     if written.left_out:
         echo(
-            f"left out, as the page would be larger than {size:g} MB: {counted(written.left_out, 'contact')}. "
+            f"left out, as the page would be larger than {size:g} MB: {format_count(written.left_out, 'contact')}. "
             "--study, --surface, --material and --seed choose others, --size allows more"
         )
     if written.without_steps:
-        echo(f"left out, as their runs reached no stop: {counted(written.without_steps, 'contact')}")
+        echo(f"left out, as their runs reached no stop: {format_count(written.without_steps, 'contact')}")

@@ -33,7 +33,7 @@ from icha.cli.project import (
     workflow_folder,
 )
 from icha.support.atomic_files import in_the_way
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -150,7 +150,7 @@ def run(
 
 
 def _refuse_results_of_another(results: Path, name: str, path: Path, workflow: Path) -> None:
-    from icha.planning.belonging import belongs_to_another
+    from icha.planning.ownership import belongs_to_another
 
     if reason := belongs_to_another(shown(results), name, path, workflow):
         raise UserError(f"{reason} Nothing was begun")
@@ -172,7 +172,7 @@ def _ask_if_wanting(items, asked: list[str], cores: int, results: Path, profile:
     UserError
         If nobody is there to be asked, or says no.
     """
-    from icha.planning.needs import wanting
+    from icha.planning.requirements import wanting
 
     if "surfaces" in asked:
         items = [item for item in items if item.part == "surfaces"]
@@ -217,7 +217,7 @@ def _planned(said: str) -> str:
         return "\n".join([*again, "and what is made from it"]) if again else nothing
     listed = ", ".join(f"{number} {rule}" for rule, number in counts.items())
     would = "would run, those included that a changed program makes anew"
-    return "\n".join([*again, f"{counted(sum(counts.values()), 'job')} {would}: {listed}"])
+    return "\n".join([*again, f"{format_count(sum(counts.values()), 'job')} {would}: {listed}"])
 
 
 def _refuse_unknown(said: str, asked: list[str], campaign) -> None:
@@ -325,7 +325,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
     """Print what has become of the campaign, and in how many seconds of those that were promised."""
     from icha.cli.live import reason_of
     from icha.planning.plan import failed_runs
-    from icha.support import in_words
+    from icha.support import formatting
     from icha.support.atomic_files import why_not_writable
 
     results = folder / "results" / campaign.name
@@ -335,17 +335,19 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
     if status == 0 and watch.started is None:
         echo("Nothing to do: everything that was asked for is there and up to date.")
     elif ended:
-        took = in_words.duration(watch.clock() - watch.called)
-        beside = f"; about {in_words.duration(promised)} were expected" if promised and ended == watch.job_count else ""
-        echo(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}{beside}")
+        took = formatting.duration(watch.clock() - watch.called)
+        beside = (
+            f"; about {formatting.duration(promised)} were expected" if promised and ended == watch.job_count else ""
+        )
+        echo(f"{len(watch.done)} of {format_count(watch.job_count, 'job')} done in {took}{beside}")
     incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
     if incomplete:
-        _heading(f"{counted(len(incomplete), 'run')} without a result:")
+        _heading(f"{format_count(len(incomplete), 'run')} without a result:")
         for path, reason in incomplete.items():
             _reason(path, [reason])
     failed = [job for job in watch.failed if not stopped or reason_of(job, folder)]
     if failed:
-        _heading(f"{counted(len(failed), 'job')} failed:")
+        _heading(f"{format_count(len(failed), 'job')} failed:")
         for job in failed:
             logs = ", ".join(str(shown(folder / name)) for name in job.logs)
             # The verdict repeats the runs that were just listed.
@@ -366,7 +368,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
         _heading("Snakemake could not go on:" if ended else "Snakemake could not start:")
         _reason(None, _last_words(log.read_text(encoding="utf-8", errors="replace")))
     elif status and kept_back:
-        echo(f"{counted(kept_back, 'job')} not done, since they need what failed")
+        echo(f"{format_count(kept_back, 'job')} not done, since they need what failed")
     # Where nothing was made, what is there is of another day.
     made = (
         ("figures", results / "figures"),

@@ -8,7 +8,7 @@ import typer
 from icha.cli.project import UserError, echo
 from icha.cli.scans import check_picture
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
-from icha.support.in_words import counted, printable
+from icha.support.formatting import format_count, printable
 
 _BARS = " ▁▂▃▄▅▆▇█"
 _WIDTH = 60
@@ -164,7 +164,7 @@ def _show_campaign(tree, file) -> None:
                 echo(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
         if reasons := reasons_not_applicable(study):
             some = printable(". ".join(list(reasons)[:3]))
-            echo(f"  model not applicable to {counted(reasons.total(), 'run')}: {some}", fg="red")
+            echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {some}", fg="red")
         if "failure" in study:
             for where in zip(*(study["failure"] != "").values.nonzero(), strict=True):
                 labels = map(str, labels_at(study, where, study["failure"].dims))

@@ -180,15 +180,16 @@ def _refuse_too_large(grid: int, waves: float, model: str) -> None:
     `waves` are the shortest ones along a side: some twenty numbers are held for each wave of the spectrum.
     """
     from icha.planning.costs import RUN_SIZES, surface_cost
-    from icha.planning.needs import memory_of_machine
-    from icha.support import in_words
+    from icha.planning.requirements import memory_of_machine
+    from icha.support import formatting
 
     arrays = 8 * RUN_SIZES[model].arrays * grid**2
     needed, there = max(surface_cost(grid).memory, arrays, 8 * 20 * waves**2), memory_of_machine()
     if needed > there:
         raise ValueError(
-            f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about {in_words.size(needed)} "
-            f"of memory, and this machine has {in_words.size(there)}; choose a smaller --grid or a longer --short"
+            f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about "
+            f"{formatting.size(needed)} of memory, and this machine has {formatting.size(there)}; "
+            "choose a smaller --grid or a longer --short"
         )
 
 

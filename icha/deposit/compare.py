@@ -27,7 +27,7 @@ from icha.checks.run import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.deposit.verify import COMPUTED, files_of
 from icha.support.atomic_files import whole_file
 from icha.support.checksums import sha256_of
-from icha.support.in_words import printable
+from icha.support.formatting import printable
 from icha.support.input_files import refuse_traps
 
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (

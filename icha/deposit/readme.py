@@ -29,8 +29,8 @@ from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE
 from icha.deposit.metadata import TABLES, acknowledgement, known_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
-from icha.planning.needs import further_software
-from icha.support import in_words
+from icha.planning.requirements import further_software
+from icha.support import formatting
 
 _TEMPLATE = "README.md.jinja"
 # Placeholders for what differs between files of one kind.
@@ -216,8 +216,8 @@ def _template() -> jinja2.Template:
         "link": _link,
         "number": "{:.4g}".format,
         "value": "{:z.2g}".format,
-        "size": in_words.size,
-        "duration": in_words.duration,
+        "size": formatting.size,
+        "duration": formatting.duration,
         "span": _span,
         "seeds": _seeds,
         "few": _few,

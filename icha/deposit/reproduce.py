@@ -20,7 +20,7 @@ from icha.datasets.results import CONFIGURATION
 from icha.deposit.program import PROGRAM, differences, program_files
 from icha.deposit.verify import CHECKSUMS, COMPUTED, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 from icha.support.input_files import refuse_traps
 from icha.support.program import own_workflow
 from icha.support.values import NAME_PATTERN
@@ -103,7 +103,7 @@ def asked_runs(only: Iterable[str], deposit: Path) -> list[str]:
             such_as = f", such as {runs[0].removeprefix('runs/').removesuffix('.nc')}" if runs else ""
             raise Refused(
                 f"--only {asked}: the deposit has no such run; allowed: {SMALLEST}, or one of its "
-                f"{counted(len(runs), 'run')}{such_as}"
+                f"{format_count(len(runs), 'run')}{such_as}"
             )
         found.append(path)
     return list(dict.fromkeys(found))
