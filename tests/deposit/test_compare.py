@@ -109,7 +109,7 @@ PLANTED = {
     "integer": (changed("count", 4, 5), "/count", DIFFERENT, "not equal: 1 of 5, first at [4]: 4 and 5"),
     "scalar": (changed("height", ..., 2.5), "/height", DIFFERENT, "2.0 and 2.5"),
     "text": (changed("note", ..., "hard"), "/note", DIFFERENT, "'soft' and 'hard'"),
-    "characters": (changed("branch", slice(1, 2), np.array(["unload"])), "/branch", DIFFERENT, "first at [1]: 'loading'"),
+    "characters": (changed("branch", slice(1, 2), np.array(["unload"])), "/branch", DIFFERENT, "[1]: 'loading' and"),
     "in a group": (changed("study/radius", 2, 3.1), "/study/radius", DIFFERENT, "[2]: 3.0 and 3.1"),
     "type": (of_type("f4"), "/height", DIFFERENT, "dtype: float64 and float32"),
     "dimension": (renamed("Dimension", "step", "stop"), "/pressure", DIFFERENT, "dimensions: ('step',) and ('stop',)"),
