@@ -98,7 +98,7 @@ def simulate(
     seed : recorded in the dataset; -1 for a surface without one.
     progress : called with a line of text at every stop.
     kept : a folder in which equilibria are kept as they are found, and in which those are that a call with the same
-        arguments found before it was stopped (`icha.contact.kept`); of boundary elements.
+        arguments found before it was stopped (`icha.contact.checkpoints`); of boundary elements.
 
     Returns
     -------
