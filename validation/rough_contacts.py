@@ -141,7 +141,7 @@ def loop(surface: Surface, largest_pressure: float, step: float, material: Mater
         "steps": steps,
         "largest_work": most / unit,
         "work": balance.work / unit,
-        "not_closed": (balance.work - balance.lost - contact.stored_energy(waypoint.state)) / unit,
+        "not_closed": (balance.work - balance.loss - contact.stored_energy(waypoint.state)) / unit,
         **{part: getattr(balance, part) / unit for part in parts},
     }
 

@@ -9,7 +9,7 @@ from icha.cli.deposits import reproduce, upload, verify
 from icha.cli.describe import describe
 from icha.cli.explore import explore
 from icha.cli.new import new
-from icha.cli.project import say, told
+from icha.cli.project import echo, reports_errors
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
@@ -27,7 +27,7 @@ def _version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        say(f"icha {version('icha')}")
+        echo(f"icha {version('icha')}")
         raise typer.Exit
 
 
@@ -46,7 +46,7 @@ def icha(
 
 
 for command in (new, describe, run, simulate, show, explore, check, verify, reproduce, upload):
-    app.command()(told(command))
+    app.command()(reports_errors(command))
 
 
 def main() -> None:

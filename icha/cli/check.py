@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, WRONG, say
+from icha.cli.project import FAILED, WRONG, echo
 from icha.deposit.verify import CHECKSUMS
-from icha.support.in_words import counted, printable
+from icha.support.formatting import format_count, printable
 
 
 def check(
@@ -23,16 +23,16 @@ def check(
     status = 0
     for file in files:
         if (file.suffix == ".zip" and file.is_file()) or (file / CHECKSUMS).is_file():
-            say(f"{file}: deposit; `icha verify` checks it")
+            echo(f"{file}: deposit; `icha verify` checks it")
             continue
         try:
             kind, data = kind_of(file)
         except UnknownFile as error:
-            say(f"Error: {error}", err=True, fg="red")
+            echo(f"Error: {error}", err=True, fg="red")
             status = WRONG
             continue
         if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
-            say(f"{file}: {kind}; it can be read, and has no checks of its own")
+            echo(f"{file}: {kind}; it can be read, and has no checks of its own")
             continue
         try:
             found, tested = _checked(kind, data)
@@ -40,12 +40,12 @@ def check(
             found, tested = [f"is of another format: {error!r}"], 0
         if found:
             status = max(status, FAILED)
-            say(f"{file}: {kind}, {counted(len(found), 'flaw')}", fg="red")
+            echo(f"{file}: {kind}, {format_count(len(found), 'flaw')}", fg="red")
             for flaw in found:
-                say(f"    {printable(flaw)}")
+                echo(f"    {printable(flaw)}")
         else:
-            numbers = f" ({counted(tested, 'check')} of its numbers)" if tested else ""
-            say(f"{file}: {kind}, all is well{numbers}")
+            numbers = f" ({format_count(tested, 'check')} of its numbers)" if tested else ""
+            echo(f"{file}: {kind}, all is well{numbers}")
     if status:
         raise typer.Exit(status)
 

@@ -14,10 +14,10 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, Anyway, Cores, Large, Mistake, confirmed, say, shown
+from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirmed, echo, shown
 from icha.cli.run import run
-from icha.support import in_words
-from icha.support.in_words import counted, printable
+from icha.support import formatting
+from icha.support.formatting import format_count, printable
 
 TOKEN = "ZENODO_TOKEN"
 _MOST_PROBLEMS = 100
@@ -38,10 +38,10 @@ def verify(deposit: Deposit, large: Large = False) -> None:
 
     try:
         with _whole(deposit, large) as folder:
-            say(f"{printable(deposit)}: whole: {_size_of(folder)}")
+            echo(f"{printable(deposit)}: whole: {_size_of(folder)}")
     except Damaged as damaged:
-        say(_listed(damaged.args))
-        say(f"{printable(deposit)}: not whole: {counted(len(damaged.args), 'problem')}", err=True, fg="red")
+        echo(_listed(damaged.args))
+        echo(f"{printable(deposit)}: not whole: {format_count(len(damaged.args), 'problem')}", err=True, fg="red")
         raise typer.Exit(FAILED) from None
 
 
@@ -51,7 +51,7 @@ def _whole(deposit: Path, large: bool) -> Iterator[Path]:
     from icha.deposit.verify import whole_deposit
 
     if not deposit.exists():
-        raise Mistake(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")
+        raise UserError(f"{deposit}: no such file or folder; needed: the folder of a deposit, or its zip")
     with whole_deposit(deposit, large=large) as folder:
         yield folder
 
@@ -60,7 +60,9 @@ def _size_of(folder: Path) -> str:
     from icha.deposit.verify import files_of
 
     files = files_of(folder)
-    return f"{counted(len(files), 'file')}, {in_words.size(sum((folder / file).stat().st_size for file in files))}"
+    return (
+        f"{format_count(len(files), 'file')}, {formatting.size(sum((folder / file).stat().st_size for file in files))}"
+    )
 
 
 def _listed(problems: tuple[str, ...]) -> str:
@@ -119,7 +121,7 @@ def reproduce(
                 status = _run(project, targets, cores, anyway)
                 made = project / "results" / name
                 if not made.is_dir():
-                    say("Error: nothing was computed", err=True, fg="red")
+                    echo("Error: nothing was computed", err=True, fg="red")
                     raise typer.Exit(FAILED)
             except BaseException:
                 if folder is None:
@@ -127,16 +129,16 @@ def reproduce(
                 raise
             comparison = compare_folders(original, made, with_surfaces(runs, original) if runs else None)
     except Damaged as damaged:
-        raise Mistake(f"{printable(deposit)}: the deposit is damaged:\n{_listed(damaged.args)}") from None
+        raise UserError(f"{printable(deposit)}: the deposit is damaged:\n{_listed(damaged.args)}") from None
     except Refused as refused:
-        raise Mistake(f"{printable(deposit)}: {refused}") from None
+        raise UserError(f"{printable(deposit)}: {refused}") from None
     good = _report(comparison)
     if status:
-        say(f"Not everything was computed; the same command with --folder {shown(place)} continues.", fg="yellow")
+        echo(f"Not everything was computed; the same command with --folder {shown(place)} continues.", fg="yellow")
     if folder is None and good:
         shutil.rmtree(place)
     else:
-        say(f"what was computed again: {shown(made)}")
+        echo(f"what was computed again: {shown(made)}")
     if json:
         write_json(comparison, json)
     if not good:
@@ -153,20 +155,20 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
         statements = summary_of(read_zenodo_metadata(original)) if (original / ZENODO).is_file() else {}
     except ValueError as error:
         raise Refused(str(error)) from None
-    say(f"deposit:    {printable(deposit)}, {_size_of(original)}")
-    say("it says of itself, and nobody has checked it:" if statements else "it does not say whose it is")
+    echo(f"deposit:    {printable(deposit)}, {_size_of(original)}")
+    echo("it says of itself, and nobody has checked it:" if statements else "it does not say whose it is")
     for name, text in statements.items():
         if text:
-            say(f"  {name + ':':<10}{printable(textwrap.shorten(text, 200, placeholder=' …'))}")
+            echo(f"  {name + ':':<10}{printable(textwrap.shorten(text, 200, placeholder=' …'))}")
     if wrong := other_versions(original):
         raise Refused(
             "was made with other versions than those that are installed; needed: these versions, as `make environment` "
             "installs them in a clone of that version, or in a copy of the deposit's source:\n" + "\n".join(wrong)
         )
-    say(f"is run:     the ICHA that is installed, {version('icha')}; nothing in the deposit is executed")
+    echo(f"is run:     the ICHA that is installed, {version('icha')}; nothing in the deposit is executed")
     if changed := changed_files(original):
-        say(f"            (the deposit's source differs from it in {counted(changed, 'file')})", fg="yellow")
-    say(f"can touch:  {shown(folder) if folder else 'a temporary folder'}")
+        echo(f"            (the deposit's source differs from it in {format_count(changed, 'file')})", fg="yellow")
+    echo(f"can touch:  {shown(folder) if folder else 'a temporary folder'}")
 
 
 def _run(project: Path, targets: list[str], cores: str | None, anyway: bool) -> int:
@@ -187,15 +189,15 @@ def _report(comparison) -> bool:
     """Print the comparison; return whether everything is reproduced."""
     from icha.deposit.compare import DIFFERENT, IDENTICAL, TOLERANCE, table
 
-    say(f"\nthe deposit, and what was computed again:\n\n{table(comparison)}\n")
-    files = counted(len(comparison.files), "file")
+    echo(f"\nthe deposit, and what was computed again:\n\n{table(comparison)}\n")
+    files = format_count(len(comparison.files), "file")
     if not comparison.files or comparison.verdict == DIFFERENT:
-        say("different: not everything is reproduced", fg="red")
+        echo("different: not everything is reproduced", fg="red")
         return False
     if comparison.verdict == IDENTICAL:
-        say(f"identical: {files}, every value", fg="green")
+        echo(f"identical: {files}, every value", fg="green")
     else:
-        say(f"within tolerance: {files}, every value to {TOLERANCE:g}", fg="green")
+        echo(f"within tolerance: {files}, every value to {TOLERANCE:g}", fg="green")
     return True
 
 
@@ -242,7 +244,7 @@ def upload(
     from icha.deposit.verify import CRATE, README, Damaged
 
     if (sandbox and url) or (draft and new_version_of):
-        raise Mistake("--sandbox and --url, and --draft and --new-version-of, exclude each other; give one of them")
+        raise UserError("--sandbox and --url, and --draft and --new-version-of, exclude each other; give one of them")
     archive = deposit.resolve().with_name(f"{deposit.resolve().name}.zip") if deposit.is_dir() else deposit
     try:
         address = server_address(url or (SANDBOX if sandbox else ZENODO))
@@ -254,25 +256,25 @@ def upload(
             rows = {"to": f"{address}, {place}", **summary_of(metadata)}
             for path in files:
                 size = path.stat().st_size
-                rows[path.name] = f"{in_words.size(size)} ({size:,} bytes)"
+                rows[path.name] = f"{formatting.size(size)} ({size:,} bytes)"
             _refuse_foreign_doi(metadata, draft)
-            say("\n".join(f"{name + ':':<11}{printable(value or 'none')}" for name, value in rows.items()))
+            echo("\n".join(f"{name + ':':<11}{printable(value or 'none')}" for name, value in rows.items()))
             if not yes and not sys.stdin.isatty():
-                raise Mistake("cannot ask for confirmation without a terminal; nothing was sent. Use --yes")
+                raise UserError("cannot ask for confirmation without a terminal; nothing was sent. Use --yes")
             if not yes and not confirmed("Send it?"):
-                say("Nothing was sent.")
+                echo("Nothing was sent.")
                 raise typer.Exit(FAILED)
             _send(server, files, metadata, draft, new_version_of, publish, yes)
     except Damaged as damaged:
-        raise Mistake(f"{archive}: the deposit is damaged; nothing was sent:\n{_listed(damaged.args)}") from None
+        raise UserError(f"{archive}: the deposit is damaged; nothing was sent:\n{_listed(damaged.args)}") from None
     except ValueError as error:
-        raise Mistake(str(error)) from None
+        raise UserError(str(error)) from None
 
 
 def _token(address: str) -> str:
     token = os.environ.get(TOKEN, "").strip()
     if not re.fullmatch(r"[!-~]+", token):
-        raise Mistake(
+        raise UserError(
             f"{TOKEN} is {'not a token' if token else 'not set'}; needed: a token, with the scopes deposit:write and "
             f"deposit:actions, from {address}/account/settings/applications/tokens/new/, in that environment variable"
         )
@@ -283,7 +285,7 @@ def _refuse_foreign_doi(metadata: dict, draft: int | None) -> None:
     """Refuse a DOI that Zenodo has reserved for another draft, since all files of the deposit name it."""
     found = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", str(metadata.get("doi")))
     if found and int(found[1]) != draft:
-        raise Mistake(
+        raise UserError(
             f"the deposit has the DOI {metadata['doi']}, which is reserved for draft {found[1]}; needed: --draft "
             f"{found[1]}, or a deposit without publication.doi"
         )
@@ -299,35 +301,35 @@ def _send(server, files, metadata, number, new_version_of, publish, yes) -> None
             draft = server.draft(str(number))
         else:
             draft = server.new_version(str(new_version_of)) if new_version_of else server.create()
-        say(f"draft:     {draft.page}")
+        echo(f"draft:     {draft.page}")
         sums = {path.name: md5_of(path) for path in files}
         there = {name for name, (_, md5) in draft.files.items() if md5 == sums.get(name)}
         for name in set(draft.files) - there:
             if name in sums or new_version_of:
                 server.remove(draft, name)
             else:
-                say(f"{name}: another file of the draft, which stays there")
+                echo(f"{name}: another file of the draft, which stays there")
         # Before the files, since mistakes in it are known at once.
         server.describe(draft, metadata)
         for path in files:
             if path.name in there:
-                say(f"{path.name}: is there already")
+                echo(f"{path.name}: is there already")
                 continue
             arrived = server.upload(draft, path, sums[path.name])
-            say(f"{path.name}: sent, {'its checksum is right' if arrived else 'the server gives no checksum'}")
+            echo(f"{path.name}: sent, {'its checksum is right' if arrived else 'the server gives no checksum'}")
         if draft.doi:
-            say(f"DOI:       {draft.doi} (reserved)")
+            echo(f"DOI:       {draft.doi} (reserved)")
         if publish and (yes or confirmed("Publish it? What is published cannot be deleted.")):
             page, doi = server.publish(draft)
-            say(f"published: {page}\nDOI:       {doi}")
+            echo(f"published: {page}\nDOI:       {doi}")
         else:
-            say("It is a draft. Look at it, and publish it, on its page.")
+            echo("It is a draft. Look at it, and publish it, on its page.")
     except (ZenodoError, OSError, KeyboardInterrupt) as error:
         with contextlib.suppress(OSError):
-            say(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")
+            echo(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")
         if draft is not None:
             option = "" if server.address == ZENODO else f" --url {server.address}"
-            say(
+            echo(
                 f"A draft is left: {draft.page}\n"
                 f"To continue with it:   icha upload {shown(files[0])}{option} --draft {draft.number}",
                 err=True,

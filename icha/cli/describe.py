@@ -10,20 +10,20 @@ from icha.cli.project import (
     Config,
     Cores,
     Folder,
-    Mistake,
+    UserError,
     configuration_path,
     core_count,
+    echo,
     markup,
     profile_settings,
     project,
     read_configuration,
-    say,
     shown,
     workflow_folder,
 )
 from icha.cli.scans import about_scan, check_picture
-from icha.support import in_words
-from icha.support.in_words import counted
+from icha.support import formatting
+from icha.support.formatting import format_count
 
 
 def describe(
@@ -62,7 +62,7 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
     measured = {name: section for name, section in pressed.items() if isinstance(section, MeasuredSurface)}
     if not measured:
         if plot is not None:
-            raise Mistake("--plot: draws measured surfaces; the campaign presses none")
+            raise UserError("--plot: draws measured surfaces; the campaign presses none")
         return
     from icha.contact.models import MODELS
     from icha.surfaces.measured.resolution import scan_resolution
@@ -71,15 +71,15 @@ def _tell_of_scans(campaign, plot: Path | None) -> None:
     for case in run_cases(campaign):
         models.setdefault(case.surface, []).append(MODELS[case.model])
     scans = {name: scan_resolution(section.path, section.preparation) for name, section in measured.items()}
-    say("")
+    echo("")
     for name, scan in scans.items():
         for line in about_scan(name, scan, models=models[name]):
-            say(line)
+            echo(line)
     if plot is not None:
         from icha.cli.quick_plot import draw_scans
 
         draw_scans(scans, plot)
-        say(f"drawn: {shown(plot)}")
+        echo(f"drawn: {shown(plot)}")
 
 
 def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: bool = False, profile=None) -> None:
@@ -98,9 +98,9 @@ def tell(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs: 
     from rich.console import Console
 
     from icha.deposit.metadata import licence_problem
-    from icha.planning.belonging import belongs_to_another
-    from icha.planning.needs import missing_software, wanting
+    from icha.planning.ownership import belongs_to_another
     from icha.planning.plan import plan
+    from icha.planning.requirements import missing_software, wanting
     from icha.planning.validity import expected_validity
     from icha.support.checksums import damaged
 
@@ -148,9 +148,9 @@ def _summary(console, items, damaged, cores) -> None:
         "failed": str(every.failed or ""),
         "to do": str(every.to_do),
         "each": "",
-        "core time": in_words.duration(every.work + around),
-        "memory": in_words.size(every.memory),
-        "disk": in_words.size(every.disk),
+        "core time": formatting.duration(every.work + around),
+        "memory": formatting.size(every.memory),
+        "disk": formatting.size(every.disk),
     }
     for heading, footer in columns.items():
         # In a narrow terminal it is the names that are broken, not the numbers.
@@ -160,27 +160,28 @@ def _summary(console, items, damaged, cores) -> None:
     for part, members in parts.items():
         sums = total(members)
         counts = (str(count or "") for count in (sums.count, sums.done, sums.failed, sums.to_do))
-        work = in_words.duration(sums.work) if sums.to_do else ""
-        sizes = in_words.size(sums.memory), in_words.size(sums.disk)
-        table.add_row(part, *counts, in_words.duration(sums.typical), work, *sizes)
+        work = formatting.duration(sums.work) if sums.to_do else ""
+        sizes = formatting.size(sums.memory), formatting.size(sums.disk)
+        table.add_row(part, *counts, formatting.duration(sums.typical), work, *sizes)
     if around:
-        table.add_row("starting and scheduling", "", "", "", "", "", in_words.duration(around))
+        table.add_row("starting and scheduling", "", "", "", "", "", formatting.duration(around))
     console.print(table)
     runs = [item for item in items if item.is_run]
     changed = sum(item.state == "changed" for item in runs)
     console.print()
     if not every.to_do and not damaged:
-        console.print(f"{counted(len(runs), 'run')}; everything is there.")
+        console.print(f"{format_count(len(runs), 'run')}; everything is there.")
     else:
-        time, memory = in_words.duration(time_on(items, cores)), in_words.size(memory_on(items, cores))
+        time, memory = formatting.duration(time_on(items, cores)), formatting.size(memory_on(items, cores))
         console.print(
-            f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and {memory}"
-            f" of memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk when all is there."
+            f"{format_count(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and "
+            f"{memory} of memory on {format_count(cores, 'core')}; {formatting.size(every.disk)} of disk when all is "
+            "there."
         )
     for path in damaged:
         _line(console, "red", "damaged", f"{path}: to do again.")
     if changed:
-        console.print(f"{counted(changed, 'run')} there, but with other settings: to do again.")
+        console.print(f"{format_count(changed, 'run')} there, but with other settings: to do again.")
     for item in runs:
         if item.reason:
             console.print(f"[red]failed:[/] {item.path}: {markup(item.reason)}")
@@ -193,7 +194,7 @@ def _list(console, items) -> None:
     for heading in ("file", "state", "time", "memory", "disk"):
         table.add_column(heading, justify="left" if heading in ("file", "state") else "right", overflow="fold")
     for item in items:
-        time, memory = in_words.duration(item.cost.seconds), in_words.size(item.cost.memory)
-        table.add_row(item.path, item.state, time, memory, in_words.size(item.cost.disk))
+        time, memory = formatting.duration(item.cost.seconds), formatting.size(item.cost.memory)
+        table.add_row(item.path, item.state, time, memory, formatting.size(item.cost.disk))
     console.print(table)
     console.print()

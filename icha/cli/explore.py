@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import Mistake, say
-from icha.support.in_words import counted
+from icha.cli.project import UserError, echo
+from icha.support.formatting import format_count
 
 
 def explore(
@@ -39,25 +39,25 @@ def explore(
 
     if not results.is_dir():
         what = "is a file" if results.exists() else "no such folder"
-        raise Mistake(f"{results}: {what}; allowed: the results of a campaign, results/<campaign>")
+        raise UserError(f"{results}: {what}; allowed: the results of a campaign, results/<campaign>")
     if output is None and (results / CHECKSUMS).is_file():
-        raise Mistake(f"{results}: is a deposit, to which nothing is added; name another place by --output")
+        raise UserError(f"{results}: is a deposit, to which nothing is added; name another place by --output")
     page = output or results / EXPLORER
     if page.is_dir():
-        raise Mistake(f"--output {page}: is a folder; allowed: the name of an HTML file")
+        raise UserError(f"--output {page}: is a folder; allowed: the name of an HTML file")
     asked = {"study": study, "surface": surface, "material": material, "seed": seed}
     only = {name: values for name, values in asked.items() if values}
     try:
         written = write_explorer(results, page, only=only, largest=size)
     except NothingToExplore as reason:
-        raise Mistake(str(reason)) from None
+        raise UserError(str(reason)) from None
     except ValueError as error:
-        raise Mistake(f"{error}; `icha run` computes what is missing") from None
-    say(f"{page}: {counted(written.shown, 'contact')}, {written.size / 1e6:.1f} MB")
+        raise UserError(f"{error}; `icha run` computes what is missing") from None
+    echo(f"{page}: {format_count(written.shown, 'contact')}, {written.size / 1e6:.1f} MB")
     if written.left_out:
-        say(
-            f"left out, as the page would be larger than {size:g} MB: {counted(written.left_out, 'contact')}. "
+        echo(
+            f"left out, as the page would be larger than {size:g} MB: {format_count(written.left_out, 'contact')}. "
             "--study, --surface, --material and --seed choose others, --size allows more"
         )
     if written.without_steps:
-        say(f"left out, as their runs reached no stop: {counted(written.without_steps, 'contact')}")
+        echo(f"left out, as their runs reached no stop: {format_count(written.without_steps, 'contact')}")

@@ -14,8 +14,8 @@ from rich.table import Table
 from rich.text import Text
 
 from icha.datasets.results import CHECKS, MODEL_ERROR, REPORT
-from icha.support import in_words
-from icha.support.in_words import printable
+from icha.support import formatting
+from icha.support.formatting import printable
 
 # Rules that only collect others' files.
 _TARGETS = ("all", "surfaces", "runs", "references", "dataset", "figures", "report", "publish")
@@ -256,7 +256,7 @@ class LiveView:
         ended, failed = len(watch.done) + len(watch.failed), len(watch.failed)
         parts = [f"{self._campaign}: {ended} of {watch.job_count} jobs"]
         parts += [f"{failed} failed"] if failed else []
-        parts += [time_left(watch), f"{in_words.duration(watch.clock() - watch.started)} so far"]
+        parts += [time_left(watch), f"{formatting.duration(watch.clock() - watch.started)} so far"]
         parts += [self._remark] if self._remark != "planning" else []
         table = Table(box=None, pad_edge=False, header_style="dim")
         for heading in ("", "done", "running", "failed", "of", ""):
@@ -268,7 +268,7 @@ class LiveView:
             table.add_row(rule.replace("_", " "), *cells, str(total), bar, style=style)
         lines = []
         for job in sorted(watch.running.values(), key=lambda job: job.started)[:_MOST_JOBS]:
-            lines.append(Text(f"▸ {in_words.duration(watch.clock() - job.started):>8}  {job.title}", no_wrap=True))
+            lines.append(Text(f"▸ {formatting.duration(watch.clock() - job.started):>8}  {job.title}", no_wrap=True))
             if said := last_line(job, self.folder):
                 lines.append(Text(f"            {said}", style="dim", no_wrap=True))
         if more := len(watch.running) - _MOST_JOBS:
@@ -296,7 +296,7 @@ class PlainView:
         ended = len(watch.done) + len(watch.failed)
         what = "failed: " if failed else ""
         count = f"{ended:>{len(str(watch.job_count))}}/{watch.job_count}"
-        self._say(f"[{count}, {time_left(watch)}] {what}{job.title} ({in_words.duration(job.seconds)})")
+        self._say(f"[{count}, {time_left(watch)}] {what}{job.title} ({formatting.duration(job.seconds)})")
         for line in reason_of(job, self.folder)[:3] if failed else ():
             self._say(f"    {line}")
 
@@ -312,4 +312,4 @@ class PlainView:
 def time_left(watch: Watch) -> str:
     """How long it still takes, in words."""
     seconds = watch.seconds_left()
-    return "time left unknown" if seconds is None else f"about {in_words.duration(seconds)} left"
+    return "time left unknown" if seconds is None else f"about {formatting.duration(seconds)} left"

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import CAMPAIGNS, Mistake, campaigns, project, say, shown, workflow_folder
+from icha.cli.project import CAMPAIGNS, UserError, campaigns, echo, project, shown, workflow_folder
 from icha.cli.scans import MeasuredSection, about_scan, check_picture, measured_section
 
 _TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
@@ -50,17 +50,17 @@ def new(
 
     folder = project()
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
-        raise Mistake(f"{name!r} is not a name; allowed: lower-case letters, digits, '_' and '-'")
+        raise UserError(f"{name!r} is not a name; allowed: lower-case letters, digits, '_' and '-'")
     file = folder / CAMPAIGNS / f"{name}.yaml"
     if name in campaigns() and not file.exists():
-        raise Mistake(f"{name} is the campaign of {shown(campaigns()[name])}; choose another name")
+        raise UserError(f"{name} is the campaign of {shown(campaigns()[name])}; choose another name")
     if file.exists():
-        raise Mistake(f"{shown(file)} is there already; choose another name, or remove it")
+        raise UserError(f"{shown(file)} is there already; choose another name, or remove it")
     if data is not None and measured is None:
-        raise Mistake("--data: names data in a measured file; allowed: only with --measured")
+        raise UserError("--data: names data in a measured file; allowed: only with --measured")
     check_picture(plot)
     if plot is not None and measured is None:
-        raise Mistake("--plot: draws a measured file; allowed: only with --measured")
+        raise UserError("--plot: draws a measured file; allowed: only with --measured")
     own = None if measured is None else measured_section(measured, data, file.parent)
     values = {
         "name": name,
@@ -75,10 +75,10 @@ def new(
     against = [] if own is None else _against(file, own)
     if against:
         _write(file, values, f"once `icha describe {name}` says nothing against it any more")
-    say(f"{shown(file)} written")
+    echo(f"{shown(file)} written")
     if own is not None:
         _tell(own, against, plot)
-    say(f"next:  icha describe {name}    what it will compute\n       icha run {name}         compute it")
+    echo(f"next:  icha describe {name}    what it will compute\n       icha run {name}         compute it")
 
 
 def _write(file: Path, values: dict, runs: str) -> None:
@@ -93,18 +93,18 @@ def _tell(section: MeasuredSection, against: list[str], plot: Path | None) -> No
     """Tell of a scan, what is to fill in, and what else is in the way; draw it if asked."""
     to_scale = not against and not section.to_fill_in.keys() - {"boundary"}
     for line in about_scan(section.name, section.scan, to_scale=to_scale):
-        say(line)
+        echo(line)
     if not to_scale:
-        say(f"{section.name}: `icha describe` looks at its spectrum once units and size are settled")
+        echo(f"{section.name}: `icha describe` looks at its spectrum once units and size are settled")
     if plot is not None:
         from icha.cli.quick_plot import draw_scans
 
         draw_scans({section.name: section.scan}, plot)
-        say(f"drawn: {shown(plot)}")
+        echo(f"drawn: {shown(plot)}")
     for key, why in section.to_fill_in.items():
-        say(f"to fill in: surfaces.{section.name}.{key} ({why})", fg="yellow")
+        echo(f"to fill in: surfaces.{section.name}.{key} ({why})", fg="yellow")
     for line in against:
-        say(f"to settle: {line}", fg="yellow")
+        echo(f"to settle: {line}", fg="yellow")
 
 
 def _schema(folder: Path) -> Path:

@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from icha.support.in_words import printable_lines
-from icha.support.input_files import flaw_of_path
+from icha.support.formatting import printable_lines
+from icha.support.input_files import problem_with_path
 from icha.support.program import own_workflow
 
 Config = Annotated[
@@ -33,7 +33,7 @@ DEFAULT = Path("config/config.yaml")
 FAILED, WRONG = 1, 2
 
 
-def say(text: object = "", *, err: bool = False, **style) -> None:
+def echo(text: object = "", *, err: bool = False, **style) -> None:
     """Print text, to the error output if `err`; `style` is that of `typer.style`: `fg="red"`, `bold=True`."""
     typer.secho(printable_lines(text), err=err, **style)
 
@@ -50,7 +50,7 @@ def confirmed(question: str) -> bool:
     try:
         return sys.stdin.isatty() and typer.confirm(question)
     except typer.Abort:
-        say()
+        echo()
         return False
 
 
@@ -90,34 +90,34 @@ Folder = Annotated[
 ]
 
 
-class Mistake(Exception):
+class UserError(Exception):
     """What was asked for cannot be done; the message says why and what can."""
 
 
-def told(command: Callable) -> Callable:
+def reports_errors(command: Callable) -> Callable:
     """Decorate a command: mistakes and failures end it with their message and an exit status, not with a traceback."""
 
     @wraps(command)
     def call(*args, **kwargs):
         try:
             return command(*args, **kwargs)
-        except Mistake as mistake:
-            say(f"Error: {mistake}", err=True, fg="red")
+        except UserError as mistake:
+            echo(f"Error: {mistake}", err=True, fg="red")
             raise typer.Exit(WRONG) from None
         except UnicodeEncodeError as error:
-            say(f"Error: {error.object!r}: holds bytes that are no UTF-8; allowed: text", err=True, fg="red")
+            echo(f"Error: {error.object!r}: holds bytes that are no UTF-8; allowed: text", err=True, fg="red")
             raise typer.Exit(WRONG) from None
         except BrokenPipeError:
             # Whoever read our output has seen enough (`icha describe --runs | head`).
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(FAILED) from None
         except MemoryError as error:
-            say(f"Error: not enough memory: {error or 'nothing is left'}", err=True, fg="red")
+            echo(f"Error: not enough memory: {error or 'nothing is left'}", err=True, fg="red")
             raise typer.Exit(FAILED) from None
         except OSError as error:
             # What the system refuses: a folder that cannot be written to, a full disk.
             what = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
-            say(f"Error: {what}", err=True, fg="red")
+            echo(f"Error: {what}", err=True, fg="red")
             raise typer.Exit(FAILED) from None
 
     return call
@@ -147,12 +147,12 @@ def configuration_path(asked: str | None) -> Path:
 
     Raises
     ------
-    Mistake
+    UserError
         If there is no such file.
     """
     if asked is None:
         if not (project() / DEFAULT).is_file():
-            raise Mistake(
+            raise UserError(
                 f"there is no {DEFAULT} here; name a campaign: {', '.join(sorted(campaigns()))}, or a YAML file. "
                 "`icha new NAME` writes a campaign to start from"
             )
@@ -163,8 +163,8 @@ def configuration_path(asked: str | None) -> Path:
     if asked in there:
         return shown(there[asked])
     if Path(asked).exists():
-        raise Mistake(f"{asked}: {flaw_of_path(asked)}; allowed: a YAML file, or the name of a campaign")
-    raise Mistake(
+        raise UserError(f"{asked}: {problem_with_path(asked)}; allowed: a YAML file, or the name of a campaign")
+    raise UserError(
         f"{asked}: no such file and no campaign of that name; there are: {', '.join(sorted(there))}. `icha new NAME` "
         "writes a campaign to start from"
     )
@@ -200,7 +200,7 @@ def read_configuration(path: Path):
 
     Raises
     ------
-    Mistake
+    UserError
         With everything that is wrong with it.
     """
     from icha.configuration.errors import ConfigurationError
@@ -209,9 +209,9 @@ def read_configuration(path: Path):
     try:
         configuration = load_configuration(path)
     except ConfigurationError as error:
-        raise Mistake(f"the configuration cannot be run:\n{error}") from None
+        raise UserError(f"the configuration cannot be run:\n{error}") from None
     for warning in configuration.warnings:
-        say(f"Warning: {warning}", err=True, fg="yellow")
+        echo(f"Warning: {warning}", err=True, fg="yellow")
     return configuration
 
 

@@ -22,18 +22,18 @@ from icha.cli.project import (
     Config,
     Cores,
     Folder,
-    Mistake,
+    UserError,
     configuration_path,
     core_count,
+    echo,
     profile_settings,
     project,
     read_configuration,
-    say,
     shown,
     workflow_folder,
 )
 from icha.support.atomic_files import in_the_way
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -89,7 +89,7 @@ def run(
     folder = (folder or project()).resolve()
     _refuse_results_of_another(folder / "results" / campaign.name, campaign.name, path, workflow)
     if obstacle := in_the_way(shown(folder / ".snakemake")):
-        raise Mistake(f"{obstacle}: Snakemake keeps its records there; remove it, or put it right. Nothing was begun")
+        raise UserError(f"{obstacle}: Snakemake keeps its records there; remove it, or put it right. Nothing was begun")
     command = [
         # Not what lies in the folder by the name of a module.
         *(sys.executable, "-P", "-m", "snakemake", *asked),
@@ -109,7 +109,7 @@ def run(
             core_count(cores),
             profile=_profile(profile, workflow) if profile else None,
         )
-        say(planned)
+        echo(planned)
         return
     from rich.console import Console
 
@@ -126,7 +126,7 @@ def run(
         _say_what_holds(expected_validity(campaign))
     watch = Watch(expected_seconds(items, f"results/{campaign.name}"))
     if plain or not console.is_terminal:
-        view = PlainView(watch, campaign.name, folder, say)
+        view = PlainView(watch, campaign.name, folder, echo)
     else:
         view = LiveView(watch, campaign.name, folder, console)
     log = _log_file(folder, campaign.name)
@@ -134,7 +134,7 @@ def run(
     if status and watch.started is None and not stopped:
         try:
             _refuse_unknown(log.read_text(encoding="utf-8", errors="replace"), asked, campaign)
-        except Mistake:
+        except UserError:
             log.unlink(missing_ok=True)
             raise
     # What `icha describe` says: of everything, on this machine.
@@ -144,16 +144,16 @@ def run(
         _tell_what_it_is_worth(campaign, folder / "results" / campaign.name)
     if not status and "publish" in asked:
         deposit = f"{campaign.name}-{campaign.published().version}.zip"
-        say(f"deposit: {shown(folder / 'results' / campaign.name / 'publish' / deposit)}")
+        echo(f"deposit: {shown(folder / 'results' / campaign.name / 'publish' / deposit)}")
     if status:
         raise typer.Exit(FAILED)
 
 
 def _refuse_results_of_another(results: Path, name: str, path: Path, workflow: Path) -> None:
-    from icha.planning.belonging import belongs_to_another
+    from icha.planning.ownership import belongs_to_another
 
     if reason := belongs_to_another(shown(results), name, path, workflow):
-        raise Mistake(f"{reason} Nothing was begun")
+        raise UserError(f"{reason} Nothing was begun")
 
 
 def _profile(asked: str, workflow: Path) -> Path:
@@ -161,7 +161,7 @@ def _profile(asked: str, workflow: Path) -> Path:
         if (path / "config.yaml").is_file():
             return path.resolve()
     there = sorted(path.parent.name for path in (workflow / "profiles").glob("*/config.yaml"))
-    raise Mistake(f"--profile {asked}: no folder with a config.yaml; there are: {', '.join(there)}")
+    raise UserError(f"--profile {asked}: no folder with a config.yaml; there are: {', '.join(there)}")
 
 
 def _ask_if_wanting(items, asked: list[str], cores: int, results: Path, profile: dict) -> None:
@@ -169,10 +169,10 @@ def _ask_if_wanting(items, asked: list[str], cores: int, results: Path, profile:
 
     Raises
     ------
-    Mistake
+    UserError
         If nobody is there to be asked, or says no.
     """
-    from icha.planning.needs import wanting
+    from icha.planning.requirements import wanting
 
     if "surfaces" in asked:
         items = [item for item in items if item.part == "surfaces"]
@@ -185,10 +185,10 @@ def _ask_if_wanting(items, asked: list[str], cores: int, results: Path, profile:
         return
     said = "\n".join(["not enough for what is to be done:", *(f"  {lack}" for lack in lacks)])
     if not _at_a_terminal():
-        raise Mistake(f"{said}\nNothing was begun; --anyway begins it all the same")
-    say(said, fg="red")
+        raise UserError(f"{said}\nNothing was begun; --anyway begins it all the same")
+    echo(said, fg="red")
     if not typer.confirm("Begin all the same?"):
-        raise Mistake("nothing was begun")
+        raise UserError("nothing was begun")
 
 
 def _at_a_terminal() -> bool:
@@ -217,16 +217,16 @@ def _planned(said: str) -> str:
         return "\n".join([*again, "and what is made from it"]) if again else nothing
     listed = ", ".join(f"{number} {rule}" for rule, number in counts.items())
     would = "would run, those included that a changed program makes anew"
-    return "\n".join([*again, f"{counted(sum(counts.values()), 'job')} {would}: {listed}"])
+    return "\n".join([*again, f"{format_count(sum(counts.values()), 'job')} {would}: {listed}"])
 
 
 def _refuse_unknown(said: str, asked: list[str], campaign) -> None:
-    """Raise `Mistake` if Snakemake has ended because a target that was asked for is none."""
+    """Raise `UserError` if Snakemake has ended because a target that was asked for is none."""
     unknown = re.findall(r"^No rule to produce (.+) \(if you use", said, re.MULTILINE)
     if "\nInputFunctionException" in said:  # a file of a rule, but of no case of the campaign
         unknown = [name for name in asked if name not in TARGETS and not name.startswith("-")]
     if any(name in asked for name in unknown):
-        raise Mistake(
+        raise UserError(
             f"{', '.join(unknown)}: no target, and no file that campaign {campaign.name} makes; allowed: "
             f"{', '.join(TARGETS)}, or a file of its own under results/{campaign.name}/"
         )
@@ -250,7 +250,7 @@ def _log_file(folder: Path, campaign: str) -> Path:
         logs.mkdir(parents=True, exist_ok=True)
         file, name = tempfile.mkstemp(prefix=f"icha-{campaign}-", suffix=".log", dir=logs)
     except OSError as error:
-        raise Mistake(
+        raise UserError(
             f"{folder} cannot be written to: {error.strerror}; make room there or make it writable, or work in another "
             f"folder: --directory FOLDER"
         ) from None
@@ -325,7 +325,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
     """Print what has become of the campaign, and in how many seconds of those that were promised."""
     from icha.cli.live import reason_of
     from icha.planning.plan import failed_runs
-    from icha.support import in_words
+    from icha.support import formatting
     from icha.support.atomic_files import why_not_writable
 
     results = folder / "results" / campaign.name
@@ -333,19 +333,21 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
     if status == 0:
         log.unlink(missing_ok=True)  # Snakemake's own has all of it
     if status == 0 and watch.started is None:
-        say("Nothing to do: everything that was asked for is there and up to date.")
+        echo("Nothing to do: everything that was asked for is there and up to date.")
     elif ended:
-        took = in_words.duration(watch.clock() - watch.called)
-        beside = f"; about {in_words.duration(promised)} were expected" if promised and ended == watch.job_count else ""
-        say(f"{len(watch.done)} of {counted(watch.job_count, 'job')} done in {took}{beside}")
+        took = formatting.duration(watch.clock() - watch.called)
+        beside = (
+            f"; about {formatting.duration(promised)} were expected" if promised and ended == watch.job_count else ""
+        )
+        echo(f"{len(watch.done)} of {format_count(watch.job_count, 'job')} done in {took}{beside}")
     incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
     if incomplete:
-        _heading(f"{counted(len(incomplete), 'run')} without a result:")
+        _heading(f"{format_count(len(incomplete), 'run')} without a result:")
         for path, reason in incomplete.items():
             _reason(path, [reason])
     failed = [job for job in watch.failed if not stopped or reason_of(job, folder)]
     if failed:
-        _heading(f"{counted(len(failed), 'job')} failed:")
+        _heading(f"{format_count(len(failed), 'job')} failed:")
         for job in failed:
             logs = ", ".join(str(shown(folder / name)) for name in job.logs)
             # The verdict repeats the runs that were just listed.
@@ -355,7 +357,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
                 reason or [f"it ended without a message, perhaps killed (out of memory?); see {logs or log}"],
             )
             if logs:
-                say(f"    log: {logs}")
+                echo(f"    log: {logs}")
     if status and results.is_dir() and (reason := why_not_writable(results)):
         # Logs are there as well, so jobs may not have been able to say it.
         _heading(f"{shown(results)} cannot be written to: {reason.strerror}. The same command goes on once it can.")
@@ -366,7 +368,7 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
         _heading("Snakemake could not go on:" if ended else "Snakemake could not start:")
         _reason(None, _last_words(log.read_text(encoding="utf-8", errors="replace")))
     elif status and kept_back:
-        say(f"{counted(kept_back, 'job')} not done, since they need what failed")
+        echo(f"{format_count(kept_back, 'job')} not done, since they need what failed")
     # Where nothing was made, what is there is of another day.
     made = (
         ("figures", results / "figures"),
@@ -375,9 +377,9 @@ def _tell(status: int, stopped: bool, watch, campaign, folder: Path, log: Path, 
     )
     for what, path in made if ended or not status else ():
         if path.exists():
-            say(f"{what + ':':<9}{shown(path)}")
+            echo(f"{what + ':':<9}{shown(path)}")
     if status:
-        say(f"log:     {shown(log)}")
+        echo(f"log:     {shown(log)}")
 
 
 def _tell_what_it_is_worth(campaign, results: Path) -> None:
@@ -389,24 +391,24 @@ def _tell_what_it_is_worth(campaign, results: Path) -> None:
     files = campaign_files(campaign)
     found = read_checks(results / files.checks)
     passed = sum(check.passed for check in found)
-    say(f"checks:  {passed if passed < len(found) else 'all'} of {len(found)} passed: the equations are solved")
-    say("Whether the models hold here is another question:")
+    echo(f"checks:  {passed if passed < len(found) else 'all'} of {len(found)} passed: the equations are solved")
+    echo("Whether the models hold here is another question:")
     _say_what_holds(found_validity(results / files.dataset))
 
 
 def _say_what_holds(statements) -> None:
     for statement in statements:
-        say(f"{statement.about + ':':<10}{statement.text}", fg=None if statement.good else "yellow")
+        echo(f"{statement.about + ':':<10}{statement.text}", fg=None if statement.good else "yellow")
 
 
 def _heading(text: str) -> None:
-    say(text, fg="red")
+    echo(text, fg="red")
 
 
 def _reason(name: str | None, lines: list[str]) -> None:
     if name is not None:
-        say(f"  {name}", bold=True)
+        echo(f"  {name}", bold=True)
     for line in lines[:_MOST_LINES]:
-        say(f"    {line}")
+        echo(f"    {line}")
     if len(lines) > _MOST_LINES:
-        say(f"    … and {len(lines) - _MOST_LINES} more lines in its log")
+        echo(f"    … and {len(lines) - _MOST_LINES} more lines in its log")

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from icha.cli.project import Mistake
-from icha.support import in_words
-from icha.support.in_words import printable
-from icha.support.input_files import flaw_of_path
+from icha.cli.project import UserError
+from icha.support import formatting
+from icha.support.formatting import format_count, printable
+from icha.support.input_files import problem_with_path
 
 if TYPE_CHECKING:
     from icha.contact.models import Model
@@ -30,9 +30,9 @@ _BEGINNING = 2**16
 
 
 def check_picture(path: Path | None) -> None:
-    """Raise `Mistake` unless the path, if there is one, ends as a picture."""
+    """Raise `UserError` unless the path, if there is one, ends as a picture."""
     if path is not None and path.suffix not in PICTURES:
-        raise Mistake(f"--plot {path}: ends in {path.suffix!r}; allowed: {', '.join(PICTURES)}")
+        raise UserError(f"--plot {path}: ends in {path.suffix!r}; allowed: {', '.join(PICTURES)}")
 
 
 def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
@@ -45,13 +45,13 @@ def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model
     from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, error_of_cells
 
     used = scan.used
-    points = in_words.counted(scan.filled, "point")
+    points = format_count(scan.filled, "point")
     filled = f"{points} had no height and {'was' if scan.filled == 1 else 'were'} filled" if scan.filled else ""
     taken = f", `data: {printable(scan.data)}` of several" if scan.data else ""
     yield f"{name}: read as {scan.format}{taken}, {filled or 'no point is missing'}"
     yield f"{name}: {scan.reading.partition(', ')[2]}"
     if scan.filled:
-        yield f"{name}: {in_words.share(scan.filled, scan.points)} of the points are filled"
+        yield f"{name}: {formatting.share(scan.filled, scan.points)} of the points are filled"
     if scan.filled > MANY_FILLED * scan.points:
         yield (
             f"{name}: warning: more than {100 * MANY_FILLED:.0f} % of the points are filled, so much of it is "
@@ -63,10 +63,10 @@ def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model
             "so there is a step at the edges; use `boundary: window`, `mirror` or `free`"
         )
     nodes = f"{used.grid} x {used.grid} nodes"
-    scale = f" {in_words.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}," if to_scale else ","
+    scale = f" {formatting.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}," if to_scale else ","
     few = "; fewer than " if scan.cells_per_summit < LEAST_CELLS_OF_SUMMIT else "; at least "
     yield (
-        f"{name}: {nodes}{scale} {in_words.counted(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} nodes for each"
+        f"{name}: {nodes}{scale} {format_count(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} nodes for each"
         f"{few}{LEAST_CELLS_OF_SUMMIT}, with which summits are resolved"
     )
     if unsupported := len(scan.asperities.unsupported_height):
@@ -96,8 +96,8 @@ def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model
         yield f"{name}: its spectrum falls to the shortest waves: no noise floor is seen"
     else:
         yield (
-            f"{name}: its spectrum ends in a noise floor of {in_words.length(float(f'{noise.rms:.2g}'))} rms; waves "
-            f"shorter than {in_words.length(float(f'{noise.wavelength:.2g}'))} are mostly noise, and have "
+            f"{name}: its spectrum ends in a noise floor of {formatting.length(float(f'{noise.rms:.2g}'))} rms; waves "
+            f"shorter than {formatting.length(float(f'{noise.wavelength:.2g}'))} are mostly noise, and have "
             f"{noise.slope_share:.0%} of its mean square slope"
         )
     if scan.advice:
@@ -109,7 +109,7 @@ def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model
 
 def in_yaml(advice: Mapping[str, float | int]) -> dict[str, str]:
     """Advised keys with their values as a configuration has them."""
-    return {key: in_words.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
+    return {key: formatting.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
 
 
 class MeasuredSection(NamedTuple):
@@ -136,7 +136,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
 
     Raises
     ------
-    Mistake
+    UserError
         If it can be read by no setting, or has no topography that can be used.
     """
     import numpy as np
@@ -153,7 +153,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     try:
         resolution = scan_resolution(path, how)
     except UnfitTopography as error:
-        raise Mistake(f"--measured {path}: {error.key} {error}") from None
+        raise UserError(f"--measured {path}: {error.key} {error}") from None
 
     taken = data if data is not None else scan.data
     lines = [f"data: {json.dumps(taken)}"] if taken else []
@@ -174,11 +174,11 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
 
 
 def _check_file(path):
-    if flaw := flaw_of_path(path):
-        raise Mistake(f"--measured {path}: {flaw}; allowed: a file that holds a topography")
+    if problem := problem_with_path(path):
+        raise UserError(f"--measured {path}: {problem}; allowed: a file that holds a topography")
     with path.open("rb") as file:
         if not file.read(_BEGINNING).strip():
-            raise Mistake(f"--measured {path}: the file is empty; allowed: one that holds a topography")
+            raise UserError(f"--measured {path}: the file is empty; allowed: one that holds a topography")
 
 
 def _read(path, data):
@@ -194,7 +194,7 @@ def _read(path, data):
         except UnfitTopography as error:
             if error.key not in _GUESSES or error.key in assumed:
                 how = "; say which by --data NAME" if error.key == "data" else ""
-                raise Mistake(f"--measured {path}: {error.key} {error}{how}") from None
+                raise UserError(f"--measured {path}: {error.key} {error}{how}") from None
             assumed[error.key] = _GUESSES[error.key]
             missing[error.key] = str(error)
     if "size" in missing:

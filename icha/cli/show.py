@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import Mistake, say
+from icha.cli.project import UserError, echo
 from icha.cli.scans import check_picture
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
-from icha.support.in_words import counted, printable
+from icha.support.formatting import format_count, printable
 
 _BARS = " ▁▂▃▄▅▆▇█"
 _WIDTH = 60
@@ -31,13 +31,13 @@ def show(
     try:
         kind, data = kind_of(file)
     except UnknownFile as error:
-        raise Mistake(str(error)) from None
+        raise UserError(str(error)) from None
     if kind not in (RUN, SURFACE, CAMPAIGN):
-        raise Mistake(f"{file}: {kind}; shown are runs, surfaces and campaign datasets, and others by `ncdump -h`")
+        raise UserError(f"{file}: {kind}; shown are runs, surfaces and campaign datasets, and others by `ncdump -h`")
     if kind == CAMPAIGN:
         studies = list(data.children)
         if study is not None and study not in studies:
-            raise Mistake(f"--study {study}: there is none in {file}; there are: {printable(', '.join(studies))}")
+            raise UserError(f"--study {study}: there is none in {file}; there are: {printable(', '.join(studies))}")
         data = data if study is None else data.filter(lambda node: node.name in (None, data.name, study))
     try:
         if kind == RUN:
@@ -50,9 +50,9 @@ def show(
             from icha.cli.quick_plot import draw
 
             draw(kind, data, plot)
-            say(f"drawn:   {plot}")
+            echo(f"drawn:   {plot}")
     except (AttributeError, LookupError, TypeError, ValueError) as error:  # of files from elsewhere
-        raise Mistake(f"{file}: {kind} of another format ({error!r}); `icha check` lists what is wrong") from None
+        raise UserError(f"{file}: {kind} of another format ({error!r}); `icha check` lists what is wrong") from None
 
 
 def show_run(run, name: str) -> None:
@@ -62,49 +62,49 @@ def show_run(run, name: str) -> None:
     def value(variable):
         return float(run[variable])
 
-    say(f"{name}: {printable(run.attrs.get('title', 'run'))}")
+    echo(f"{name}: {printable(run.attrs.get('title', 'run'))}")
     place = [printable(run.attrs[key]) for key in ("campaign", "study") if run.attrs.get(key)]
     if place:
-        say(f"campaign {' and study '.join(place)}")
+        echo(f"campaign {' and study '.join(place)}")
     if run.attrs.get("applicability"):
-        say(printable(run.attrs["applicability"]), fg="yellow")
-    say(f"model:    {printable(run.attrs.get('contact_model', 'unknown')).replace('_', ' ')}")
-    say(
+        echo(printable(run.attrs["applicability"]), fg="yellow")
+    echo(f"model:    {printable(run.attrs.get('contact_model', 'unknown')).replace('_', ' ')}")
+    echo(
         f"material: E* {quantity(value('contact_modulus'), 'Pa')}, surface energy "
         f"{quantity(value('surface_energy'), 'J/m²')}, range {quantity(value('interaction_range'), 'm')}, "
         f"Tabor parameter {value('tabor_parameter'):.3g}"
     )
-    say(
+    echo(
         f"surface:  period {quantity(value('period'), 'm')}, rms slope {value('rms_slope'):.4g}, rms height "
         f"{quantity(value('rms_height'), 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
     )
     if reason := why_no_result(run.attrs):
-        say(f"failed:   {printable(reason)}", fg="red")
+        echo(f"failed:   {printable(reason)}", fg="red")
     if reason := run.attrs.get("applicability"):
-        say(f"warning:  {printable(reason)}", fg="red")
+        echo(f"warning:  {printable(reason)}", fg="red")
     steps = run.sizes["step"]
     if not steps:
-        say("no step was reached")
+        echo("no step was reached")
         return
     residual = float(run["residual"].max())
-    say(f"{steps} steps, {run.sizes.get('snapshot', 0)} snapshots, residual at most {residual:.1e} h_rms")
+    echo(f"{steps} steps, {run.sizes.get('snapshot', 0)} snapshots, residual at most {residual:.1e} h_rms")
     for variable, label in _CURVES.items():
         values = run[variable].values
-        say(f"{label:>8} {sparkline(values)} {values.min():.3g} to {values.max():.3g}")
+        echo(f"{label:>8} {sparkline(values)} {values.min():.3g} to {values.max():.3g}")
     if str(run["boundary"].values) == "free":
         gap = (run["mean_gap"] / run["rms_height"]).values
-        say(f" gap/h_rms {sparkline(gap)} {gap.min():.3g} to {gap.max():.3g}")
-        say("          u: mean separation from the half-space far away; gap: mean gap between the surfaces")
+        echo(f" gap/h_rms {sparkline(gap)} {gap.min():.3g} to {gap.max():.3g}")
+        echo("          u: mean separation from the half-space far away; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
-        say(
+        echo(
             f"pull-off: {quantity(-value('pull_off_pressure'), 'Pa')} of tension; "
             f"loss {value('hysteresis_loss'):.3g} J/m²"
         )
-    say("")
-    say("  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
+    echo("")
+    echo("  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
     for k in _some(steps):
         row = run.isel(step=k)
-        say(
+        echo(
             f"{k:>6}  {float(row['reduced_pressure']):>16.4e}   {float(row['contact_area_fraction']):.4e}   "
             f"{float(row['reduced_separation']):>8.4f}   {int(row['spot_count']):>6}"
         )
@@ -121,34 +121,34 @@ def _show_surface(surface, file) -> None:
     from icha.datasets.surface_file import as_measured
     from icha.figures.style import quantity
 
-    say(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
+    echo(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
     for key in ("summary", "boundary", "source_file", "preparation"):
         if key in surface.attrs:
-            say(f"{key.replace('_', ' ')}: {printable(surface.attrs[key])}")
-    say("")
+            echo(f"{key.replace('_', ' ')}: {printable(surface.attrs[key])}")
+    echo("")
     scale = as_measured(surface)
     if scale != 1:
         height, slope = (float(surface[name]) * scale for name in ("rms_height", "rms_slope"))
-        say(f"as measured: rms height {quantity(height, 'm')}, rms slope {slope:.4g}")
-        say("as stored, at the rms slope to which the heights are scaled:")
+        echo(f"as measured: rms height {quantity(height, 'm')}, rms slope {slope:.4g}")
+        echo("as stored, at the rms slope to which the heights are scaled:")
     for name in surface.data_vars:
         variable = surface[name]
         if variable.ndim == 0 and variable.dtype.kind in "fiu":
             unit = variable.attrs.get("units", "1")
             text = quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g}"
             unit = "" if unit in ("1", "m") else f" {unit}"
-            say(printable(f"{variable.attrs.get('long_name', name)}: {text}{unit}"))
+            echo(printable(f"{variable.attrs.get('long_name', name)}: {text}{unit}"))
     heights = surface["height"].values
     low, high = (quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
-    say(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; a line through the middle:")
-    say(f"  {sparkline(heights[len(heights) // 2])}")
+    echo(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; a line through the middle:")
+    echo(f"  {sparkline(heights[len(heights) // 2])}")
 
 
 def _show_campaign(tree, file) -> None:
     from icha.datasets.labels import LABELS, labels_at
 
-    say(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
-    say(printable(" ".join(str(tree.attrs.get("summary", "")).split())))
+    echo(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
+    echo(printable(" ".join(str(tree.attrs.get("summary", "")).split())))
     for name, node in tree.children.items():
         study = node.to_dataset()
         sizes = ", ".join(f"{study.sizes[d]} {d}" for d in LABELS)
@@ -156,20 +156,20 @@ def _show_campaign(tree, file) -> None:
         meanings = study["status"].attrs.get("flag_meanings", "").split()
         numbers = {word: int((status == k).sum()) for k, word in enumerate(meanings)}
         counts = ", ".join(f"{number} {word}" for word, number in numbers.items() if number)
-        say(f"\n{printable(f'{name}: {sizes}; {counts}')}")
-        say(f"  models {printable(', '.join(study['model'].values))}")
+        echo(f"\n{printable(f'{name}: {sizes}; {counts}')}")
+        echo(f"  models {printable(', '.join(study['model'].values))}")
         for label, variable in (("A/A0", "contact_area_fraction"), ("p*", "reduced_pressure")):
             values = study[variable].values
             if (known := values[values == values]).size:
-                say(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
+                echo(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
         if reasons := reasons_not_applicable(study):
             some = printable(". ".join(list(reasons)[:3]))
-            say(f"  model not applicable to {counted(reasons.total(), 'run')}: {some}", fg="red")
+            echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {some}", fg="red")
         if "failure" in study:
             for where in zip(*(study["failure"] != "").values.nonzero(), strict=True):
                 labels = map(str, labels_at(study, where, study["failure"].dims))
                 reason = printable(study["failure"].values[where])
-                say(f"  failed: {printable(', '.join(labels))}: {reason}", fg="red")
+                echo(f"  failed: {printable(', '.join(labels))}: {reason}", fg="red")
 
 
 def sparkline(values) -> str:

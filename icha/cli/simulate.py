@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, Mistake
+from icha.cli.project import FAILED, UserError
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import why_no_result
-from icha.support.input_files import flaw_of_path
+from icha.support.input_files import problem_with_path
 
 
 def _length(value: str | None) -> float | None:
@@ -84,12 +84,12 @@ def simulate(
     holds the stops that were reached, and says why there are no more.
     """
     for path in (output, surface):
-        if path is not None and path.exists() and (flaw := flaw_of_path(path)):
-            raise Mistake(f"{path}: {flaw}; allowed: a file")
+        if path is not None and path.exists() and (problem := problem_with_path(path)):
+            raise UserError(f"{path}: {problem}; allowed: a file")
     if output.exists() and not force:
-        raise Mistake(f"{output} is there already; --force replaces it")
+        raise UserError(f"{output} is there already; --force replaces it")
     if not output.absolute().parent.is_dir():
-        raise Mistake(f"{output}: no such folder as {output.parent}")
+        raise UserError(f"{output}: no such folder as {output.parent}")
     if not confirmed:
         _refuse_unusual(
             period=("--period", period if surface is None or surface.suffix == ".npy" else None),
@@ -120,7 +120,7 @@ def simulate(
     except ConvergenceError as error:
         run = error.dataset
     except ValueError as error:
-        raise Mistake(str(error)) from None
+        raise UserError(str(error)) from None
     write_dataset(run, output)
     show_run(run, str(output))
     if why_no_result(run.attrs):
@@ -135,7 +135,7 @@ def _refuse_unusual(**given: tuple[str, float | None]) -> None:
         usual = USUAL[key]
         written = value if usual.si_unit == "1" else f"{value!r} {usual.si_unit}"
         if value is not None and not usual.holds(written):
-            raise Mistake(
+            raise UserError(
                 f"{option}: {written} is unusual; usual: {usual}; allowed: another value, or, if it is meant, this one "
                 "with --confirmed"
             )
@@ -180,15 +180,16 @@ def _refuse_too_large(grid: int, waves: float, model: str) -> None:
     `waves` are the shortest ones along a side: some twenty numbers are held for each wave of the spectrum.
     """
     from icha.planning.costs import RUN_SIZES, surface_cost
-    from icha.planning.needs import memory_of_machine
-    from icha.support import in_words
+    from icha.planning.requirements import memory_of_machine
+    from icha.support import formatting
 
     arrays = 8 * RUN_SIZES[model].arrays * grid**2
     needed, there = max(surface_cost(grid).memory, arrays, 8 * 20 * waves**2), memory_of_machine()
     if needed > there:
         raise ValueError(
-            f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about {in_words.size(needed)} "
-            f"of memory, and this machine has {in_words.size(there)}; choose a smaller --grid or a longer --short"
+            f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about "
+            f"{formatting.size(needed)} of memory, and this machine has {formatting.size(there)}; "
+            "choose a smaller --grid or a longer --short"
         )
 
 

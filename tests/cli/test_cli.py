@@ -28,7 +28,7 @@ from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.figures.style import quantity
-from icha.planning.belonging import belongs_to_another, claim
+from icha.planning.ownership import belongs_to_another, claim
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
 from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
@@ -493,7 +493,7 @@ BEGUN = 77
 
 @pytest.fixture
 def small_machine(monkeypatch):
-    monkeypatch.setattr("icha.planning.needs.memory_of_machine", lambda: 2**20)
+    monkeypatch.setattr("icha.planning.requirements.memory_of_machine", lambda: 2**20)
 
     def begun(*_):
         raise SystemExit(BEGUN)
@@ -516,7 +516,7 @@ def test_what_exceeds_the_machine_is_refused_where_nobody_can_be_asked(project, 
 
 
 def test_a_single_run_that_exceeds_the_machine_is_refused_with_its_size(project, monkeypatch):
-    monkeypatch.setattr("icha.planning.needs.memory_of_machine", lambda: 16e9)
+    monkeypatch.setattr("icha.planning.requirements.memory_of_machine", lambda: 16e9)
     refused = told("simulate", "run.nc", "--grid", "32768", status=2)
     assert "--grid 32768" in refused and "this machine has 16 GB" in refused
     told("simulate", "run.nc", "--grid", "16384", "--model", "boundary_elements", status=2)

@@ -12,12 +12,12 @@ from typer.testing import CliRunner
 import icha
 from icha.cli import app
 from icha.cli.live import Job, last_line, reason_of
-from icha.cli.project import Mistake, markup, say, told
+from icha.cli.project import UserError, echo, markup, reports_errors
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.report.explorer import _filled
 from icha.report.template import template
-from icha.support.in_words import is_printable, printable, printable_lines
+from icha.support.formatting import is_printable, printable, printable_lines
 
 EVIL = "a\x1b[2J\x9b1m\r\b\x07\x7f\u202eb\u2028c\u200b"
 
@@ -40,10 +40,10 @@ def test_what_people_write_stays(text):
 
 
 def test_commands_say_nothing_else(capsys):
-    say(EVIL, fg="red")
-    say(f"two\n{EVIL}", err=True)
+    echo(EVIL, fg="red")
+    echo(f"two\n{EVIL}", err=True)
     with pytest.raises(Exception, match="2"):
-        told(lambda: (_ for _ in ()).throw(Mistake(EVIL)))()
+        reports_errors(lambda: (_ for _ in ()).throw(UserError(EVIL)))()
     out, err = capsys.readouterr()
     assert r"\x1b[2J" in out and r"\x1b[2J" in err and err.startswith("two\n")
     assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(out + err)
