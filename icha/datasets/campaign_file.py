@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from icha.datasets.attributes import COLLECTED, collected
-from icha.datasets.campaign_runs import Arrangement, Entry, arranged, spooled, values_back
+from icha.datasets.campaign_runs import Arrangement, Entry, arrange_runs, load_values, spool_runs
 from icha.datasets.files import (
     FLOAT_FILL,
     INTEGER_FILL,
@@ -295,7 +295,7 @@ def write_campaign(
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=path.parent) as spool:
-        studies = arranged(spooled(runs, spool, settings), design)
+        studies = arrange_runs(spool_runs(runs, spool, settings), design)
         with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
             origins = [each for study in studies for each in study.origins]
             names = [study.name for study in studies]
@@ -356,7 +356,7 @@ def _write_block(
         place = dict(zip(LABELS, position, strict=True))
         values = {
             name: group.columns[name].pad(v)
-            for name, (_, v) in values_back(entry, spool).items()
+            for name, (_, v) in load_values(entry, spool).items()
             if name in group.columns
         }
         for name, v in values.items():
