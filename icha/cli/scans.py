@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from icha.cli.project import UserError
 from icha.support import in_words
+<<<<<<< HEAD
 from icha.support.in_words import counted, printable
+=======
+from icha.support.in_words import printable
+>>>>>>> house
 from icha.support.input_files import problem_with_path
 
 if TYPE_CHECKING:
@@ -185,9 +189,15 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     return MeasuredSection(name, path, lines, missing, filled_in, periodic, advice, resolution)
 
 
+<<<<<<< HEAD
 def _check_file(path: Path) -> None:
     if problem := problem_with_path(path):
         raise UserError(f"--measured {path}: {problem}; expected a file with a topography")
+=======
+def _check_file(path):
+    if problem := problem_with_path(path):
+        raise UserError(f"--measured {path}: {problem}; allowed: a file that holds a topography")
+>>>>>>> house
     with path.open("rb") as file:
         if not file.read(FIRST_BYTES).strip():
             raise UserError(f"--measured {path}: the file is empty; expected a file with a topography")

@@ -13,7 +13,7 @@ from icha.configuration.campaign import Defaults
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.surfaces import SURFACE_KINDS
 from icha.support import in_words
-from icha.support.input_files import flaw_of_path
+from icha.support.input_files import problem_with_path
 from icha.support.values import NOTHING, Problem
 
 # No text of so many bytes has as many values, but aliases may stand for them.
@@ -46,8 +46,8 @@ def read_yaml(path: Path) -> dict:
 
 
 def _text_of(path: Path) -> str:
-    if flaw := flaw_of_path(path):
-        raise ConfigurationError(f"{path}: {flaw}; allowed: a YAML file")
+    if problem := problem_with_path(path):
+        raise ConfigurationError(f"{path}: {problem}; allowed: a YAML file")
     try:
         with path.open("rb") as file:
             content = file.read(_MOST_BYTES + 1)

@@ -49,7 +49,7 @@ class TooLarge(RefusedFile):
         )
 
 
-def flaw_of_path(path: str | os.PathLike) -> str | None:
+def problem_with_path(path: str | os.PathLike) -> str | None:
     """What keeps a path from being opened as a file, None if nothing does; pipes and devices might never end."""
     try:
         kind = stat.S_IFMT(os.stat(path).st_mode)
@@ -201,8 +201,8 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
     """
     import numpy as np  # which commands that read no table do not wait for
 
-    if flaw := flaw_of_path(path):
-        raise ValueError(f"{flaw}; allowed: a CSV file")
+    if problem := problem_with_path(path):
+        raise ValueError(f"{problem}; allowed: a CSV file")
     try:
         with bounded_memory(), Path(path).open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.DictReader(file, skipinitialspace=True))

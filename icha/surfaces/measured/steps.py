@@ -11,7 +11,7 @@ from icha.support import in_words
 from icha.support.input_files import TooLarge, require_room
 from icha.surfaces.measured.scan import Scan
 from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
-from icha.surfaces.square import flaw_of_heights
+from icha.surfaces.square import problem_with_heights
 from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 # Rounding of the quotient of two lengths must not cost a pixel.
@@ -216,8 +216,8 @@ def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
     if heights.shape != (grid, grid):
         heights = _resampled(heights, grid, free=how.boundary == FREE)
         said.append(f"resampled to {grid} x {grid} points")
-    if flaw := flaw_of_heights(heights):
-        raise UnfitTopography("path", f"holds {flaw}; allowed: a rough surface")
+    if problem := problem_with_heights(heights):
+        raise UnfitTopography("path", f"holds {problem}; allowed: a rough surface")
     free = how.boundary == FREE
     said.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     try:

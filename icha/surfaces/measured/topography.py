@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from icha.support.checksums import sha256_of
-from icha.support.input_files import flaw_of_path
+from icha.support.input_files import problem_with_path
 from icha.surfaces.measured.scan import load_scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
 from icha.surfaces.measured.steps import bounded, cropped, detrended, filled, refuse_flat, squared, without_short_waves
@@ -125,6 +125,6 @@ def _facts(path, modified, size, preparation):
 
 def _existing(path):
     path = Path(path)
-    if flaw := flaw_of_path(path):
-        raise UnfitTopography("path", f"{flaw}; allowed: a file of heights")
+    if problem := problem_with_path(path):
+        raise UnfitTopography("path", f"{problem}; allowed: a file of heights")
     return path
