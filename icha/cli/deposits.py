@@ -155,8 +155,8 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
             echo(f"  {name + ':':<10}{printable(textwrap.shorten(text, 200, placeholder=' …'))}")
     if differences := other_versions(original):
         raise Refused(
-            "was made with other versions than those installed; expected the same versions. Run `make environment` in a "
-            "clone of that version, or in a copy of the deposit's source:\n" + "\n".join(differences)
+            "was made with other versions than those installed; expected the same versions. Run `make environment` in "
+            "a clone of that version, or in a copy of the deposit's source:\n" + "\n".join(differences)
         )
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
     if changed := changed_files(original):
@@ -240,7 +240,9 @@ def upload(
             metadata = read_zenodo_metadata(folder)
             _refuse_foreign_doi(metadata, draft)
             files = [archive, folder / README, folder / CRATE]
-            target = f"draft {draft}" if draft else f"new version of {new_version_of}" if new_version_of else "new draft"
+            target = (
+                f"draft {draft}" if draft else f"new version of {new_version_of}" if new_version_of else "new draft"
+            )
             rows = {"to": f"{address}, {target}", **summary_of(metadata)}
             for path in files:
                 size = path.stat().st_size
@@ -263,7 +265,8 @@ def _token(address: str) -> str:
     if not re.fullmatch(r"[!-~]+", token):
         raise UserError(
             f"the environment variable {TOKEN} is {'not a token' if token else 'not set'}; expected a token with the "
-            f"scopes deposit:write and deposit:actions. Create one on {address}/account/settings/applications/tokens/new/"
+            "scopes deposit:write and deposit:actions. Create one on "
+            f"{address}/account/settings/applications/tokens/new/"
         )
     return token
 

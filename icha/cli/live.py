@@ -158,9 +158,7 @@ class Progress:
         measured = sum(job.seconds * job.threads for job in ended)
         # Ratio of measured to expected times on this machine.
         slowness = (measured + PRIOR_SECONDS) / (sum(map(self._expected_work, ended)) + PRIOR_SECONDS)
-        work = sum(
-            max(self._expected_work(job) * slowness - (now - job.started) * job.threads, 0.0) for job in running
-        )
+        work = sum(max(self._expected_work(job) * slowness - (now - job.started) * job.threads, 0.0) for job in running)
         return (work + self._waiting_work([*ended, *running]) * slowness) / max(self.cores, 1)
 
     def _waiting_work(self, begun: list[Job]) -> float:

@@ -47,14 +47,10 @@ def _check_picture(value: Path | None) -> Path | None:
 
 Config = Annotated[
     str | None,
-    typer.Argument(
-        help="Configuration file, or name of a campaign. Default: config/config.yaml.", show_default=False
-    ),
+    typer.Argument(help="Configuration file, or name of a campaign. Default: config/config.yaml.", show_default=False),
 ]
 Anyway = Annotated[bool, typer.Option("--anyway", help="Run even if memory or disk space is probably too small.")]
-Large = Annotated[
-    bool, typer.Option("--large", help="Accept a deposit with very many files, or a zip that unpacks to a very large one.")
-]
+Large = Annotated[bool, typer.Option("--large", help="Accept a deposit with very many or very large files.")]
 Plot = Annotated[Path | None, option("Also draw a plot into this file (.png, .pdf or .svg).", callback=_check_picture)]
 Cores = Annotated[str | None, option("Cores to use, or `all`. Default: 2.", "--cores", "-c", callback=_check_cores)]
 Folder = Annotated[
@@ -145,37 +141,6 @@ def workflow_folder() -> Path:
     return find_project() or own_workflow()
 
 
-<<<<<<< HEAD
-=======
-def configuration_path(asked: str | None) -> Path:
-    """The configuration file that is meant: by its path, by the name of a campaign, or the default one.
-
-    Raises
-    ------
-    UserError
-        If there is no such file.
-    """
-    if asked is None:
-        if not (project() / DEFAULT).is_file():
-            raise UserError(
-                f"there is no {DEFAULT} here; name a campaign: {', '.join(sorted(campaigns()))}, or a YAML file. "
-                "`icha new NAME` writes a campaign to start from"
-            )
-        return shown(project() / DEFAULT)
-    if Path(asked).is_file():
-        return Path(asked)
-    there = campaigns()
-    if asked in there:
-        return shown(there[asked])
-    if Path(asked).exists():
-        raise UserError(f"{asked}: {problem_with_path(asked)}; allowed: a YAML file, or the name of a campaign")
-    raise UserError(
-        f"{asked}: no such file and no campaign of that name; there are: {', '.join(sorted(there))}. `icha new NAME` "
-        "writes a campaign to start from"
-    )
-
-
->>>>>>> house
 def campaigns() -> dict[str, Path]:
     """Return the configuration files that commands find by name: those of the project and those shipped with ICHA.
 

@@ -344,7 +344,9 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     _print_failures(status, stopped, progress, campaign, folder, log)
     if status and results.is_dir() and (reason := why_not_writable(results)):
         # Logs are in this folder, so jobs may have been unable to report it.
-        echo(f"cannot write to {shown(results)}: {reason.strerror}. Repeat the command when this is repaired.", fg="red")
+        echo(
+            f"cannot write to {shown(results)}: {reason.strerror}. Repeat the command when this is repaired.", fg="red"
+        )
     if stopped or status < 0:
         echo("Stopped before the end. Repeat the command to continue.", fg="red")
     elif status and not progress.failed:

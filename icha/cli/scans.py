@@ -12,11 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from icha.cli.project import UserError
 from icha.support import in_words
-<<<<<<< HEAD
 from icha.support.in_words import counted, printable
-=======
-from icha.support.in_words import printable
->>>>>>> house
 from icha.support.input_files import problem_with_path
 
 if TYPE_CHECKING:
@@ -176,7 +172,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     lines.append(f"# {columns} x {rows} points{_size_and_heights(scan, missing, sides)}")
     for key in missing:
         default = " (default: that of the heights)" if key == "lateral_unit" else ""
-        lines.append(f"{key}:        # to fill in, since the file does not contain it{default}: such as {EXAMPLES[key]}")
+        lines.append(f"{key}:        # to fill in, since the file lacks it{default}: such as {EXAMPLES[key]}")
     if gaps:
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
     advice = {} if missing else advice_in_yaml(resolution.advice)
@@ -189,15 +185,9 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     return MeasuredSection(name, path, lines, missing, filled_in, periodic, advice, resolution)
 
 
-<<<<<<< HEAD
 def _check_file(path: Path) -> None:
     if problem := problem_with_path(path):
         raise UserError(f"--measured {path}: {problem}; expected a file with a topography")
-=======
-def _check_file(path):
-    if problem := problem_with_path(path):
-        raise UserError(f"--measured {path}: {problem}; allowed: a file that holds a topography")
->>>>>>> house
     with path.open("rb") as file:
         if not file.read(FIRST_BYTES).strip():
             raise UserError(f"--measured {path}: the file is empty; expected a file with a topography")

@@ -50,9 +50,7 @@ def simulate(
             callback=_LENGTH,
         ),
     ] = None,
-    short: Annotated[
-        str | None, option("Short cut-off wavelength. Default: 8 grid cells.", callback=_LENGTH)
-    ] = None,
+    short: Annotated[str | None, option("Short cut-off wavelength. Default: 8 grid cells.", callback=_LENGTH)] = None,
     hurst: Annotated[float, typer.Option(help="Hurst exponent.")] = 0.8,
     grid: Annotated[int, typer.Option(help="Grid points along a side.")] = 128,
     seed: Annotated[int, typer.Option(help="Seed of the random phases.")] = 1,
@@ -60,9 +58,7 @@ def simulate(
         float | None, option("Scale the heights to this rms slope. Default: 1; that of a file as measured.")
     ] = None,
     modulus: Annotated[str, typer.Option(help="Contact modulus E*.", callback=_in_si("Pa", "25 MPa"))] = "25 MPa",
-    energy: Annotated[
-        str, typer.Option(help="Surface energy.", callback=_in_si("J/m^2", "50 mJ/m^2"))
-    ] = "50 mJ/m^2",
+    energy: Annotated[str, typer.Option(help="Surface energy.", callback=_in_si("J/m^2", "50 mJ/m^2"))] = "50 mJ/m^2",
     interaction_range: Annotated[
         str, typer.Option("--range", help="Range of the attraction.", callback=_LENGTH)
     ] = "2 nm",
@@ -72,9 +68,7 @@ def simulate(
     areas: Annotated[
         str | None, option("Stops at contact area fractions A/A0 instead, increasing.", callback=_numbers)
     ] = None,
-    model: Annotated[
-        str, typer.Option(help=f"Contact model: {' or '.join(MODELS)} (slower).")
-    ] = DEFAULT_MODEL,
+    model: Annotated[str, typer.Option(help=f"Contact model: {' or '.join(MODELS)} (slower).")] = DEFAULT_MODEL,
     unload: Annotated[bool, typer.Option("--unload", help="Unload until the surfaces separate.")] = False,
     confirmed: Annotated[bool, typer.Option("--confirmed", help="Accept unusual values.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
@@ -163,7 +157,9 @@ def _random_surface(period, rolloff, short, hurst, grid, seed, rms_slope, model)
             f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about {in_words.size(needed)} "
             f"of memory, and this machine has {in_words.size(available)}; use a smaller --grid or a longer --short"
         )
-    return SelfAffineSpectrum(period, rolloff, short, hurst, 1.0 if rms_slope is None else rms_slope).realise(grid, seed)
+    return SelfAffineSpectrum(period, rolloff, short, hurst, 1.0 if rms_slope is None else rms_slope).realise(
+        grid, seed
+    )
 
 
 def _cutoffs(period, rolloff, short, grid):
