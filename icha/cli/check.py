@@ -7,7 +7,7 @@ import typer
 
 from icha.cli.project import FAILED, WRONG, echo
 from icha.deposit.verify import CHECKSUMS
-from icha.support.in_words import counted, printable
+from icha.support.formatting import format_count, printable
 
 
 def check(
@@ -40,11 +40,11 @@ def check(
             problems, count = [f"unknown format: {error!r}"], 0
         if problems:
             status = max(status, FAILED)
-            echo(f"{file}: {kind}, {counted(len(problems), 'problem')}", fg="red")
+            echo(f"{file}: {kind}, {format_count(len(problems), 'problem')}", fg="red")
             for problem in problems:
                 echo(f"    {printable(problem)}")
         else:
-            echo(f"{file}: {kind}, no problems" + (f" ({counted(count, 'check')} passed)" if count else ""))
+            echo(f"{file}: {kind}, no problems" + (f" ({format_count(count, 'check')} passed)" if count else ""))
     if status:
         raise typer.Exit(status)
 

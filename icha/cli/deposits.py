@@ -16,8 +16,8 @@ import typer
 
 from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirm, echo, option, shown
 from icha.cli.run import run
-from icha.support import in_words
-from icha.support.in_words import counted, printable
+from icha.support import formatting
+from icha.support.formatting import format_count, printable
 
 TOKEN = "ZENODO_TOKEN"
 MOST_PROBLEMS = 100  # printed of a damaged deposit
@@ -41,7 +41,7 @@ def verify(deposit: Deposit, large: Large = False) -> None:
             echo(f"{printable(deposit)}: intact: {_contents(folder)}")
     except Damaged as damaged:
         echo(_listed(damaged.args))
-        echo(f"{printable(deposit)}: damaged: {counted(len(damaged.args), 'problem')}", err=True, fg="red")
+        echo(f"{printable(deposit)}: damaged: {format_count(len(damaged.args), 'problem')}", err=True, fg="red")
         raise typer.Exit(FAILED) from None
 
 
@@ -60,7 +60,9 @@ def _contents(folder: Path) -> str:
     from icha.deposit.verify import files_of
 
     files = files_of(folder)
-    return f"{counted(len(files), 'file')}, {in_words.size(sum((folder / file).stat().st_size for file in files))}"
+    return (
+        f"{format_count(len(files), 'file')}, {formatting.size(sum((folder / file).stat().st_size for file in files))}"
+    )
 
 
 def _listed(problems: tuple[str, ...]) -> str:
@@ -160,7 +162,7 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
         )
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
     if changed := changed_files(original):
-        echo(f"            (the deposit's source differs from it in {counted(changed, 'file')})", fg="yellow")
+        echo(f"            (the deposit's source differs from it in {format_count(changed, 'file')})", fg="yellow")
     echo(f"writes to:  {shown(folder) if folder else 'a temporary folder'}")
 
 
@@ -183,7 +185,7 @@ def _print_comparison(comparison) -> bool:
     from icha.deposit.compare import DIFFERENT, IDENTICAL, TOLERANCE, table
 
     echo(f"\ncomparison of the deposit with the new results:\n\n{table(comparison)}\n")
-    files = counted(len(comparison.files), "file")
+    files = format_count(len(comparison.files), "file")
     if not comparison.files or comparison.verdict == DIFFERENT:
         echo("different: not everything is reproduced", fg="red")
         return False
@@ -246,7 +248,7 @@ def upload(
             rows = {"to": f"{address}, {target}", **summary_of(metadata)}
             for path in files:
                 size = path.stat().st_size
-                rows[path.name] = f"{in_words.size(size)} ({size:,} bytes)"
+                rows[path.name] = f"{formatting.size(size)} ({size:,} bytes)"
             echo("\n".join(f"{name + ':':<11}{printable(value or 'none')}" for name, value in rows.items()))
             if not yes and not sys.stdin.isatty():
                 raise UserError("cannot ask for confirmation without a terminal; nothing was sent. Use --yes")

@@ -23,8 +23,8 @@ from icha.cli.project import (
     workflow_folder,
 )
 from icha.cli.scans import about_scan
-from icha.support import in_words
-from icha.support.in_words import counted
+from icha.support import formatting
+from icha.support.formatting import format_count
 
 
 def describe(
@@ -91,9 +91,9 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     from rich.console import Console
 
     from icha.deposit.metadata import licence_problem
-    from icha.planning.belonging import belongs_to_another
-    from icha.planning.needs import missing_software, wanting
+    from icha.planning.ownership import belongs_to_another
     from icha.planning.plan import plan
+    from icha.planning.requirements import missing_software, wanting
     from icha.planning.validity import expected_validity
     from icha.support.checksums import damaged
 
@@ -137,8 +137,8 @@ def _print_files(console, items) -> None:
     for heading in ("file", "state", "time", "memory", "disk"):
         table.add_column(heading, justify="left" if heading in ("file", "state") else "right", overflow="fold")
     for item in items:
-        sizes = (in_words.size(size) for size in (item.cost.memory, item.cost.disk))
-        table.add_row(item.path, item.state, in_words.duration(item.cost.seconds), *sizes)
+        sizes = (formatting.size(size) for size in (item.cost.memory, item.cost.disk))
+        table.add_row(item.path, item.state, formatting.duration(item.cost.seconds), *sizes)
     console.print(table)
     console.print()
 
@@ -152,8 +152,8 @@ def _print_sums(console, items) -> None:
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
     every, around = total(items), around_jobs(items)
     footers = {"": "all", "files": str(every.count), "done": str(every.done), "failed": str(every.failed or "")}
-    footers |= {"to do": str(every.to_do), "each": "", "core time": in_words.duration(every.work + around)}
-    footers |= {"memory": in_words.size(every.memory), "disk": in_words.size(every.disk)}
+    footers |= {"to do": str(every.to_do), "each": "", "core time": formatting.duration(every.work + around)}
+    footers |= {"memory": formatting.size(every.memory), "disk": formatting.size(every.disk)}
     for heading, footer in footers.items():
         # A narrow terminal breaks the names, not the numbers.
         table.add_column(
@@ -162,11 +162,11 @@ def _print_sums(console, items) -> None:
     for kind in dict.fromkeys(item.part for item in items):
         sums = total(item for item in items if item.part == kind)
         counts = (str(count or "") for count in (sums.count, sums.done, sums.failed, sums.to_do))
-        work = in_words.duration(sums.work) if sums.to_do else ""
-        sizes = in_words.size(sums.memory), in_words.size(sums.disk)
-        table.add_row(kind, *counts, in_words.duration(sums.typical), work, *sizes)
+        work = formatting.duration(sums.work) if sums.to_do else ""
+        sizes = formatting.size(sums.memory), formatting.size(sums.disk)
+        table.add_row(kind, *counts, formatting.duration(sums.typical), work, *sizes)
     if around:
-        table.add_row("starting and scheduling", "", "", "", "", "", in_words.duration(around))
+        table.add_row("starting and scheduling", "", "", "", "", "", formatting.duration(around))
     console.print(table)
     console.print()
 
@@ -177,12 +177,12 @@ def _print_cost(console, items, cores: int, damaged) -> None:
     runs = [item for item in items if item.is_run]
     every = total(items)
     if every.to_do or damaged:
-        time, memory = in_words.duration(time_on(items, cores)), in_words.size(memory_on(items, cores))
+        time, memory = formatting.duration(time_on(items, cores)), formatting.size(memory_on(items, cores))
         console.print(
-            f"{counted(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and {memory}"
-            f" of memory on {counted(cores, 'core')}; {in_words.size(every.disk)} of disk for all results."
+            f"{format_count(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] "
+            f"and {memory} of memory on {format_count(cores, 'core')}; {formatting.size(every.disk)} of disk for all results."
         )
     else:
-        console.print(f"{counted(len(runs), 'run')}; all results exist.")
+        console.print(f"{format_count(len(runs), 'run')}; all results exist.")
     if changed := sum(item.state == "changed" for item in runs):
-        console.print(f"{counted(changed, 'run')} with other settings: will be computed again.")
+        console.print(f"{format_count(changed, 'run')} with other settings: will be computed again.")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import UserError, echo, option
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 
 
 def explore(
@@ -45,11 +45,11 @@ def explore(
         raise UserError(str(reason)) from None
     except ValueError as error:
         raise UserError(f"{error}; `icha run` computes missing files") from None
-    echo(f"{page}: {counted(written.shown, 'contact')}, {written.size / 1e6:.1f} MB")
+    echo(f"{page}: {format_count(written.shown, 'contact')}, {written.size / 1e6:.1f} MB")
     if written.left_out:
         echo(
-            f"omitted, since the page would be larger than {size:g} MB: {counted(written.left_out, 'contact')}. "
+            f"omitted, since the page would be larger than {size:g} MB: {format_count(written.left_out, 'contact')}. "
             "Use --study, --surface, --material and --seed to choose others, or a larger --size"
         )
     if written.without_steps:
-        echo(f"omitted, since their runs reached no stop: {counted(written.without_steps, 'contact')}")
+        echo(f"omitted, since their runs reached no stop: {format_count(written.without_steps, 'contact')}")

@@ -16,8 +16,8 @@ from rich.text import Text
 
 from icha.cli.project import echo
 from icha.datasets.results import CHECKS, MODEL_ERROR, REPORT
-from icha.support import in_words
-from icha.support.in_words import printable
+from icha.support import formatting
+from icha.support.formatting import printable
 
 # Rules without a job of their own: they collect files of other rules.
 TARGET_RULES = ("all", "surfaces", "runs", "references", "dataset", "figures", "report", "publish")
@@ -181,7 +181,7 @@ class Progress:
     def time_left(self) -> str:
         """Return the estimated time until all jobs are done, as text."""
         seconds = self.seconds_left()
-        return "time left unknown" if seconds is None else f"about {in_words.duration(seconds)} left"
+        return "time left unknown" if seconds is None else f"about {formatting.duration(seconds)} left"
 
 
 def rule_of(output: str) -> str:
@@ -243,7 +243,7 @@ class PlainView(AbstractContextManager):
         progress = self._progress
         ended, total = len(progress.done) + len(progress.failed), str(progress.job_count)
         title = f"failed: {job.title}" if failed else job.title
-        echo(f"[{ended:>{len(total)}}/{total}, {progress.time_left()}] {title} ({in_words.duration(job.seconds)})")
+        echo(f"[{ended:>{len(total)}}/{total}, {progress.time_left()}] {title} ({formatting.duration(job.seconds)})")
         for line in error_of(job, self.folder)[:3] if failed else ():
             echo(f"    {line}")
 
@@ -300,7 +300,7 @@ class LiveView(PlainView):
         progress, failed = self._progress, len(self._progress.failed)
         texts = [f"{self._campaign}: {len(progress.done) + failed} of {progress.job_count} jobs"]
         texts += [f"{failed} failed"] if failed else []
-        texts += [progress.time_left(), f"{in_words.duration(progress.clock() - progress.started)} so far"]
+        texts += [progress.time_left(), f"{formatting.duration(progress.clock() - progress.started)} so far"]
         texts += [self._remark] if self._remark != "planning" else []
         return Text(", ".join(texts), style="bold")
 
@@ -318,7 +318,7 @@ class LiveView(PlainView):
     def _running(self) -> list[Text]:
         progress, lines = self._progress, []
         for job in sorted(progress.running.values(), key=lambda job: job.started)[:MOST_JOBS]:
-            duration = in_words.duration(progress.clock() - job.started)
+            duration = formatting.duration(progress.clock() - job.started)
             lines.append(Text(f"▸ {duration:>8}  {job.title}", no_wrap=True))
             if message := last_line(job, self.folder):
                 lines.append(Text(f"            {message}", style="dim", no_wrap=True))

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from icha.support.in_words import printable_lines
+from icha.support.formatting import printable_lines
 from icha.support.input_files import problem_with_path
 from icha.support.program import own_workflow
 

@@ -33,9 +33,9 @@ from icha.cli.project import (
     shown,
     workflow_folder,
 )
-from icha.support import in_words
+from icha.support import formatting
 from icha.support.atomic_files import in_the_way
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -138,7 +138,7 @@ def run(
 
 
 def _refuse_obstacles(folder: Path, results: Path, name: str, path: Path, workflow: Path) -> None:
-    from icha.planning.belonging import belongs_to_another
+    from icha.planning.ownership import belongs_to_another
 
     if reason := belongs_to_another(shown(results), name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
@@ -163,7 +163,7 @@ def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, 
     UserError
         If the answer is no, or there is no terminal to ask at.
     """
-    from icha.planning.needs import wanting
+    from icha.planning.requirements import wanting
 
     if "surfaces" in targets:
         items = [item for item in items if item.part == "surfaces"]
@@ -204,7 +204,7 @@ def _planned_jobs(output: str) -> str:
     counts = {rule.replace("_", " "): int(number) for rule, number in rows if rule not in TARGETS}
     if counts:
         listed = ", ".join(f"{number} {rule}" for rule, number in counts.items())
-        total = counted(sum(counts.values()), "job")
+        total = format_count(sum(counts.values()), "job")
         return "\n".join([*outdated, f"{total} would run, including jobs for outdated results: {listed}"])
     if outdated:
         return "\n".join([*outdated, "and all results that depend on these"])
@@ -336,10 +336,10 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     if status == 0 and progress.started is None:
         echo("Nothing to do: all requested results exist and are up to date.")
     elif ended:
-        text = f"{len(progress.done)} of {counted(progress.job_count, 'job')} done in "
-        text += in_words.duration(progress.clock() - progress.called)
+        text = f"{len(progress.done)} of {format_count(progress.job_count, 'job')} done in "
+        text += formatting.duration(progress.clock() - progress.called)
         if expected and ended == progress.job_count:
-            text += f"; expected about {in_words.duration(expected)}"
+            text += f"; expected about {formatting.duration(expected)}"
         echo(text)
     _print_failures(status, stopped, progress, campaign, folder, log)
     if status and results.is_dir() and (reason := why_not_writable(results)):
@@ -353,7 +353,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         heading = "Snakemake could not continue:" if ended else "Snakemake could not start:"
         _print_failure(heading, None, _reason_in(log.read_text(encoding="utf-8", errors="replace")))
     elif status and progress.job_count > ended:
-        echo(f"{counted(progress.job_count - ended, 'job')} not run, since they need results of failed jobs")
+        echo(f"{format_count(progress.job_count - ended, 'job')} not run, since they need results of failed jobs")
     if ended or not status:  # otherwise the existing files are those of an earlier call
         files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
         for name, file in files.items():
@@ -371,12 +371,12 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     results = folder / "results" / campaign.name
     incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
     if incomplete:
-        echo(f"{counted(len(incomplete), 'run')} without a result:", fg="red")
+        echo(f"{format_count(len(incomplete), 'run')} without a result:", fg="red")
         for path, reason in incomplete.items():
             _print_failure(None, path, [reason])
     failed = [job for job in progress.failed if not stopped or error_of(job, folder)]
     if failed:
-        echo(f"{counted(len(failed), 'job')} failed:", fg="red")
+        echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
             logs = ", ".join(str(shown(folder / name)) for name in job.logs)
             # The verdict repeats the runs without a result.

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from icha.cli.project import UserError
-from icha.support import in_words
-from icha.support.in_words import counted, printable
+from icha.support import formatting
+from icha.support.formatting import format_count, printable
 from icha.support.input_files import problem_with_path
 
 if TYPE_CHECKING:
@@ -43,12 +43,12 @@ def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model
 
 def _reading(scan) -> Iterator[str]:
     """Return how the file was read, its missing points, and whether opposite edges fit."""
-    filled = f"{counted(scan.filled, 'point')} without height {'was' if scan.filled == 1 else 'were'} filled"
+    filled = f"{format_count(scan.filled, 'point')} without height {'was' if scan.filled == 1 else 'were'} filled"
     array = f", `data: {printable(scan.data)}` of several" if scan.data else ""
     yield f"read as {scan.format}{array}, {filled if scan.filled else 'no point is missing'}"
     yield scan.reading.partition(", ")[2]
     if scan.filled:
-        yield f"{in_words.share(scan.filled, scan.points)} of the points are filled"
+        yield f"{formatting.share(scan.filled, scan.points)} of the points are filled"
     if scan.filled > MOST_FILLED * scan.points:
         yield (
             f"warning: more than {100 * MOST_FILLED:.0f} % of the points are filled by interpolation, which is smooth; "
@@ -67,10 +67,10 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, error_of_cells
 
     used = scan.used
-    scale = f" {in_words.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}" if to_scale else ""
+    scale = f" {formatting.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}" if to_scale else ""
     yield (
-        f"{used.grid} x {used.grid} nodes{scale}, {counted(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} nodes "
-        f"per summit (recommended: at least {LEAST_CELLS_OF_SUMMIT})"
+        f"{used.grid} x {used.grid} nodes{scale}, {format_count(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} "
+        f"nodes per summit (recommended: at least {LEAST_CELLS_OF_SUMMIT})"
     )
     if unsupported := len(scan.asperities.unsupported_height):
         yield (
@@ -99,7 +99,7 @@ def _noise(scan) -> Iterator[str]:
     if (noise := scan.noise) is None:
         yield "no noise floor: the spectrum decreases down to the shortest waves"
     else:
-        rms, wavelength = (in_words.length(float(f"{length:.2g}")) for length in (noise.rms, noise.wavelength))
+        rms, wavelength = (formatting.length(float(f"{length:.2g}")) for length in (noise.rms, noise.wavelength))
         yield (
             f"the spectrum ends in a noise floor of {rms} rms; waves shorter than {wavelength} are mostly noise, and "
             f"contribute {noise.slope_share:.0%} of the mean square slope"
@@ -113,7 +113,7 @@ def _noise(scan) -> Iterator[str]:
 
 def advice_in_yaml(advice: Mapping[str, float | int]) -> dict[str, str]:
     """Return recommended keys with their values as written in a configuration."""
-    return {key: in_words.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
+    return {key: formatting.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import typer
 
 from icha.cli.project import Plot, UserError, echo, option
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
-from icha.support.in_words import counted, printable
+from icha.support.formatting import format_count, printable
 
 BARS = " ▁▂▃▄▅▆▇█"
 MOST_BARS = 60
@@ -144,7 +144,7 @@ def _print_campaign(tree, file: Path) -> None:
                 echo(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
         if reasons := reasons_not_applicable(study):
             first = printable(". ".join(list(reasons)[:3]))
-            echo(f"  model not applicable to {counted(reasons.total(), 'run')}: {first}", fg="red")
+            echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {first}", fg="red")
         if "failure" in study:
             for index in zip(*(study["failure"] != "").values.nonzero(), strict=True):
                 labels = ", ".join(map(str, labels_at(study, index, study["failure"].dims)))

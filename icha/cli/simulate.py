@@ -139,8 +139,8 @@ def _refuse_unusual(**values: tuple[str, float | None]) -> None:
 def _random_surface(period, rolloff, short, hurst, grid, seed, rms_slope, model):
     """Return a random surface; refuse one that needs more memory than this machine has."""
     from icha.planning.costs import RUN_SIZES, surface_cost
-    from icha.planning.needs import memory_of_machine
-    from icha.support import in_words
+    from icha.planning.requirements import memory_of_machine
+    from icha.support import formatting
     from icha.support.rules import GRID, LENGTH
     from icha.surfaces.spectrum import SelfAffineSpectrum
 
@@ -154,8 +154,8 @@ def _random_surface(period, rolloff, short, hurst, grid, seed, rms_slope, model)
     needed, available = max(surface_cost(grid).memory, run_arrays, wave_arrays), memory_of_machine()
     if needed > available:
         raise ValueError(
-            f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about {in_words.size(needed)} "
-            f"of memory, and this machine has {in_words.size(available)}; use a smaller --grid or a longer --short"
+            f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about "
+            f"{formatting.size(needed)} of memory, and this machine has {formatting.size(available)}; use a smaller --grid or a longer --short"
         )
     return SelfAffineSpectrum(period, rolloff, short, hurst, 1.0 if rms_slope is None else rms_slope).realise(
         grid, seed

@@ -28,7 +28,7 @@ from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.figures.style import quantity
-from icha.planning.belonging import belongs_to_another, claim
+from icha.planning.ownership import belongs_to_another, claim
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
 from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
@@ -101,7 +101,7 @@ def no_snakemake(monkeypatch):
 
 @pytest.fixture
 def small_machine(monkeypatch, no_snakemake):
-    monkeypatch.setattr("icha.planning.needs.memory_of_machine", lambda: 2**20)
+    monkeypatch.setattr("icha.planning.requirements.memory_of_machine", lambda: 2**20)
 
 
 @pytest.fixture
@@ -501,7 +501,7 @@ def test_a_campaign_too_large_for_the_machine_starts_after_confirmation(
 
 
 def test_a_single_run_too_large_for_the_machine_is_refused(project, monkeypatch):
-    monkeypatch.setattr("icha.planning.needs.memory_of_machine", lambda: 16e9)
+    monkeypatch.setattr("icha.planning.requirements.memory_of_machine", lambda: 16e9)
     refused = printed("simulate", "run.nc", "--grid", "32768", status=2)
     assert "--grid 32768" in refused and "this machine has 16 GB" in refused
     output("simulate", "run.nc", "--grid", "16384", "--model", "boundary_elements", status=2)

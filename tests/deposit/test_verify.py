@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from icha.cli import app
 from icha.deposit import verify
 from icha.deposit.verify import Damaged, files_of, problem_with_name, read_text, verify_deposit, whole_deposit
-from icha.support.in_words import is_printable
+from icha.support.formatting import is_printable
 
 FILES = {"README.md": "# Tiny\n", "runs/load/soft.nc": bytes(range(256)) * 20, "inputs/Höhen (2).txt": "1 2\n"}
 

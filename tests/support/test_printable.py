@@ -17,7 +17,7 @@ from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.report.explorer import _filled
 from icha.report.template import template
-from icha.support.in_words import is_printable, printable, printable_lines
+from icha.support.formatting import is_printable, printable, printable_lines
 
 EVIL = "a\x1b[2J\x9b1m\r\b\x07\x7f\u202eb\u2028c\u200b"
 
