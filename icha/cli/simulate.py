@@ -155,7 +155,8 @@ def _random_surface(period, rolloff, short, hurst, grid, seed, rms_slope, model)
     if needed > available:
         raise ValueError(
             f"--grid {grid}, with {waves:.3g} of the shortest waves along a side, needs about "
-            f"{formatting.size(needed)} of memory, and this machine has {formatting.size(available)}; use a smaller --grid or a longer --short"
+            f"{formatting.size(needed)} of memory, and this machine has {formatting.size(available)}; use a smaller "
+            "--grid or a longer --short"
         )
     return SelfAffineSpectrum(period, rolloff, short, hurst, 1.0 if rms_slope is None else rms_slope).realise(
         grid, seed
