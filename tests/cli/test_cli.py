@@ -166,7 +166,7 @@ def test_one_of_several_datasets_of_a_measured_file_is_chosen_by_its_name(projec
             file[name] = np.random.default_rng(1).normal(size=(16, 16))
             file[name].attrs["units"] = "nm"
     refused = told("new", "two", "--measured", "my.h5", status=2)
-    assert "allowed: first, second; say which by --data NAME" in refused
+    assert "expected one of: first, second; say which by --data NAME" in refused
     assert icha("new", "two", "--measured", "my.h5", "--data", "third").exit_code == 2
     written = icha("new", "two", "--measured", "my.h5", "--data", "second")
     assert written.exit_code == 0 and "to fill in: surfaces.my.size" in written.output
