@@ -31,7 +31,7 @@ from icha.datasets.attributes import COMPUTED, discovery
 from icha.datasets.build import bin_values, build, described, joined, of, stacked
 from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
-from icha.path.energy_balance import Waypoint, hysteresis
+from icha.path.energy_balance import Waypoint, summarise_loop
 from icha.path.follow import follow
 from icha.path.targets import (
     BETWEEN,
@@ -98,7 +98,7 @@ def simulate(
     seed : recorded in the dataset; -1 for a surface without one.
     progress : called with a line of text at every stop.
     kept : a folder in which equilibria are kept as they are found, and in which those are that a call with the same
-        arguments found before it was stopped (`icha.contact.kept`); of boundary elements.
+        arguments found before it was stopped (`icha.contact.checkpoints`); of boundary elements.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def _computed(solver, surface, material, path, model, seed, progress, kept):
         raise ConvergenceError(met.failure, dataset) from None
     if path.unload:
         pull_off = met.snapshots[-1]["snapshot_step"]
-        loop = hysteresis(met.steps, pull_off, material, observables.largest_tension, met.unattributed)
+        loop = summarise_loop(met.steps, pull_off, material, observables.largest_tension, met.unattributed)
         dataset = dataset.assign(described(LOOP, loop | {"uphill_jump_in_count": _count_uphill_jumps_in(met)}))
     return dataset
 

@@ -30,7 +30,7 @@ from icha.boundary_elements.patches import (
     patch_events,
     unpacked,
 )
-from icha.contact.kept import Kept
+from icha.contact.checkpoints import Kept
 from icha.contact.model import (
     COALESCENCE,
     JUMP_IN,

@@ -1,4 +1,4 @@
-"""The command line: `icha`. Whatever takes time to import is imported by the commands that need it."""
+"""The command line: `icha`. Commands import slow libraries only when they run."""
 
 from typing import Annotated
 
@@ -9,7 +9,7 @@ from icha.cli.deposits import reproduce, upload, verify
 from icha.cli.describe import describe
 from icha.cli.explore import explore
 from icha.cli.new import new
-from icha.cli.project import say, told
+from icha.cli.project import echo, reports_errors
 from icha.cli.run import run
 from icha.cli.show import show
 from icha.cli.simulate import simulate
@@ -23,32 +23,33 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         from importlib.metadata import version
 
-        say(f"icha {version('icha')}")
+        echo(f"icha {version('icha')}")
         raise typer.Exit
 
 
 @app.callback()
 def icha(
     version: Annotated[
-        bool, typer.Option("--version", help="Show the version and exit.", callback=_version, is_eager=True)
+        bool,
+        typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
-    """Adhesive rough contact: campaigns of runs from one YAML file.
+    """Adhesive contact of rough surfaces: campaigns of runs from one YAML file.
 
-    Start with `icha new NAME`, look with `icha describe NAME`, compute with `icha run NAME`.
+    Start with `icha new NAME`, look at it with `icha describe NAME`, compute it with `icha run NAME`.
 
-    Exit status: 0 if all went well, 1 if something failed, 2 if the call or the configuration is wrong.
+    Exit status: 0 on success, 1 if something failed, 2 if the call or the configuration is wrong.
     """
 
 
 for command in (new, describe, run, simulate, show, explore, check, verify, reproduce, upload):
-    app.command()(told(command))
+    app.command()(reports_errors(command))
 
 
 def main() -> None:
-    """Entry point."""
+    """Run the command line."""
     app()

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
-from icha.support import in_words
+from icha.support import formatting
 from icha.support.rules import GRID, HURST, LENGTH, Integer, Real
 from icha.support.values import (
     PATTERN,
@@ -92,7 +92,7 @@ class Crop(Section):
 
     def __repr__(self):
         """How messages call it."""
-        side, x, y = map(in_words.length, (self.side, self.x, self.y))
+        side, x, y = map(formatting.length, (self.side, self.x, self.y))
         return f"a square of {side} at x = {x}, y = {y}"
 
 

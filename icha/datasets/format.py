@@ -16,7 +16,7 @@ import xarray as xr
 from icha.contact.models import MODELS
 from icha.datasets.files import has_groups, is_refused, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
-from icha.support.input_files import bounded_memory, flaw_of_path, most_memory, refuse_traps, require_room
+from icha.support.input_files import bounded_memory, most_memory, problem_with_path, refuse_traps, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
 SOLUTION = "solution by boundary elements at a finite range"
@@ -90,8 +90,8 @@ def kind_of(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
     UnknownFile
         If it is none of them, or cannot be read.
     """
-    if flaw := flaw_of_path(path):
-        raise UnknownFile(f"{path}: {flaw}; allowed: a file")
+    if problem := problem_with_path(path):
+        raise UnknownFile(f"{path}: {problem}; allowed: a file")
     if not os.path.getsize(path):
         raise UnknownFile(f"{path}: the file is empty")
     try:

@@ -6,7 +6,7 @@ The deposit is a folder that `icha.deposit.verify.whole_deposit` has found to be
 import re
 import shutil
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -17,12 +17,12 @@ from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.program import PROGRAM, differences
+from icha.deposit.program import PROGRAM, differences, program_files
 from icha.deposit.verify import CHECKSUMS, COMPUTED, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 from icha.support.input_files import refuse_traps
-from icha.support.program import own_workflow, package_of
+from icha.support.program import own_workflow
 from icha.support.values import NAME_PATTERN
 
 SMALLEST = "smallest"
@@ -75,18 +75,8 @@ def changed_files(deposit: Path) -> int:
     lines = read_text(deposit, CHECKSUMS).splitlines()
     listed = {name.removeprefix(f"{SOURCE}/"): digest for digest, name in (line.split("  ", 1) for line in lines)}
     theirs = {name: digest for name, digest in listed.items() if name == PROGRAM[0] or name.startswith(PROGRAM[1:])}
-    ours = {name: sha256_of(file) for name, file in _installed_files()}
+    ours = {name: sha256_of(file) for name, file in program_files(own_workflow()).items()}
     return sum(theirs.get(name) != ours.get(name) for name in {*theirs, *ours})
-
-
-def _installed_files() -> Iterator[tuple[str, Path]]:
-    """Files of the installed program with their names in the repository."""
-    workflow = own_workflow()
-    for part in PROGRAM:
-        top = package_of(workflow) if part == "icha/" else workflow / part
-        for file in [top] if top.is_file() else top.rglob("*"):
-            if file.is_file() and "__pycache__" not in file.parts:
-                yield (Path(part) / file.relative_to(top)).as_posix(), file
 
 
 def asked_runs(only: Iterable[str], deposit: Path) -> list[str]:
@@ -113,7 +103,7 @@ def asked_runs(only: Iterable[str], deposit: Path) -> list[str]:
             such_as = f", such as {runs[0].removeprefix('runs/').removesuffix('.nc')}" if runs else ""
             raise Refused(
                 f"--only {asked}: the deposit has no such run; allowed: {SMALLEST}, or one of its "
-                f"{counted(len(runs), 'run')}{such_as}"
+                f"{format_count(len(runs), 'run')}{such_as}"
             )
         found.append(path)
     return list(dict.fromkeys(found))

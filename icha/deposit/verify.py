@@ -14,9 +14,9 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from icha.support import in_words
+from icha.support import formatting
 from icha.support.checksums import sha256_of
-from icha.support.in_words import is_printable, printable
+from icha.support.formatting import is_printable, printable
 
 CHECKSUMS = "SHA256SUMS"
 # Files by which a deposit describes itself: to readers, as an RO-Crate, to Zenodo.
@@ -99,7 +99,7 @@ def read_text(folder: Path, name: str) -> str:
     """
     size = (folder / name).stat().st_size
     if size > LARGEST_TEXT:
-        raise ValueError(f"{name}: has {in_words.size(size)}; allowed: {in_words.size(LARGEST_TEXT)}")
+        raise ValueError(f"{name}: has {formatting.size(size)}; allowed: {formatting.size(LARGEST_TEXT)}")
     return (folder / name).read_text(encoding="utf-8")
 
 
@@ -135,13 +135,13 @@ def _extract(path: Path, folder: Path, large: bool) -> Path:
                 raise Damaged(_too_many(len(entries)))
             if unpacked > MOST_GROWTH * packed + ALLOWANCE and not large:
                 raise Damaged(
-                    f"{name}: unpacks from {in_words.size(packed)} to {in_words.size(unpacked)}; allowed: "
-                    f"{MOST_GROWTH} times its size and {in_words.size(ALLOWANCE)}, or more with {LARGE}"
+                    f"{name}: unpacks from {formatting.size(packed)} to {formatting.size(unpacked)}; allowed: "
+                    f"{MOST_GROWTH} times its size and {formatting.size(ALLOWANCE)}, or more with {LARGE}"
                 )
             if unpacked > free:
                 raise OSError(
-                    f"{folder.parent}: {in_words.size(unpacked)} are needed to extract {name}, and "
-                    f"{in_words.size(free)} are free; set TMPDIR to a folder with more room"
+                    f"{folder.parent}: {formatting.size(unpacked)} are needed to extract {name}, and "
+                    f"{formatting.size(free)} are free; set TMPDIR to a folder with more room"
                 )
             archive.extractall(folder)
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:

@@ -29,7 +29,7 @@ from icha.figures.maps import block_means
 from icha.path.targets import BETWEEN
 from icha.report.template import template
 from icha.support.atomic_files import whole_file
-from icha.support.in_words import counted, printable_lines
+from icha.support.formatting import format_count, printable_lines
 
 # What one chooses a contact by, in this order.
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
@@ -202,8 +202,8 @@ def _filled(campaign, data, *, library, largest, left_out=0, without_steps=0) ->
         most_cells=MOST_CELLS,
         least_density=LEAST_DENSITY,
         largest=largest,
-        left_out=left_out and counted(left_out, "contact"),
-        without_steps=without_steps and counted(without_steps, "contact"),
+        left_out=left_out and format_count(left_out, "contact"),
+        without_steps=without_steps and format_count(without_steps, "contact"),
     )
 
 

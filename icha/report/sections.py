@@ -15,9 +15,10 @@ from icha.analysis.model_error import SUMMARISED
 from icha.datasets.labels import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.surface_file import as_measured
 from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.figures.looks import MOST_COLOURS, Scale, legend_below, named_handles
+from icha.figures.legends import legend_below, named_handles
+from icha.figures.looks import MOST_COLOURS, Scale
 from icha.figures.style import COLOURS, TWO_COLUMNS, logarithmic_axes, new_figure, quantity, styled
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 from icha.support.statistics import ENOUGH, ensemble
 
 # --- what was made of what ---
@@ -41,7 +42,7 @@ def provenance(studies, surfaces, figures, model_error, files, dataset) -> list[
     begin = [Box("Configuration", "as used", files.get("Configuration"))]
     if measured := sources(surfaces):
         begin.append(
-            Box("Measurements", counted(len({each["source_sha256"] for each in measured}), "file"), "#surfaces")
+            Box("Measurements", format_count(len({each["source_sha256"] for each in measured}), "file"), "#surfaces")
         )
     runs = [
         Box(_short(study["name"]), _runs(study["complete"], study["failed"]), f"#study-{study['name']}")
@@ -50,13 +51,13 @@ def provenance(studies, surfaces, figures, model_error, files, dataset) -> list[
     if len(studies) > _MOST_STUDIES:
         whole = (sum(study[name] for study in studies) for name in ("complete", "failed"))
         runs = [Box(f"{len(studies)} studies", _runs(*whole), "#studies")]
-    made = [Box("Figures", counted(len(figures), "figure"), "#figures")] if figures else []
+    made = [Box("Figures", format_count(len(figures), "figure"), "#figures")] if figures else []
     if "Comparison" in files:
         made.append(Box("Comparison", "at common loads", files["Comparison"]))
     made.append(Box("Checks", "of the data", "#checks"))
     if model_error is not None:
         states = sum(int(node["area_error"].count()) for node in model_error.children.values())
-        runs.append(Box("Boundary elements", counted(states, "state"), "#error"))
+        runs.append(Box("Boundary elements", format_count(states, "state"), "#error"))
         made.append(Box("Error of the model", "against them", "#error"))
     topographies = f"{len(surfaces)} {'topography' if len(surfaces) == 1 else 'topographies'}"
     columns = [begin, [Box("Surfaces", topographies, "#surfaces")] if surfaces else [], runs]
@@ -65,7 +66,7 @@ def provenance(studies, surfaces, figures, model_error, files, dataset) -> list[
 
 
 def _runs(complete, failed):
-    return counted(complete, "run") + (f", {failed} failed" if failed else "")
+    return format_count(complete, "run") + (f", {failed} failed" if failed else "")
 
 
 def _short(name):

@@ -8,8 +8,8 @@ import jinja2
 import numpy as np
 from markupsafe import Markup, escape
 
-from icha.support import in_words
-from icha.support.in_words import printable_lines
+from icha.support import formatting
+from icha.support.formatting import printable_lines
 
 # A table has so many rows at most.
 MOST_ROWS = 300
@@ -66,6 +66,6 @@ def template(name: str) -> jinja2.Template:
         "scientific": scientific,
         "per_cent": _per_cent,
         "number": "{:g}".format,
-        "duration": in_words.duration,
+        "duration": formatting.duration,
     }
     return environment.get_template(name)

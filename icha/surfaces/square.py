@@ -14,7 +14,7 @@ def periodic_difference(first, second, period):
     return difference - period * np.rint(difference / period)
 
 
-def flaw_of_heights(heights: np.ndarray) -> str | None:
+def problem_with_heights(heights: np.ndarray) -> str | None:
     """What keeps an array of real numbers from being a height map: its shape, values that are not finite, flatness."""
     if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 8:
         return f"an array of shape {heights.shape}, not a square of at least 8 x 8"

@@ -17,7 +17,7 @@ import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, Integer, Real
-from icha.surfaces.square import flaw_of_heights
+from icha.surfaces.square import problem_with_heights
 
 # What lies beyond the square: the same square again and again, or nothing but the half-space.
 PERIODIC, FREE = "periodic", "free"
@@ -82,8 +82,8 @@ class Surface:
             heights = np.array(given, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
-        if flaw := flaw_of_heights(heights):
-            raise ValueError(f"heights: {flaw}")
+        if problem := problem_with_heights(heights):
+            raise ValueError(f"heights: {problem}")
         object.__setattr__(self, "period", LENGTH.checked("period", self.period))
         with np.errstate(over="ignore"):
             _STEEPNESS.checked("heights: their range over the period", np.ptp(heights) / self.period)

@@ -262,6 +262,7 @@ publication:
   authors: [{name: The team}]
 """
 ASKED = asked_of(["0"])
+SOURCES = ("Snakefile", "uv.lock", "LICENSE", "workflow/scripts/run.py")
 
 
 def check(run, value):
@@ -296,13 +297,6 @@ def campaign(tmp_path):
     return campaign, results
 
 
-def export(folder):
-    for name in ("Snakefile", "uv.lock", "LICENSE", "workflow/scripts/run.py"):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(name)
-        (folder / name).chmod(0o644)
-
-
 def published_as(folder, campaign, results):
     files = [path for path in files_of(results) if not path.startswith("checksums/")]
     made = tuple(path for path in files if path.endswith(".nc"))
@@ -312,7 +306,7 @@ def published_as(folder, campaign, results):
         results=results,
         files=files,
         campaign=campaign,
-        source=Source("revision", export),
+        source=Source("revision", dict.fromkeys(SOURCES, (b"source", 0o644))),
         jobs=[Job("run", ("config.used.yaml",), made, (), "Compute.", "source/workflow/scripts/run.py")],
         cost=Cost(60.0, 2e8, 7e6),
     )

@@ -9,8 +9,8 @@ from icha.checks.run import check_run
 from icha.contact.model import NotConverged
 from icha.path import loading
 from icha.path.follow import follow
-from icha.path.loading import Course
-from icha.path.stops import Stop
+from icha.path.loading import PathProgress
+from icha.path.stops import TargetFunction
 
 WAVES = np.add.outer(*[np.cos(np.linspace(0, 2 * np.pi, 16, endpoint=False))] * 2)
 
@@ -86,20 +86,22 @@ def test_at_the_ends_of_the_ranges_runs_are_finite_and_pass_their_checks(height,
 def test_a_path_that_does_not_get_on_ends_and_says_so(monkeypatch):
     monkeypatch.setattr(loading, "_MOST_EQUILIBRIA", 10)
     contact = contact_of([HEIGHT])
-    state, here = contact.untouched(), Course(contact, 1, longest=1.0)
+    state, progress = contact.untouched(), PathProgress(contact, 1, longest=1.0)
     for _ in range(11):
-        here = here.after(state, loading=True)
+        progress.record_equilibrium(state, loading=True)
     with pytest.raises(NotConverged, match=r"no progress: 10 equilibria within 0\.1 h_rms"):
-        here.after(state, loading=True)
-    # A stop is progress, and so is a longest step.
-    assert here.met(Path([1e-2]).targets[0], state).after(state, True).idle == 1
+        progress.record_equilibrium(state, loading=True)
+    # A target is progress, and so is a longest step.
+    progress.record_target(Path([1e-2]).targets[0], state)
+    progress.record_equilibrium(state, loading=True)
+    assert progress.idle == 1
 
 
 @pytest.mark.parametrize("unload", [False, True])
 def test_the_work_for_each_of_many_stops_does_not_grow_with_their_number(monkeypatch, unload):
     contact, calls = contact_of([HEIGHT]), []
-    excess = Stop.excess
-    monkeypatch.setattr(Stop, "excess", lambda stop, state: calls.append(stop) or excess(stop, state))
+    excess = TargetFunction.excess
+    monkeypatch.setattr(TargetFunction, "excess", lambda stop, state: calls.append(stop) or excess(stop, state))
     per_stop = []
     for count in (20, 100):
         calls.clear()

@@ -9,7 +9,7 @@ import scipy
 from job import attributes, guarded
 
 from icha.asperity.material import Material
-from icha.contact.kept import prepared
+from icha.contact.checkpoints import prepared
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from icha.support.input_files import bounded_memory, flaw_of_path, refuse_traps, require_room
+from icha.support.input_files import bounded_memory, problem_with_path, refuse_traps, require_room
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
@@ -19,7 +19,7 @@ from icha.surfaces.measured.settings import (
     regular_ticks,
     with_y_first,
 )
-from icha.surfaces.square import flaw_of_heights
+from icha.surfaces.square import problem_with_heights
 
 # Copies of an array, as floats, in memory while it is read.
 _COPIES = 3
@@ -258,8 +258,8 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
         If the file cannot be read or its heights are not a square array of finite numbers.
     """
     path = Path(path)
-    if flaw := flaw_of_path(path):
-        raise ValueError(f"{flaw}; {_EXPECTED}")
+    if problem := problem_with_path(path):
+        raise ValueError(f"{problem}; {_EXPECTED}")
     try:
         with bounded_memory():
             refuse_traps(path)
@@ -268,8 +268,8 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
         raise ValueError(f"cannot be read ({error}); {_EXPECTED}") from None
     if heights.dtype.kind not in "iuf":
         raise ValueError(f"holds {heights.dtype}, not real numbers; {_EXPECTED}")
-    if flaw := flaw_of_heights(heights):
-        raise ValueError(f"holds {flaw}; {_EXPECTED}")
+    if problem := problem_with_heights(heights):
+        raise ValueError(f"holds {problem}; {_EXPECTED}")
     heights = heights.astype(float) * metres_per_unit
     if not LENGTH.holds(float(np.ptp(heights))):
         raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {_EXPECTED}, and another unit")

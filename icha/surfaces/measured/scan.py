@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from icha.support import in_words
-from icha.support.in_words import printable
+from icha.support import formatting
+from icha.support.formatting import printable
 from icha.support.input_files import RefusedFile, bounded_memory, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
@@ -65,7 +65,7 @@ class Scan:
         """Remark for messages about a length of the scan."""
         if self.coordinate_unit is None:
             return ""
-        unit = in_words.length(self.coordinate_unit)
+        unit = formatting.length(self.coordinate_unit)
         return f"; the coordinates are taken to be in units of {unit}, see `lateral_unit`"
 
 
@@ -87,9 +87,9 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     reading = f"{name}, {rows} rows x {columns} columns of points"
     if found.data:
         reading += f", data {printable(found.data)} of several"
-    sides = [in_words.length(float(side)) for side in size]
-    pixel = [in_words.length(size[0] / columns), in_words.length(size[1] / rows)]
-    reading += f"; pixels of {' x '.join(pixel)}, {' x '.join(sides)} in all; heights in {in_words.length(unit)}"
+    sides = [formatting.length(float(side)) for side in size]
+    pixel = [formatting.length(size[0] / columns), formatting.length(size[1] / rows)]
+    reading += f"; pixels of {' x '.join(pixel)}, {' x '.join(sides)} in all; heights in {formatting.length(unit)}"
     reading += "".join(f"; {remark}" for remark in (found.remark, _replaced(how, found)) if remark)
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     scan = Scan(found.heights.astype(float) * unit, tuple(size), (reading,), coordinate_unit, format_, found.data)
@@ -104,9 +104,9 @@ def _replaced(how, found):
     """Describe the size and unit of the file that given ones replace; empty if there are none."""
     replaced = []
     if how.size and found.size and not np.allclose(how.size, found.size, rtol=1e-3, atol=0):
-        replaced.append(f"its size {' x '.join(map(in_words.length, found.size))}")
+        replaced.append(f"its size {' x '.join(map(formatting.length, found.size))}")
     if how.height_unit and found.unit and not np.isclose(how.height_unit, found.unit, rtol=1e-3, atol=0):
-        replaced.append(f"its unit of heights {in_words.length(found.unit)}")
+        replaced.append(f"its unit of heights {formatting.length(found.unit)}")
     return f"the file has, and you replace, {' and '.join(replaced)}" if replaced else ""
 
 

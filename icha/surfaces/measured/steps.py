@@ -7,11 +7,11 @@ import scipy.fft
 import scipy.sparse
 import scipy.sparse.linalg
 
-from icha.support import in_words
+from icha.support import formatting
 from icha.support.input_files import TooLarge, require_room
 from icha.surfaces.measured.scan import Scan
 from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
-from icha.surfaces.square import flaw_of_heights
+from icha.surfaces.square import problem_with_heights
 from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 # Rounding of the quotient of two lengths must not cost a pixel.
@@ -35,7 +35,7 @@ def cropped(scan: Scan, how: Preparation) -> Scan:
     """
     rows, columns = scan.heights.shape
     dx, dy = scan.pixel
-    width, height = map(in_words.length, scan.size)
+    width, height = map(formatting.length, scan.size)
     if how.crop is None:
         side = min(scan.size)
         nx, ny = (int(side / each * (1 + _ROUNDING)) for each in (dx, dy))
@@ -49,7 +49,7 @@ def cropped(scan: Scan, how: Preparation) -> Scan:
         if first_x + nx > columns or first_y + ny > rows:
             raise UnfitTopography(
                 "crop",
-                f"ends at x = {in_words.length(x + side)}, y = {in_words.length(y + side)}, outside of the scan"
+                f"ends at x = {formatting.length(x + side)}, y = {formatting.length(y + side)}, outside of the scan"
                 f"{scan.remark_on_unit}; allowed: up to x = {width}, y = {height}",
             )
     if nx < 8 or ny < 8:
@@ -112,7 +112,7 @@ def filled(scan: Scan, how: Preparation) -> Scan:
         raise UnfitTopography("missing", f"would make up {count} of {missing.size} points; allowed: up to half of them")
     heights = scan.heights.copy()
     heights[missing] = _harmonic(heights, missing, periodic=how.boundary == PERIODIC)
-    said = f"{count} missing points filled, {in_words.share(count, missing.size)} of the points"
+    said = f"{count} missing points filled, {formatting.share(count, missing.size)} of the points"
     return scan.after(heights, said)
 
 
@@ -153,7 +153,7 @@ def squared(scan: Scan, how: Preparation) -> Scan:
     grid = int(min(scan.size) / cell * (1 + 1e-9))
     lines = np.take(scan.heights, range(grid), axis=1 - across)
     heights = _by_cosine_series(lines, across, cell / max(dx, dy), grid)
-    pixel = " x ".join(map(in_words.length, (dx, dy)))
+    pixel = " x ".join(map(formatting.length, (dx, dy)))
     said = f"pixels of {pixel} resampled to {grid} x {grid} square ones, by the cosine series along {'yx'[across]}"
     return scan.after(heights, said, size=(grid * cell, grid * cell))
 
@@ -187,7 +187,7 @@ def without_short_waves(scan: Scan, how: Preparation) -> Scan:
         raise UnfitTopography(
             "cutoff",
             f"is {how.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; allowed: from {LEAST_PIXELS} pixels, "
-            f"{in_words.length(least)}, to the side of the square, {in_words.length(most)}",
+            f"{formatting.length(least)}, to the side of the square, {formatting.length(most)}",
         )
     dx, dy = scan.pixel
     sigma = DEVIATION * how.cutoff
@@ -216,8 +216,8 @@ def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
     if heights.shape != (grid, grid):
         heights = _resampled(heights, grid, free=how.boundary == FREE)
         said.append(f"resampled to {grid} x {grid} points")
-    if flaw := flaw_of_heights(heights):
-        raise UnfitTopography("path", f"holds {flaw}; allowed: a rough surface")
+    if problem := problem_with_heights(heights):
+        raise UnfitTopography("path", f"holds {problem}; allowed: a rough surface")
     free = how.boundary == FREE
     said.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     try:

@@ -116,12 +116,12 @@ class SourceFile:
     def _lines(self) -> Iterator[tuple[int, str]]:
         """Iterate over the lines of numbers, without remarks, with their numbers, counted from 1; note gaps."""
         self._gaps.clear()
-        row, after_gap, last_line = 0, False, self.layout.last_line
+        layout, row, after_gap = self.table_layout, 0, False
         with open_text(self.path) as file:
             for number, line in enumerate(file, 1):
-                if last_line is not None and number > last_line:
+                if layout.last_line is not None and number > layout.last_line:
                     return
-                if number <= self.layout.first_line:
+                if number <= layout.first_line:
                     continue
                 if not (text := strip_remark(line)):
                     after_gap = row > 0
@@ -236,7 +236,7 @@ def _find_layout(path: Path) -> Layout | None:
             fields = notation.fields(text)
             numbers = [notation.number(field) for field in fields]
             corner = numbers[0] is None and is_scale(numbers[1:])
-            if corner or (None not in numbers and not np.all(np.isnan(numbers))):
+            if corner or (None not in numbers and not np.isnan(np.array(numbers, dtype=float)).all()):
                 if heading:
                     _refuse_damaged_row(heading[-1], len(heading), notation)
                 notation = _decide_on_commas(notation, lines[number:], len(fields))

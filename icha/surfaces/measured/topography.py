@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from icha.support.checksums import sha256_of
-from icha.support.input_files import flaw_of_path
+from icha.support.input_files import problem_with_path
 from icha.surfaces.measured.scan import load_scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
 from icha.surfaces.measured.steps import bounded, cropped, detrended, filled, refuse_flat, squared, without_short_waves
@@ -69,8 +69,8 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         A ValueError with the setting (`key`) that does not fit the file, the reason, and what is expected.
     """
     file, how = Path(path), Preparation(**preparation)
-    if flaw := flaw_of_path(file):
-        raise UnfitTopography("path", f"{flaw}; expected a file of heights")
+    if problem := problem_with_path(file):
+        raise UnfitTopography("path", f"{problem}; expected a file of heights")
     scan = load_scan(file, how)
     touching = scan.heights if how.touches_first == "high" else -scan.heights
     square = cropped(scan.after(touching, f"{how.touches_first} numbers touch first"), how)

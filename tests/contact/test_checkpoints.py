@@ -6,7 +6,7 @@ from xarray.testing import assert_identical
 from icha import Material, Path, SelfAffineSpectrum, simulate
 from icha.boundary_elements import contact
 from icha.boundary_elements.contact import BoundaryElements
-from icha.contact.kept import prepared
+from icha.contact.checkpoints import prepared
 from icha.simulation import ConvergenceError
 
 SURFACE = SelfAffineSpectrum(1e-6, 1e-6, 0.5e-6, 0.8).realise(16, 1).scaled_to_rms_slope(0.3)
