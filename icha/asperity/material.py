@@ -7,7 +7,7 @@ import numpy as np
 from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
 
 # From this Tabor parameter on Wu's distance of the jump into contact is within 0.5 % of the exact one, which
-# icha.references.jump_in computes.
+# validation.jump_in computes.
 WU_HOLDS_FROM = 1.0
 
 

@@ -11,7 +11,8 @@ from icha.datasets.labels import place_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
-from icha.figures.looks import Looks, interfaces_of, legend_below, words_handle
+from icha.figures.legends import legend_below, words_handle
+from icha.figures.looks import Looks, interfaces_of
 from icha.figures.select import NothingToDraw, asked_of_entry, study_errors
 from icha.figures.style import DASHES, GREY, legend_handle, logarithmic_axes, material_label, new_panels, number, styled
 from icha.support.statistics import ensemble

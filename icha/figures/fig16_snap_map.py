@@ -10,10 +10,10 @@ import numpy as np
 from icha.datasets import results
 from icha.figures.curves import SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, not_unloaded
-from icha.figures.hysteresis import BRANCH_DASHES
-from icha.figures.looks import NOT_APPLICABLE_ALONE, legend_below, words_handle
+from icha.figures.legends import legend_below, words_handle
+from icha.figures.looks import BRANCH_DASHES, NOT_APPLICABLE_ALONE
 from icha.figures.maps import block_means, draw_whole
-from icha.figures.select import NothingToDraw, is_applicable, run_on_topography, ways_back
+from icha.figures.select import NothingToDraw, is_applicable, run_on_topography, unloading_legs
 from icha.figures.style import (
     BLACK,
     GREY,
@@ -85,8 +85,8 @@ _LEAST_SIZE = 1.6
 def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: object) -> Figure:
     """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
     labels, run = run_on_topography(campaign, study, surface, **which)
-    if not ways_back(run):
-        raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
+    if not unloading_legs(run):
+        raise NothingToDraw(f"study {study}: no run was unloaded, so there is no unloading to draw")
     events = _events(run)
     fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
     handles = _draw_places(where, run, surface, events)
@@ -163,7 +163,7 @@ def _events(run):
     )
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
-    back = ways_back(run)[-1]["leg"].values[-1]
+    back = unloading_legs(run)[-1]["leg"].values[-1]
     own = (leg == 0) | (leg == back)
     return {
         "kind": np.array([names[int(value)] for value in kind.values], dtype=object)[own],

@@ -21,7 +21,8 @@ from icha.figures import (
 )
 from icha.figures.captions import count_runs
 from icha.figures.ensembles import draw_members, draw_points
-from icha.figures.looks import FEWER_SEEDS, NOT_APPLICABLE, NOT_APPLICABLE_ALONE
+from icha.figures.legends import FEWER_SEEDS
+from icha.figures.looks import NOT_APPLICABLE, NOT_APPLICABLE_ALONE
 from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)
