@@ -275,9 +275,9 @@ def test_a_surface_that_pulls_itself_together_is_reported_with_what_was_computed
 
 
 def test_nothing_reached_is_an_empty_dataset_not_a_wrong_one(monkeypatch):
-    import icha.equilibrium.equilibrium
+    import icha.equilibrium.solver
 
-    monkeypatch.setattr(icha.equilibrium.equilibrium, "_MAX_NEWTON_STEPS", 0)
+    monkeypatch.setattr(icha.equilibrium.solver, "_MAX_NEWTON_STEPS", 0)
     with pytest.raises(ConvergenceError, match="after 0 of 3 stops") as caught:
         run_of(rough(), BARE)
     assert caught.value.dataset.sizes["step"] == 0
