@@ -31,7 +31,7 @@ from icha.datasets.files import (
 )
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.results import COMPRESSION, LEAST_COMPRESSED
-from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, place_of
+from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, index_variable
 from icha.datasets.variables.run import FURTHER
 from icha.support.atomic_files import whole_file
 
@@ -149,7 +149,9 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
     for dim, variables in ragged.items():
         for label in LABELS:
             name, options = f"{dim}_{label}", storage.options((), (dim,))
-            variables[name] = define_numbers(group, name, (dim,), np.int32, place_of(dim, label).attributes, **options)
+            variables[name] = define_numbers(
+                group, name, (dim,), np.int32, index_variable(dim, label).attributes, **options
+            )
     return Group(study, storage.block, columns, ragged, known, texts)
 
 

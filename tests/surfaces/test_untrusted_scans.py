@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, refused, scan, write_xyz
 
-from icha.datasets.format import SURFACE, UnknownFile, kind_of
+from icha.datasets.format import SURFACE, UnknownFile, identify_file
 from icha.surfaces.measured.array_files import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
@@ -157,9 +157,9 @@ def test_files_that_are_large_themselves_are_read_and_small_ones_that_say_so_are
                 file.createDimension(axis, nodes)
             file.createVariable("period", "f8")[...] = 1.0
             file.createVariable("height", "f8", ("y", "x"), compression=compression)[:] = np.zeros((nodes, nodes))
-    assert kind_of(tmp_path / "own.nc")[0] == SURFACE
+    assert identify_file(tmp_path / "own.nc")[0] == SURFACE
     with pytest.raises(UnknownFile, match=r"packed\.nc: "):
-        kind_of(tmp_path / "packed.nc")
+        identify_file(tmp_path / "packed.nc")
 
 
 def test_what_is_left_in_a_campaign_dataset_until_it_is_used_is_bounded_as_well(tmp_path):
@@ -170,7 +170,7 @@ def test_what_is_left_in_a_campaign_dataset_until_it_is_used_is_bounded_as_well(
         study.createVariable("status", "i4", ())[...] = 0
         study.createVariable("residual", "f8", ("run", "step"), chunksizes=(100, 100), compression="zlib")
     with pytest.raises(UnknownFile, match="needs about 320 GB of memory; allowed: 2 GB, or what"):
-        kind_of(tmp_path / "campaign.nc")
+        identify_file(tmp_path / "campaign.nc")
 
 
 def write_external_storage(path, secret):
@@ -203,7 +203,7 @@ def test_data_that_lie_in_other_files_are_refused(write, name, tmp_path):
     with pytest.raises(UnfitTopography, match=r"'height' (is a link to another file|has its data elsewhere)"):
         scan(path, **LINES)
     with pytest.raises(UnknownFile, match=r"'height' (is a link to another file|has its data elsewhere)"):
-        kind_of(path)
+        identify_file(path)
     if name == "scan.nc":
         with pytest.raises(ValueError, match=r"'height' (is a link to another file|has its data elsewhere)"):
             read_height_map(path, 1.0)
@@ -236,7 +236,7 @@ def test_groups_with_two_names_are_refused(circle, name, tmp_path):
     with pytest.raises(UnfitTopography, match="is a group that has another name, too; allowed: one name for each"):
         scan(tmp_path / name, **LINES)
     with pytest.raises(UnknownFile, match="is a group that has another name, too"):
-        kind_of(tmp_path / name)
+        identify_file(tmp_path / name)
 
 
 def test_groups_that_lie_deep_in_one_another_are_refused_at_once(tmp_path):
