@@ -22,7 +22,7 @@ from icha.datasets import results
 from icha.datasets.attributes import why_no_result
 from icha.datasets.campaign import find_snapshot, reduced_gap, run_labels, select_run, spots_of
 from icha.datasets.files import read_campaign, read_dataset, readable
-from icha.datasets.labels import RunLabels, parts
+from icha.datasets.labels import RunLabels, path_fields
 from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
 from icha.figures.fig8_patch_sizes import patch_areas, patch_density, patches_above
 from icha.figures.maps import block_means
@@ -165,7 +165,7 @@ def _maps(folder: Path, labels: RunLabels, run: xr.Dataset) -> list[str] | None:
 
     Only the file of the run contains maps; its snapshots may have another order than in the campaign.
     """
-    file = folder / results.RUN.format(**parts(labels))
+    file = folder / results.RUN.format(**path_fields(labels))
     if not MODELS[labels.model].by_cells or not file.is_file():
         return None
     with readable(file), xr.open_dataset(file, engine="netcdf4") as data:
