@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from icha.figures.looks import MODEL_MARKERS, NOT_APPLICABLE, Scale
 from icha.figures.style import GREY, legend_handle
@@ -20,8 +17,6 @@ FEWER_SEEDS = "crossed: mean over n seeds, fewer than asked for"
 
 # More names than this are written smaller.
 _MANY_NAMES = 12
-# Inches that an entry takes beside its name, and a character of it, in 8 point; and of the height of a row.
-_BESIDE, _CHARACTER, _ROW = 0.7, 0.062, 0.155
 _MOST_COLUMNS = 4
 _PALE_GREY = "0.72"
 
@@ -41,15 +36,14 @@ def legend_below(
     if scale:
         scale.draw(figure, list(panels))
     handles = dict(handles) | _marks(figure)
-    if handles:
-        size = 8 if len(handles) <= _MANY_NAMES else 7
-        lengths = [_printed_length(name) * size / 8 for name in handles]
-        columns = next(
-            (count for count in range(_MOST_COLUMNS, 1, -1) if _width(lengths, count) < figure.get_figwidth()), 1
-        )
-        rows = -(-len(handles) // columns)
-        figure.set_figheight(figure.get_figheight() + 0.06 + _ROW * size / 8 * rows)
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)
+    look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
+    for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
+        legend = figure.legend(handles.values(), handles.keys(), ncols=columns, **look)
+        size = legend.get_window_extent().size / figure.dpi
+        if size[0] < figure.get_figwidth() or columns == 1:
+            figure.set_figheight(figure.get_figheight() + size[1])
+            break
+        legend.remove()
     _spread_numbers(figure)
 
 
@@ -84,17 +78,6 @@ def model_handle(name: str, **look: object) -> Line2D:
 def words_handle(text: str) -> dict[str, object]:
     """An explanation in a legend, without a look of its own."""
     return {text: legend_handle(color=GREY, ls="none")}
-
-
-def _width(lengths, columns):
-    """Inches that so many columns of names take, at most as many as there are names."""
-    parts = np.array_split(lengths, min(columns, len(lengths)))
-    return sum(_BESIDE + _CHARACTER * max(part) for part in parts)
-
-
-def _printed_length(name):
-    """About how many characters a name has when its formulas are set."""
-    return len(re.sub(r"\\mathrm|\\prime|\\ast|\\bar|[{}$^_]", "", name).replace(r"\Delta\gamma", "Δγ"))
 
 
 # Where the number of seeds may stand beside a mark: points to the right, or to the left, and up.
