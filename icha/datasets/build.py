@@ -12,11 +12,8 @@ from icha.datasets.variables.terms import Table, Variable
 if TYPE_CHECKING:
     import xarray as xr
 
-# Lower and upper edge of a bin, as CF has bounds.
-BOUND = "bound"
 
-
-def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
+def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
     """The dataset of some values, in the order of the table, coordinates last.
 
     Parameters
@@ -32,19 +29,19 @@ def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> 
     """
     import xarray as xr  # which takes a while, and the vocabulary needs no more than `bin_table`
 
-    variables = described(table, values)
+    variables = describe_variables(table, values)
     coordinates = {name: variables.pop(name) for name in table if name in variables and table[name].coordinate}
     return xr.Dataset(variables, coordinates, attrs)
 
 
-def described(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]:
+def describe_variables(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]:
     """Variables of some values with their dimensions, types and attributes, in the order of the table."""
     if unknown := values.keys() - table.keys():
         raise ValueError(f"variables without a description: {', '.join(sorted(unknown))}")
-    return {name: variable(table[name], values[name]) for name in table if name in values}
+    return {name: make_variable(table[name], values[name]) for name in table if name in values}
 
 
-def variable(description: Variable, values: Any) -> xr.Variable:
+def make_variable(description: Variable, values: Any) -> xr.Variable:
     """A variable with the dimensions, type and attributes of its description."""
     import xarray as xr
 
@@ -52,12 +49,12 @@ def variable(description: Variable, values: Any) -> xr.Variable:
     return xr.Variable(description.dims, np.asarray(values, dtype), description.attributes)
 
 
-def of(thing: Any, *names: str) -> dict[str, Any]:
+def get_values(thing: Any, *names: str) -> dict[str, Any]:
     """Values that a surface, a material or a spectrum has under the names of their variables."""
     return {name: getattr(thing, name) for name in names}
 
 
-def stacked(
+def stack_rows(
     table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
 ) -> dict[str, np.ndarray]:
     """Rows of values, one for each position along a dimension, as arrays of all variables that begin with it.
@@ -72,7 +69,7 @@ def stacked(
     return values | ({dim: np.arange(len(rows))} if dim in table else {})
 
 
-def joined(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
+def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
     """The variables of a table along a ragged dimension, of which every row has as many values as it likes.
 
     They stand one after the other, and `<dim>_<instance>` says to which row each belongs.
@@ -81,29 +78,6 @@ def joined(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: 
     names = [name for name, own in table.items() if own.dims == (dim,) and name != index]
     values = {name: np.concatenate([np.empty(0), *(row[name] for row in rows)]) for name in names}
     return values | {index: np.repeat(np.arange(len(rows)), [len(row[names[0]]) for row in rows])}
-
-
-def bin_table(quantity: str, units: str, over: str = "") -> Table:
-    """Descriptions of the variables that say where the bins of a quantity are.
-
-    `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
-    bounds (CF 1.11, section 7.1), which have its units and its long name. In Pa it must not be a coordinate
-    variable, along a dimension of its own name, which CF would take for a height.
-
-    Parameters
-    ----------
-    quantity : what is binned.
-    units : of the edges.
-    over : by what the quantity is divided, if by anything.
-    """
-    over = f" over {over}" if over else ""
-    bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
-    middle = {"bounds": f"{bins}_bounds", "comment": "middle of the bin"}
-    return {
-        f"{bins}_edges": Variable((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
-        f"{bins}_centre": Variable((bins,), units, inside, further=middle, coordinate=True),
-        f"{bins}_bounds": Variable((bins, BOUND), units, inside),
-    }
 
 
 def bin_values(quantity: str, edges: np.ndarray) -> dict[str, np.ndarray]:
