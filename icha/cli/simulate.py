@@ -134,7 +134,7 @@ def _refuse_unusual(**given: tuple[str, float | None]) -> None:
     for key, (option, value) in given.items():
         usual = USUAL[key]
         written = value if usual.si_unit == "1" else f"{value!r} {usual.si_unit}"
-        if value is not None and not usual.holds(written):
+        if value is not None and not usual.contains(written):
             raise UserError(
                 f"{option}: {written} is unusual; usual: {usual}; allowed: another value, or, if it is meant, this one "
                 "with --confirmed"
@@ -150,8 +150,8 @@ def _topography(file, period, rolloff, short, hurst, grid, seed, rms_slope, mode
         slope = 1.0 if rms_slope is None else rms_slope
         for name, length in (("--period", period), ("--rolloff", rolloff), ("--short", short)):
             if length is not None:
-                LENGTH.checked(name, length)
-        rolloff, short = _cutoffs(period, rolloff, short, GRID.checked("grid", grid))
+                LENGTH.validate(name, length)
+        rolloff, short = _cutoffs(period, rolloff, short, GRID.validate("grid", grid))
         _refuse_too_large(grid, period / short, model)
         return SelfAffineSpectrum(period, rolloff, short, hurst, slope).realise(grid, seed)
     if file.suffix == ".npy":
