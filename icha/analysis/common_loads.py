@@ -12,7 +12,7 @@ from icha.datasets.build import variable
 from icha.datasets.campaign import loading_stops, reduced_gap
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, MISSING
-from icha.datasets.variables.terms import Variable, term
+from icha.datasets.variables.terms import TERMS, Variable
 from icha.support.statistics import ensemble
 
 # Loads at which curves are compared, per decade.
@@ -97,10 +97,10 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     for axis, load in _loads(study).items():
         suffix = "" if axis == "reduced_pressure" else "_at_load"
         at, on_grid = _on_common_grid(study, load, complete)
-        coords[axis] = variable(term(axis)._replace(dims=(axis,)), at)
+        coords[axis] = variable(TERMS[axis]._replace(dims=(axis,)), at)
         for name, (description, values) in (_curves(study, on_grid) | _spreads(on_grid, averaged)).items():
             along = description._replace(
-                dims=(*description.dims, axis), long_name=f"{description.long_name}, at {term(axis).long_name}"
+                dims=(*description.dims, axis), long_name=f"{description.long_name}, at {TERMS[axis].long_name}"
             )
             variables[name + suffix] = variable(along, values)
     described = collected(

@@ -12,9 +12,6 @@ from icha.datasets.variables.terms import Table, Variable
 if TYPE_CHECKING:
     import xarray as xr
 
-# Lower and upper edge of a bin, as CF has bounds.
-BOUND = "bound"
-
 
 def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
     """The dataset of some values, in the order of the table, coordinates last.
@@ -81,29 +78,6 @@ def joined(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: 
     names = [name for name, own in table.items() if own.dims == (dim,) and name != index]
     values = {name: np.concatenate([np.empty(0), *(row[name] for row in rows)]) for name in names}
     return values | {index: np.repeat(np.arange(len(rows)), [len(row[names[0]]) for row in rows])}
-
-
-def bin_table(quantity: str, units: str, over: str = "") -> Table:
-    """Descriptions of the variables that say where the bins of a quantity are.
-
-    `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
-    bounds (CF 1.11, section 7.1), which have its units and its long name. In Pa it must not be a coordinate
-    variable, along a dimension of its own name, which CF would take for a height.
-
-    Parameters
-    ----------
-    quantity : what is binned.
-    units : of the edges.
-    over : by what the quantity is divided, if by anything.
-    """
-    over = f" over {over}" if over else ""
-    bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
-    middle = {"bounds": f"{bins}_bounds", "comment": "middle of the bin"}
-    return {
-        f"{bins}_edges": Variable((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
-        f"{bins}_centre": Variable((bins,), units, inside, further=middle, coordinate=True),
-        f"{bins}_bounds": Variable((bins, BOUND), units, inside),
-    }
 
 
 def bin_values(quantity: str, edges: np.ndarray) -> dict[str, np.ndarray]:

@@ -9,7 +9,7 @@ import xarray as xr
 
 from icha.asperity.material import Material
 from icha.datasets.attributes import THEORY, discovery
-from icha.datasets.variables.terms import term
+from icha.datasets.variables.terms import TERMS
 from icha.references import persson, summit_theories
 from icha.surfaces.moments import SpectralMoments
 from icha.surfaces.spectrum import SelfAffineSpectrum
@@ -65,7 +65,7 @@ def reference_dataset(
 
 
 _PRESSURE, _AREA, _SEPARATION, _NAYAK = (
-    term(name).long_name
+    TERMS[name].long_name
     for name in ("reduced_pressure", "contact_area_fraction", "reduced_separation", "nayak_parameter")
 )
 

@@ -127,8 +127,8 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, deposit
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     status, said = reproduce(folder.with_name(folder.name + ending), "--cores", "3", "--anyway")
     assert status == 0 and "identical: 4 files, every value" in said, said
-    assert "it says of itself, and nobody has checked it:\n  title:    A \\x1b[2J title\n  authors:  Carb" in said
-    assert f"is run:     the ICHA that is installed, {version('icha')}; nothing in the deposit is executed" in said
+    assert "its metadata, which ICHA cannot verify:\n  title:    A \\x1b[2J title\n  authors:  Carb" in said
+    assert f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed" in said
     ((_, targets, cores, anyway),) = computed
     assert (targets, cores, anyway) == (["all"], "3", True)
     assert list((tmp_path / "temporary").iterdir()) == []

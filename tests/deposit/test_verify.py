@@ -44,7 +44,7 @@ def test_a_whole_deposit_is_whole(ending, folder):
         assert files_of(found) == sorted([*FILES, "SHA256SUMS"])
     assert found == path or not found.exists()
     done = CliRunner().invoke(app, ["verify", str(path)])
-    assert done.exit_code == 0 and "whole: 4 files" in done.output
+    assert done.exit_code == 0 and "intact: 4 files" in done.output
     assert CliRunner().invoke(app, ["verify", f"{path}.none"]).exit_code == 2
 
 
@@ -175,7 +175,7 @@ def test_no_more_than_a_hundred_problems_are_printed(folder):
     for k in range(150):
         (folder / f"added{k}").touch()
     done = CliRunner().invoke(app, ["verify", str(folder)])
-    assert done.exit_code == 1 and "… and 50 more" in done.output and "not whole: 150 problems" in done.output
+    assert done.exit_code == 1 and "… and 50 more" in done.output and "damaged: 150 problems" in done.output
 
 
 def test_names_are_too_long_where_file_systems_say_so():
