@@ -180,7 +180,8 @@ def _print_cost(console, items, cores: int, damaged) -> None:
         time, memory = formatting.duration(time_on(items, cores)), formatting.size(memory_on(items, cores))
         console.print(
             f"{format_count(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] "
-            f"and {memory} of memory on {format_count(cores, 'core')}; {formatting.size(every.disk)} of disk for all results."
+            f"and {memory} of memory on {format_count(cores, 'core')}; {formatting.size(every.disk)} of disk "
+            "for all results."
         )
     else:
         console.print(f"{format_count(len(runs), 'run')}; all results exist.")
