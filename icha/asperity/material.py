@@ -1,4 +1,4 @@
-"""The elastic half-space and the interface: three numbers."""
+"""Material: composite modulus, energy of adhesion and range of attraction."""
 
 from dataclasses import dataclass
 

@@ -170,11 +170,13 @@ class Path:
             raise ValueError(f"control: {control!r} must be one of {SEPARATION_CONTROL}, {LOAD_CONTROL}")
         max_step = STEP.validate("max_step", max_step)
         values = _validate_list(kind, lists[kind])
-        recorded = _validate_snapshots([(kind, values[-1])] if snapshots is None else snapshots)
+        recorded: list[tuple[str, float]] = _validate_snapshots(
+            [(kind, values[-1])] if snapshots is None else snapshots
+        )
         targets = [Target(kind, value, (kind, value) in recorded) for value in values]
         listed = {(kind, value) for value in values}
         turns = _validate_turning_points(turning_points, targets[-1])
-        targets += [Target(*pair, snapshot=True) for pair in recorded if pair not in listed]
+        targets += [Target(*pair, True) for pair in recorded if pair not in listed]
         if control == LOAD_CONTROL:
             _require_loads((*targets, *turns), unload or bool(turns))
         # A frozen dataclass sets its fields this way.
