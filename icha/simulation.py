@@ -24,7 +24,7 @@ from icha.contact.model import (
     NotConverged,
     State,
     gap_bins,
-    summit_counts,
+    count_summits,
 )
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import COMPUTED, discovery
@@ -164,7 +164,7 @@ def unfollowed(
     met, summits = _Met([], [], [], reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)
     reasons = coverage.reasons_against([surface.rms_height]) if MODELS[model].by_summits else []
-    return _dataset(surface, material, path, model, seed, met, summit_counts(summits), reasons)
+    return _dataset(surface, material, path, model, seed, met, count_summits(summits), reasons)
 
 
 def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
@@ -285,7 +285,7 @@ def _followed(contact, observables, path, progress) -> _Met:
         for waypoint in follow(contact, path, progress):
             state, balance = waypoint.state, waypoint.balance
             steps.append(_finite(_step(contact, waypoint) | observables.of_step(state)))
-            events.append(Events.joined(()) if before is None else contact.events_between(before, state))
+            events.append(Events.concatenate(()) if before is None else contact.events_between(before, state))
             before = state
             if waypoint.leg == 0 and steps[-1]["contact_area_fraction"] >= largest:
                 pressed, largest = state, steps[-1]["contact_area_fraction"]
@@ -350,7 +350,7 @@ def _of_path(table: Table, path: Path, met: _Met, grid: int) -> dict:
     values |= joined(table, met.snapshots, "spot", "snapshot")
     if not path.cyclic:
         return values
-    counts, events = np.array([len(each) for each in met.events], int), Events.joined(met.events)
+    counts, events = np.array([len(each) for each in met.events], int), Events.concatenate(met.events)
     return values | {
         **stacked(CYCLE, met.steps, "step"),
         "event_kind": events.kind,

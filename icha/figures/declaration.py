@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import Field
 
-from icha.contact.models import MODELS, REFERENCE_MODEL, first_of
+from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
@@ -172,7 +172,7 @@ class RunFigure(StudyFigure):
 
     def run(self, campaign: Campaign) -> RunLabels:
         """The run that is shown: of the study's that are asked for the first with adhesion, or the first of all."""
-        model = first_of(campaign.studies[self.study].models)
+        model = first_model(campaign.studies[self.study].models)
         runs = [
             run
             for run in (RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study))

@@ -9,7 +9,7 @@ import scipy
 from job import attributes, guarded
 
 from icha.asperity.material import Material
-from icha.contact.checkpoints import prepared
+from icha.contact.checkpoints import prepare_checkpoints
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
@@ -51,7 +51,9 @@ def run_sweep(
 
 def _kept(output, asked, inputs):
     """The folder in which equilibria are kept, with nothing in it from another surface, path or code."""
-    return prepared(pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {np.__version__} {scipy.__version__}")
+    return prepare_checkpoints(
+        pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {np.__version__} {scipy.__version__}"
+    )
 
 
 if "snakemake" in globals():
