@@ -27,8 +27,8 @@ from icha.contact.model import (
     count_summits,
 )
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.datasets.attributes import COMPUTED, discovery
-from icha.datasets.build import bin_values, build, described, joined, of, stacked
+from icha.datasets.attributes import COMPUTED, file_attributes
+from icha.datasets.build import bin_values, build_dataset, concatenate_rows, describe_variables, get_values, stack_rows
 from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
 from icha.path.energy_balance import Waypoint, summarise_loop
@@ -150,7 +150,7 @@ def _computed(solver, surface, material, path, model, seed, progress, kept):
     if path.unload:
         pull_off = met.snapshots[-1]["snapshot_step"]
         loop = summarise_loop(met.steps, pull_off, material, observables.largest_tension, met.unattributed)
-        dataset = dataset.assign(described(LOOP, loop | {"uphill_jump_in_count": _count_uphill_jumps_in(met)}))
+        dataset = dataset.assign(describe_variables(LOOP, loop | {"uphill_jump_in_count": _count_uphill_jumps_in(met)}))
     return dataset
 
 
@@ -178,7 +178,7 @@ def _dataset(surface, material, path, name, seed, met, of_contact, reasons=()):
         **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.rms_slope)),
     }
     described_here = table | CYCLE | _targets(table, path)
-    dataset = build(described_here, values, _attributes(surface, material, path, name))
+    dataset = build_dataset(described_here, values, _attributes(surface, material, path, name))
     dataset.attrs["applicability"] = _applicability(name, values, met, reasons)
     return dataset.assign_attrs(incomplete=met.failure) if met.failure else dataset
 
@@ -346,13 +346,13 @@ def _of_path(table: Table, path: Path, met: _Met, grid: int) -> dict:
     """The path, and what was met on it: rows as arrays, spots and events one after the other."""
     sizes = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1, "row": grid, "column": grid}
     values = {"control": path.control}
-    values |= stacked(table, met.steps, "step") | stacked(table, met.snapshots, "snapshot", sizes)
-    values |= joined(table, met.snapshots, "spot", "snapshot")
+    values |= stack_rows(table, met.steps, "step") | stack_rows(table, met.snapshots, "snapshot", sizes)
+    values |= concatenate_rows(table, met.snapshots, "spot", "snapshot")
     if not path.cyclic:
         return values
     counts, events = np.array([len(each) for each in met.events], int), Events.concatenate(met.events)
     return values | {
-        **stacked(CYCLE, met.steps, "step"),
+        **stack_rows(CYCLE, met.steps, "step"),
         "event_kind": events.kind,
         "event_step": np.repeat(np.arange(len(met.steps)), counts),
         "event_separation": np.repeat([step["mean_separation"] for step in met.steps], counts),
@@ -384,8 +384,8 @@ def _of_surface(surface: Surface, material: Material, seed: int) -> dict:
     """What is pressed against what."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
     return {
-        **of(material, *MATERIAL),
-        **of(surface, *ROUGHNESS, "period", "boundary", "grid"),
+        **get_values(material, *MATERIAL),
+        **get_values(surface, *ROUGHNESS, "period", "boundary", "grid"),
         "seed": seed,
         "spectral_moment_0": moments.m0,
         "spectral_moment_2": moments.m2,
@@ -404,7 +404,7 @@ def _of_surface(surface: Surface, material: Material, seed: int) -> dict:
 
 def _attributes(surface, material, path, name):
     model = MODELS[name]
-    attributes = discovery(
+    attributes = file_attributes(
         f"Rough contact {'with' if material.surface_energy > 0 else 'without'} adhesion, {model.title}",
         f"{'Loading and unloading' if path.cyclic else 'Loading sweep'} of a "
         f"{'periodic rough surface' if not surface.free else 'single rough square'} against an "

@@ -18,7 +18,7 @@ def check(
     All files are checked in any case. Exit status: 0 if no file has problems, 1 if one has (all problems are printed),
     2 if ICHA cannot read one.
     """
-    from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, kind_of
+    from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, identify_file
 
     status = 0
     for file in files:
@@ -26,7 +26,7 @@ def check(
             echo(f"{file}: deposit; use `icha verify`")
             continue
         try:
-            kind, data = kind_of(file)
+            kind, data = identify_file(file)
         except UnknownFile as error:
             echo(f"Error: {error}", err=True, fg="red")
             status = WRONG
@@ -53,9 +53,9 @@ def _problems(kind, data) -> tuple[list[str], int]:
     """Return all problems of a file, and the number of checks of its numbers."""
     from icha.analysis.checks import COMPLETED, check_campaign, check_solution
     from icha.checks.run import check_run
-    from icha.datasets.format import RUN, SOLUTION, SURFACE, flaws
+    from icha.datasets.format import RUN, SOLUTION, SURFACE, problems_with_file
 
-    problems = flaws(kind, data) if kind != SOLUTION else []
+    problems = problems_with_file(kind, data) if kind != SOLUTION else []
     if problems or kind == SURFACE:
         return problems, 0
     if kind == RUN and "incomplete" in data.attrs:

@@ -21,10 +21,10 @@ def show(
     study: Annotated[str | None, option("Study of a campaign dataset. Default: all of them.")] = None,
 ) -> None:
     """Show what a file contains: a run, a surface or a campaign dataset. --plot draws it."""
-    from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, kind_of
+    from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, identify_file
 
     try:
-        kind, data = kind_of(file)
+        kind, data = identify_file(file)
     except UnknownFile as error:
         raise UserError(str(error)) from None
     printers = {RUN: print_run, SURFACE: _print_surface, CAMPAIGN: _print_campaign}

@@ -178,7 +178,7 @@ def _cutoffs(period, rolloff, short, grid):
 
 def _read_surface(file: Path, period: float, rms_slope: float | None):
     """Read a surface file, or heights in m from an .npy file; scale it to an rms slope if one is given."""
-    from icha.datasets.format import SURFACE, kind_of
+    from icha.datasets.format import SURFACE, identify_file
     from icha.datasets.surface_file import as_measured, surface_of
     from icha.surfaces.measured.array_files import read_height_map
     from icha.surfaces.surface import Surface
@@ -189,7 +189,7 @@ def _read_surface(file: Path, period: float, rms_slope: float | None):
         except ValueError as error:
             raise ValueError(f"{file}: {error}") from None
     else:
-        kind, data = kind_of(file)
+        kind, data = identify_file(file)
         if kind != SURFACE:
             raise ValueError(f"{file}: {kind}; expected a {SURFACE}, or heights as .npy")
         surface = surface_of(data, file)

@@ -34,7 +34,7 @@ def reasons_not_applicable(study: Mapping) -> Counter[str]:
     return Counter(filter(None, study["applicability"].values.ravel().astype(str).tolist()))
 
 
-def discovery(
+def file_attributes(
     title: str,
     summary: str,
     level: str,
@@ -70,7 +70,7 @@ def discovery(
     return {name: text for name, text in found.items() if text}
 
 
-def collected(title: str, summary: str, level: str, origins: Iterable[Mapping[str, str]]) -> dict[str, str]:
+def combine_attributes(title: str, summary: str, level: str, origins: Iterable[Mapping[str, str]]) -> dict[str, str]:
     """Global attributes of a file made from datasets with the global attributes `origins`, in any order.
 
     Programs, publications and further keywords are theirs, each once.
@@ -81,4 +81,4 @@ def collected(title: str, summary: str, level: str, origins: Iterable[Mapping[st
         for name, mark in (("source", ";"), ("references", ";"), ("keywords", ","))
     )
     further = [word for word in keywords if word not in KEYWORDS]
-    return discovery(title, summary, level, sources=sources, references="; ".join(references), keywords=further)
+    return file_attributes(title, summary, level, sources=sources, references="; ".join(references), keywords=further)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
+def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
     """The dataset of some values, in the order of the table, coordinates last.
 
     Parameters
@@ -29,19 +29,19 @@ def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> 
     """
     import xarray as xr  # which takes a while, and the vocabulary needs no more than `bin_table`
 
-    variables = described(table, values)
+    variables = describe_variables(table, values)
     coordinates = {name: variables.pop(name) for name in table if name in variables and table[name].coordinate}
     return xr.Dataset(variables, coordinates, attrs)
 
 
-def described(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]:
+def describe_variables(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]:
     """Variables of some values with their dimensions, types and attributes, in the order of the table."""
     if unknown := values.keys() - table.keys():
         raise ValueError(f"variables without a description: {', '.join(sorted(unknown))}")
-    return {name: variable(table[name], values[name]) for name in table if name in values}
+    return {name: make_variable(table[name], values[name]) for name in table if name in values}
 
 
-def variable(description: Variable, values: Any) -> xr.Variable:
+def make_variable(description: Variable, values: Any) -> xr.Variable:
     """A variable with the dimensions, type and attributes of its description."""
     import xarray as xr
 
@@ -49,12 +49,12 @@ def variable(description: Variable, values: Any) -> xr.Variable:
     return xr.Variable(description.dims, np.asarray(values, dtype), description.attributes)
 
 
-def of(thing: Any, *names: str) -> dict[str, Any]:
+def get_values(thing: Any, *names: str) -> dict[str, Any]:
     """Values that a surface, a material or a spectrum has under the names of their variables."""
     return {name: getattr(thing, name) for name in names}
 
 
-def stacked(
+def stack_rows(
     table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
 ) -> dict[str, np.ndarray]:
     """Rows of values, one for each position along a dimension, as arrays of all variables that begin with it.
@@ -69,7 +69,7 @@ def stacked(
     return values | ({dim: np.arange(len(rows))} if dim in table else {})
 
 
-def joined(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
+def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
     """The variables of a table along a ragged dimension, of which every row has as many values as it likes.
 
     They stand one after the other, and `<dim>_<instance>` says to which row each belongs.

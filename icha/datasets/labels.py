@@ -45,7 +45,7 @@ class RunLabels(NamedTuple):
     @property
     def path(self) -> str:
         """Where the run's dataset stands among the runs, without the ending."""
-        return RUN.format(**parts(self))
+        return RUN.format(**path_fields(self))
 
     def __str__(self):
         """The run's place among the runs."""
@@ -68,7 +68,7 @@ class ContactLabels(NamedTuple):
     @property
     def path(self) -> str:
         """Where its file stands among the others, without the ending."""
-        return CONTACT.format(**parts(self))
+        return CONTACT.format(**path_fields(self))
 
 
 class SolutionLabels(NamedTuple):
@@ -90,14 +90,14 @@ class SolutionLabels(NamedTuple):
     @property
     def path(self) -> str:
         """Where its file stands among the solutions, without the ending."""
-        return SOLUTION.format(**parts(self))
+        return SOLUTION.format(**path_fields(self))
 
     def __str__(self):
         """The solution's place among the solutions."""
         return self.path
 
 
-def parts(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
+def path_fields(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
     """What stands in the braces of a path."""
     found = {
         _NUMBERS.get(name, name): number_label(value) if name in _NUMBERS else str(value)

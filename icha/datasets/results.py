@@ -42,7 +42,7 @@ class ResultFiles:
 
     def path(self, pattern: str, case: NamedTuple | None = None, **names: object) -> str:
         """Path of one file: what stands in the braces is the campaign's, of the labels of a case, or given by name."""
-        of_case = {} if case is None else labels.parts(case)
+        of_case = {} if case is None else labels.path_fields(case)
         return "/".join(filter(None, (self.folder, pattern.format(campaign=self.campaign, **of_case, **names))))
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from icha.datasets.attributes import INPUT, discovery
-from icha.datasets.build import build, of
+from icha.datasets.attributes import INPUT, file_attributes
+from icha.datasets.build import build_dataset, get_values
 from icha.datasets.files import read_dataset, readable, write_dataset
 from icha.datasets.variables.surface import SURFACE
 from icha.datasets.variables.terms import ROUGHNESS
@@ -47,7 +47,7 @@ def write_surface(
         "psd_wavevector": wave_number,
         "height": surface.heights,
         "seed": seed,
-        **of(surface, "period", "grid", *ROUGHNESS),
+        **get_values(surface, "period", "grid", *ROUGHNESS),
         "spectral_moment_0": moments.m0,
         "spectral_moment_2": moments.m2,
         "spectral_moment_4": moments.m4,
@@ -56,7 +56,7 @@ def write_surface(
         "power_spectrum": power,
     }
     if spectrum is not None:
-        values |= of(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
+        values |= get_values(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
     if measured is not None:
         values["measured_rms_slope"] = measured.rms_slope
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
@@ -67,14 +67,14 @@ def write_surface(
             "source_sha256": measured.source_sha256,
             "preparation": measured.description,
         }
-    attributes = discovery(
+    attributes = file_attributes(
         f"Topography {name}, seed {seed}",
         f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
         INPUT,
         keywords=["topography"],
     )
     origin |= {"surface": name, "boundary": surface.boundary}
-    write_dataset(build(SURFACE, values, attributes | origin | dict(attrs)), path)
+    write_dataset(build_dataset(SURFACE, values, attributes | origin | dict(attrs)), path)
 
 
 def as_measured(surface: xr.Dataset) -> float:

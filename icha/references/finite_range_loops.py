@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from icha.asperity.material import Material
-from icha.datasets.build import build
+from icha.datasets.build import build_dataset
 from icha.datasets.variables.boundary_elements import LOOP
 from icha.references.finite_range import (
     DEFAULT_TOLERANCE,
@@ -290,4 +290,4 @@ def _dataset(surface, solver, legs, separation_step, seed):
         "Rough contact {} adhesion both ways, boundary elements at finite range",
         "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
     )
-    return build(LOOP, values, attrs)
+    return build_dataset(LOOP, values, attrs)

@@ -10,10 +10,11 @@ import pytest
 from scans import NM, SIZE, UM, centred, preparation, refused, scan, write_xyz
 
 from icha.configuration.surfaces import MeasuredSurface
+from icha.configuration.topographies import inspect_scan
 from icha.datasets.files import read_dataset
 from icha.datasets.surface_file import read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography
-from icha.surfaces.measured.topography import prepared_topography, topography_facts
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 TOPOGRAPHIES = Path(__file__).parents[2] / "config" / "topographies"
@@ -235,7 +236,7 @@ def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
         (np.empty((0, 12)), "path", "of shape"),
         (np.empty((12, 0)), "path", "of shape"),
         (np.ones((1, 1)), "path", "leaves 1 x 1 points"),
-        (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points; allowed: a topography"),
+        (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points"),
         (np.arange(12.0)[:, None], "path", "is a line scan"),
         (np.arange(24.0).reshape(12, 2), "path", "is a line scan"),
         (np.full((12, 12), np.nan), "path", "no height at all"),
@@ -252,7 +253,7 @@ def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
 
 def test_messages_are_short_and_in_units_of_people(tmp_path, prepared):
     (tmp_path / "words.txt").write_text("no heights in here\n")
-    with pytest.raises(UnfitTopography, match="none of the formats of instruments") as raised:
+    with pytest.raises(UnfitTopography, match="cannot be read as instrument") as raised:
         scan(tmp_path / "words.txt", height_unit=NM, size=SIZE)
     assert len(str(raised.value)) < 200
     crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}
@@ -283,13 +284,14 @@ def test_provenance_and_facts(prepared, tmp_path):
     assert result.source_file == "scan.npy"
     assert result.source_sha256 == hashlib.sha256((tmp_path / "scan.npy").read_bytes()).hexdigest()
     assert str(tmp_path) not in result.description
-    how = preparation(height_unit=1.0, size=(5.0, 5.0), boundary="free", detrend="tilt")
-    facts = topography_facts(tmp_path / "scan.npy", how)
-    assert (facts.grid, facts.period, facts.boundary) == (10, 5.0, "free")
-    assert (facts.rms_slope, facts.source_sha256) == (result.rms_slope, result.source_sha256)
+    keys = {"kind": "measured", "path": str(tmp_path / "scan.npy"), "height_unit": "m", "size": "5 m"}
+    section = MeasuredSurface.model_validate(keys | {"boundary": "free", "detrend": "tilt"})
+    facts = inspect_scan(section)
+    assert (facts.grid, facts.period, facts.sha256) == (10, 5.0, result.source_sha256)
+    assert facts.rms_slope == pytest.approx(result.rms_slope, rel=1e-5)
     # A file that changes is read again.
     np.save(tmp_path / "scan.npy", np.pad(heights, 1))
-    assert topography_facts(tmp_path / "scan.npy", how).grid == 12
+    assert inspect_scan(section).grid == 12
 
 
 def test_synthetic_scan_is_what_its_script_makes(tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.fft
 
 from icha.surfaces.measured.steps import LEAST_PIXELS
-from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.measured.topography import PreparedTopography, prepared_topography
 from icha.surfaces.moments import (
     LEAST_CELLS_OF_SUMMIT,
     RESOLVED_CELLS,
@@ -45,23 +45,22 @@ class NoiseFloor:
 
 
 @dataclass(frozen=True, eq=False)
-class ScanResolution:
-    """A scan before its short waves are cut off, and the surface that is made of it.
+class ScanResolution(PreparedTopography):
+    """A prepared scan beside the scan before its short waves were filtered.
 
-    measured : the scan as a square, without filter, edges and changes of its grid. used : the prepared surface.
-    cutoff : nesting index of its filter, m; None: it has none. format : as which the file was read. data : the array or
-    channel that was taken, empty if the file has only one. reading : how the file was read, in words. filled : number
-    of points that had no height. points : number of points that were used.
+    Attributes
+    ----------
+    measured : the scan as a square, without filter, edges and changes of its grid.
+    cutoff : nesting index of the filter, m; None without one.
     """
 
     measured: Surface
-    used: Surface
     cutoff: float | None
-    format: str = ""
-    data: str = ""
-    reading: str = ""
-    filled: int = 0
-    points: int = 1
+
+    @property
+    def used(self) -> Surface:
+        """The prepared surface."""
+        return self.surface
 
     @property
     def edges_fit(self) -> bool:
@@ -130,16 +129,8 @@ def scan_resolution(path: str | os.PathLike, preparation: Mapping) -> ScanResolu
     if preparation["boundary"] != PERIODIC:
         raw |= {"boundary": FREE, "grid": None}
     measured = prepared_topography(path, raw).surface
-    used = prepared_topography(path, preparation)
     return ScanResolution(
-        measured=measured,
-        used=used.surface,
-        cutoff=preparation.get("cutoff"),
-        format=used.format,
-        data=used.data,
-        reading=used.reading,
-        filled=used.filled,
-        points=used.points,
+        **vars(prepared_topography(path, preparation)), measured=measured, cutoff=preparation.get("cutoff")
     )
 
 
