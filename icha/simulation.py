@@ -23,8 +23,8 @@ from icha.contact.model import (
     Events,
     NotConverged,
     State,
-    gap_bins,
     count_summits,
+    gap_bins,
 )
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import COMPUTED, file_attributes

@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, largest_tension, count_summits
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, count_summits, largest_tension
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_response
 from icha.equilibrium.sites import ContactState, Problem, Sites
