@@ -44,7 +44,7 @@ from icha.path.targets import (
     Path,
     Target,
 )
-from icha.support.rules import ALL_MODELS, Integer
+from icha.support.rules import IntegerRange
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.summits import SummitCoverage, locate_summits
 from icha.surfaces.surface import Surface
@@ -125,7 +125,7 @@ def simulate(
     solver = _solver(model)
     if kept is not None and not MODELS[model].resumable:
         raise ValueError(f"kept: equilibria of the model {model} cannot be kept; allowed: None")
-    seed = Integer(-1).checked("seed", seed)
+    seed = IntegerRange(-1).validate("seed", seed)
     dataset = _computed(solver, surface, material, path, model, seed, progress, kept)
     if failed := reasons_of_failure(check_run(dataset)):
         dataset = dataset.assign_attrs(failed_checks=failed)
@@ -234,8 +234,8 @@ def _check_arguments(surface, material, path):
             asked = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
             if target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
                 raise ValueError(
-                    f"{asked} lies beyond the range of the asperity model (a reduced pressure of at most "
-                    f"{MAX_REDUCED_PRESSURE}), {ALL_MODELS}"
+                    f"{asked} is beyond the range of the asperity model, which limits all models; expected a reduced "
+                    f"pressure of at most {MAX_REDUCED_PRESSURE}"
                 )
             if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
                 raise ValueError(
