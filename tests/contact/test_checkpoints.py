@@ -106,5 +106,5 @@ def test_of_other_programs_nothing_is_found(monkeypatch, tmp_path):
 
 
 def test_asperities_keep_nothing(tmp_path):
-    with pytest.raises(ValueError, match="^kept: the model asperities has no checkpoints"):
+    with pytest.raises(ValueError, match=r"^kept: the model asperities has no checkpoints"):
         simulate(SURFACE, *PATHS["areas"], kept=tmp_path)
