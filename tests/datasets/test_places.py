@@ -163,7 +163,7 @@ def test_report_checks_and_validity_of_either_form_are_the_same():
     assert section(tree) == section(other)
     assert check_campaign(tree) == check_campaign(other)
     assert of_dataset(tree) == of_dataset(other)
-    rows = [error_section.entry_section(crops.errors(each)[crops.STUDY].to_dataset()) for each in (tree, other)]
+    rows = [error_section.error_section(crops.errors(each)[crops.STUDY].to_dataset()) for each in (tree, other)]
     assert repr(rows[0]) == repr(rows[1]) and len(rows[0]["rows"]) == 3 * 2 * 2
 
 
