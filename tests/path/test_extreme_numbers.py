@@ -45,7 +45,7 @@ def test_next_to_no_load_is_refused_in_units_of_the_slope():
     surface = Surface(1e-6 * WAVES, 1e-4)
     path = Path([1e-3], snapshots=[("relative_load", 1e-80)])
     with pytest.raises(
-        ValueError, match=r"^path: relative_load = 1e-80 .* allowed: a reduced pressure of at least 1e-12"
+        ValueError, match=r"^path: relative_load = 1e-80 .* expected a reduced pressure of at least 1e-12"
     ):
         simulate(surface, Material(1e6, 0.0, 1e-9), path)
 
