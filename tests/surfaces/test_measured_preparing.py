@@ -72,7 +72,7 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
     harmonic = x**2 - y**2 + 2 * x * y  # of the five-point Laplacian, too
     holey = harmonic.copy()
     holey[4:7, 3:6] = np.nan
-    with refused("missing", r"9 among 100; expected fill"):
+    with refused("missing", r"9 of 100; expected fill"):
         prepared(holey, boundary="free")
     result = prepared(holey, boundary="free", missing="fill")
     np.testing.assert_allclose(result.surface.heights, centred(harmonic), atol=1e-11)
@@ -80,7 +80,7 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
     # Those outside of the square that is used matter to nobody.
     assert prepared(np.pad(harmonic, ((0, 0), (2, 2)), constant_values=np.nan), boundary="free")
     holey[:, 2:9] = np.nan
-    with pytest.raises(UnfitTopography, match="up to half"):
+    with pytest.raises(UnfitTopography, match="at most half"):
         prepared(holey, boundary="free", missing="fill")
 
 
@@ -241,12 +241,12 @@ def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
         (np.arange(24.0).reshape(12, 2), "path", "is a line scan"),
         (np.full((12, 12), np.nan), "path", "no height"),
         (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "cannot fill 132 of 144"),
-        (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 among 144"),
+        (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 of 144"),
     ],
 )
 @pytest.mark.parametrize("detrend", ["none", "tilt"])
 def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
-    missing = "fill" if "make up" in words else "refuse"
+    missing = "fill" if "cannot fill" in words else "refuse"
     with refused(key, words):
         prepared(heights, boundary="free", detrend=detrend, missing=missing, size=(6.0, 6.0))
 

@@ -106,8 +106,7 @@ def filled(scan: Scan, how: Preparation) -> Scan:
     if how.missing == "refuse":
         raise UnfitTopography(
             "missing",
-            f"stops at points without a height, and there are {count} among {missing.size}; expected fill, or a crop "
-            "without them",
+            f"does not allow {count} of {missing.size} points without a height; expected fill, or a crop without them",
         )
     if 2 * count > missing.size:
         raise UnfitTopography("missing", f"cannot fill {count} of {missing.size} points; expected at most half")
