@@ -178,9 +178,10 @@ def _print_cost(console, items, cores: int, damaged) -> None:
     every = total(items)
     if every.to_do or damaged:
         time, memory = formatting.duration(time_on(items, cores)), formatting.size(memory_on(items, cores))
+        disk = formatting.size(every.disk)
         console.print(
-            f"{format_count(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] "
-            f"and {memory} of memory on {format_count(cores, 'core')}; {formatting.size(every.disk)} of disk for all results."
+            f"{format_count(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and "
+            f"{memory} of memory on {format_count(cores, 'core')}; {disk} of disk for all results."
         )
     else:
         console.print(f"{format_count(len(runs), 'run')}; all results exist.")

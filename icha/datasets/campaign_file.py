@@ -17,7 +17,7 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
-from icha.datasets.attributes import COLLECTED, collected
+from icha.datasets.attributes import COLLECTED, combine_attributes
 from icha.datasets.campaign_runs import Arrangement, Entry, arrange_runs, load_values, spool_runs
 from icha.datasets.files import (
     FLOAT_FILL,
@@ -116,7 +116,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
     # The checksum is that of the campaign, and not that of one of the runs.
     shared = {"license": sample.attrs.get("license"), "config_sha256": attrs.get("config_sha256")}
     group.setncatts(
-        collected(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins)
+        combine_attributes(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins)
         | {"study": study.name}
         | {name: value for name, value in shared.items() if value is not None}
     )
@@ -301,7 +301,7 @@ def write_campaign(
         with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
             origins = [each for study in studies for each in study.origins]
             names = [study.name for study in studies]
-            described = collected("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
+            described = combine_attributes("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
             file.setncatts(described | {"comment": _ACCESS.format(", ".join(names), names[0])} | dict(attrs))
             # All is defined before anything is written, which is quicker: see icha.datasets.files.
             groups = [define_group(file.createGroup(study.name), study, attrs) for study in studies]

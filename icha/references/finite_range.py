@@ -30,8 +30,8 @@ from icha.asperity.cohesive_zone import longest_spacing, resolution_problem, str
 from icha.asperity.material import Material
 from icha.boundary_elements.patches import BEYOND_EDGES
 from icha.contact.model import GAP_BINS, PRESSURE_BINS, gap_bins
-from icha.datasets.attributes import COMPUTED, discovery
-from icha.datasets.build import bin_values, build, of
+from icha.datasets.attributes import COMPUTED, file_attributes
+from icha.datasets.build import bin_values, build_dataset, get_values
 from icha.datasets.variables.boundary_elements import SOLUTION
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
 from icha.support.rules import POSITIVE, REFINEMENT, TOLERANCE
@@ -167,9 +167,9 @@ def contact_state(
     progress: Callable[[str], None] | None = None,
 ) -> NodalState:
     """Solve the contact at one load, as `finite_range_solution` does; return it node by node."""
-    target = POSITIVE.checked("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
+    target = POSITIVE.validate("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
     fine = refine(surface, material, refinement, progress)
-    state = _solve_nonadhesive(fine, material, target, TOLERANCE.checked("tolerance", tolerance))
+    state = _solve_nonadhesive(fine, material, target, TOLERANCE.validate("tolerance", tolerance))
     if material.surface_energy == 0:
         return state
     contact = GapContact(fine, material, tolerance, state.gap)
@@ -181,7 +181,7 @@ def refine(
 ) -> Surface:
     """Return the surface on the grid of the solution, which must resolve the attraction; report it as progress."""
     surface.require_periodic("the solution by boundary elements")
-    fine = surface.refined(REFINEMENT.checked("refinement", refinement))
+    fine = surface.refined(REFINEMENT.validate("refinement", refinement))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
     if material.surface_energy > 0:
         numbers += (
@@ -402,7 +402,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "Rough contact {} adhesion, boundary elements at finite range",
         "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
     )
-    return build(SOLUTION, values, attrs)
+    return build_dataset(SOLUTION, values, attrs)
 
 
 def describe_problem(
@@ -413,11 +413,11 @@ def describe_problem(
     return {
         "tolerance": tolerance,
         "refinement": fine.grid // surface.grid,
-        **of(fine, "grid", "spacing"),
+        **get_values(fine, "grid", "spacing"),
         "longest_spacing": longest_spacing(material) if adhesive else 0.0,
         "strength_number": strength_number(material, fine.spacing),
-        **of(material, *MATERIAL),
-        **of(surface, *ROUGHNESS, "period"),
+        **get_values(material, *MATERIAL),
+        **get_values(surface, *ROUGHNESS, "period"),
         "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
         "seed": seed,
     }
@@ -425,7 +425,7 @@ def describe_problem(
 
 def attributes(material: Material, title: str, summary: str) -> dict[str, str]:
     """Attributes of a dataset by Tamaas; braces in the title become `with` or `without`."""
-    return discovery(
+    return file_attributes(
         title.format("with" if material.surface_energy > 0 else "without"),
         summary,
         COMPUTED,

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from icha.asperity.material import Material
-from icha.datasets.build import build
+from icha.datasets.build import build_dataset
 from icha.datasets.variables.boundary_elements import LOOP
 from icha.references.finite_range import (
     DEFAULT_TOLERANCE,
@@ -75,10 +75,10 @@ def finite_range_loop(
     NotSolved
         If the solver does not reach its tolerance, or the load is not reached; the message names the last state.
     """
-    target = POSITIVE.checked("largest_reduced_pressure", largest_reduced_pressure)
-    step = POSITIVE.checked("separation_step", separation_step) * surface.rms_height
+    target = POSITIVE.validate("largest_reduced_pressure", largest_reduced_pressure)
+    step = POSITIVE.validate("separation_step", separation_step) * surface.rms_height
     fine = refine(surface, material, refinement, progress)
-    solver = _LoopSolver(fine, material, TOLERANCE.checked("tolerance", tolerance))
+    solver = _LoopSolver(fine, material, TOLERANCE.validate("tolerance", tolerance))
     legs = _load_and_unload(solver, step, target * surface.rms_slope * material.contact_modulus, progress)
     return _dataset(surface, solver, legs, separation_step, seed)
 
@@ -290,4 +290,4 @@ def _dataset(surface, solver, legs, separation_step, seed):
         "Rough contact {} adhesion both ways, boundary elements at finite range",
         "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
     )
-    return build(LOOP, values, attrs)
+    return build_dataset(LOOP, values, attrs)

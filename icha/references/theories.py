@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from icha.asperity.material import Material
-from icha.datasets.attributes import THEORY, discovery
+from icha.datasets.attributes import THEORY, file_attributes
 from icha.datasets.variables.terms import TERMS
 from icha.references import persson, summit_theories
 from icha.surfaces.moments import SpectralMoments
@@ -53,7 +53,7 @@ def reference_dataset(
     variables = _mean_field_theories(np.asarray(reduced_pressures, float), spectrum) | _published_points(spectrum)
     if moments is not None:
         variables |= _summit_theories(moments, adhesive)
-    described = discovery(
+    described = file_attributes(
         "Theories of rough contact, and published points",
         "Contact area, mean separation and contact stiffness against reduced pressure.",
         THEORY,

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
-from icha.support.rules import LENGTH, SLOPE, Integer, Real
+from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.surfaces.square import problem_with_heights
 
 # A square that repeats, or a single one on a half-space.
@@ -24,7 +24,7 @@ PERIODIC, FREE = "periodic", "free"
 BOUNDARIES = (PERIODIC, FREE)
 
 # Range of heights over the period.
-_STEEPNESS = Real(least=1e-24, most=1e9)
+_STEEPNESS = FloatRange(least=1e-24, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
 # Largest number of lines whose steps are compared with the step between cells.
@@ -80,9 +80,9 @@ class Surface:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
         if problem := problem_with_heights(heights):
             raise ValueError(f"heights: {problem}")
-        object.__setattr__(self, "period", LENGTH.checked("period", self.period))
+        object.__setattr__(self, "period", LENGTH.validate("period", self.period))
         with np.errstate(over="ignore"):
-            _STEEPNESS.checked("heights: their range over the period", np.ptp(heights) / self.period)
+            _STEEPNESS.validate("heights: their range over the period", np.ptp(heights) / self.period)
         heights -= heights.mean()
         heights.flags.writeable = False
         object.__setattr__(self, "heights", heights)
@@ -193,7 +193,7 @@ class Surface:
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """Return the same topography with its heights multiplied to the spectral rms slope `rms_slope`."""
-        rms_slope = SLOPE.checked("rms_slope", rms_slope)
+        rms_slope = SLOPE.validate("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
         # `cached_property` keeps its values in `vars`.
@@ -206,7 +206,7 @@ class Surface:
         Raises ValueError if the factor is not an integer of at least 1, or the surface is a free square.
         """
         self.require_periodic("a trigonometric interpolant")
-        if Integer(1).checked("factor", factor) == 1:
+        if IntegerRange(1).validate("factor", factor) == 1:
             return self
         # Slow to import, and rarely needed.
         from scipy.signal import resample

@@ -72,7 +72,7 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
     harmonic = x**2 - y**2 + 2 * x * y  # of the five-point Laplacian, too
     holey = harmonic.copy()
     holey[4:7, 3:6] = np.nan
-    with refused("missing", r"9 of 100; expected fill"):
+    with refused("missing", r"9 of 100 points without a height; expected fill"):
         prepared(holey, boundary="free")
     result = prepared(holey, boundary="free", missing="fill")
     np.testing.assert_allclose(result.surface.heights, centred(harmonic), atol=1e-11)
