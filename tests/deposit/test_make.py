@@ -332,7 +332,7 @@ def test_results_that_are_not_what_was_written_are_refused(campaign, tmp_path):
     content[len(content) // 2] ^= 1
     run.write_bytes(content)
     os.utime(run, ns=(times.st_atime_ns, times.st_mtime_ns))
-    with pytest.raises(ValueError, match=rf"not what was written(.|\n)*{run.name}"):
+    with pytest.raises(ValueError, match=rf"not what their jobs wrote(.|\n)*{run.name}"):
         published_as(tmp_path / "out/small-1.0.0", *campaign)
     assert not (tmp_path / "out").exists()
 
@@ -360,7 +360,7 @@ def test_failures_are_published_only_with_their_reason(campaign, tmp_path):
 def test_names_that_verify_would_refuse_are_not_published(name, campaign, tmp_path):
     (campaign[1] / "inputs").mkdir()
     (campaign[1] / "inputs" / name).touch()
-    with pytest.raises(ValueError, match="not published, because of these names"):
+    with pytest.raises(ValueError, match="not published, because of names of files"):
         published_as(tmp_path / "out/small-1.0.0", *campaign)
     assert files_of(tmp_path / "out") == {}
 
