@@ -33,7 +33,7 @@ from icha.figures.select import (
     study_runs,
     unloading_legs,
 )
-from icha.figures.style import line_artist, logarithmic_axes
+from icha.figures.style import legend_handle, logarithmic_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +50,7 @@ UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 
 
 def gap_label(data: xr.Dataset) -> str:
-    """What the mean gap of runs is called: of periodic surfaces the mean separation, of free squares not."""
+    """Return the label of the mean gap, which is the mean separation on periodic surfaces but not on free squares."""
     return GAP_LABEL if (data["boundary"] == "free").any() else SEPARATION_LABEL
 
 
@@ -263,7 +263,7 @@ def _draw_unloading(panels, line):
             load, values = points(states)
             # Just before separation loads are as small as can be.
             pressed = np.where(load > 0, load, np.nan)
-            axes.add_artist(line_artist(pressed, values, color=line.look["mec"], **UNLOADING))
+            axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **UNLOADING))
 
 
 def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, object] = {}) -> None:
