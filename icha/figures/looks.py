@@ -17,15 +17,9 @@ from icha.contact.models import MODELS
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.style import (
     BLACK,
-    BLUE,
     COLOURS,
-    GREEN,
     GREY,
     INTERFACE,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILLION,
     legend_handle,
     material_label,
     slope_label,
@@ -42,8 +36,7 @@ if TYPE_CHECKING:
 Contact = tuple[str, str, float | None]
 
 # Okabe and Ito's colours without black, which is for theories, and darker ones of the same hues.
-MATERIAL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
-MATERIAL_COLOURS += ("#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
+MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
 PLACE_MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
 ASPERITIES_NAME = MODELS["asperities"].words
