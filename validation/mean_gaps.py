@@ -34,6 +34,6 @@ def states_at_mean_separations(
     if material.surface_energy == 0:
         raise ValueError("surface_energy: 0; without adhesion the load is given, not the mean gap")
     fine = refine(surface, material, refinement, progress)
-    separations = [LENGTH.checked("mean_separations", separation) for separation in mean_separations]
-    contact = GapContact(fine, material, TOLERANCE.checked("tolerance", tolerance))
+    separations = [LENGTH.validate("mean_separations", separation) for separation in mean_separations]
+    contact = GapContact(fine, material, TOLERANCE.validate("tolerance", tolerance))
     return (contact.solve(separation) for separation in separations)

@@ -34,11 +34,11 @@ class Material:
 
     def __post_init__(self):
         """Check the values."""
-        object.__setattr__(self, "contact_modulus", CONTACT_MODULUS.checked("contact_modulus", self.contact_modulus))
-        object.__setattr__(self, "surface_energy", SURFACE_ENERGY.checked("surface_energy", self.surface_energy))
-        object.__setattr__(self, "interaction_range", LENGTH.checked("interaction_range", self.interaction_range))
+        object.__setattr__(self, "contact_modulus", CONTACT_MODULUS.validate("contact_modulus", self.contact_modulus))
+        object.__setattr__(self, "surface_energy", SURFACE_ENERGY.validate("surface_energy", self.surface_energy))
+        object.__setattr__(self, "interaction_range", LENGTH.validate("interaction_range", self.interaction_range))
         if self.surface_energy:
-            ADHESION_LENGTH.checked("surface_energy over contact_modulus", self.adhesion_length)
+            ADHESION_LENGTH.validate("surface_energy over contact_modulus", self.adhesion_length)
 
     @property
     def adhesion_length(self) -> float:

@@ -11,7 +11,7 @@ import xarray as xr
 
 from icha.checks.findings import IDENTITY_LIMIT, Check, Finding, RunArrays, at_most, not_finite
 from icha.checks.loops import check_events, check_loop
-from icha.contact.models import HELD_CELLS, HELD_PART, SMALLEST_LOAD, model_of
+from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of
 from icha.datasets.variables.run import OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
 from icha.path.targets import AREA_FRACTION, BETWEEN
@@ -169,7 +169,7 @@ def _miss(run):
     miss = np.abs(value - target)
     if model_of(run.attrs).by_cells and float(run["surface_energy"]) == 0:
         of_area = np.array([kind == AREA_FRACTION for kind in kinds])
-        cells = np.minimum(HELD_CELLS / float(run["grid"]) ** 2, HELD_PART * np.abs(target))
+        cells = np.minimum(AREA_TOLERANCE_CELLS / float(run["grid"]) ** 2, AREA_TOLERANCE_PART * np.abs(target))
         miss = np.where(of_area, np.maximum(miss - cells, 0.0), miss)
     # A path may turn back at no load, of which no part can be taken: then it is one of the run's largest load.
     whole = np.array([np.max(np.abs(reached[kind])) for kind in kinds])

@@ -130,7 +130,7 @@ def _refuse_unusual(**values: tuple[str, float | None]) -> None:
     for key, (name, value) in values.items():
         usual = USUAL[key]
         text = value if usual.si_unit == "1" else f"{value!r} {usual.si_unit}"
-        if value is not None and not usual.holds(text):
+        if value is not None and not usual.contains(text):
             raise UserError(
                 f"{name}: {text} is unusual; expected {usual}. Correct it, or add --confirmed if it is intended"
             )
@@ -146,8 +146,8 @@ def _random_surface(period, rolloff, short, hurst, grid, seed, rms_slope, model)
 
     for name, length in (("--period", period), ("--rolloff", rolloff), ("--short", short)):
         if length is not None:
-            LENGTH.checked(name, length)
-    rolloff, short = _cutoffs(period, rolloff, short, GRID.checked("grid", grid))
+            LENGTH.validate(name, length)
+    rolloff, short = _cutoffs(period, rolloff, short, GRID.validate("grid", grid))
     waves = period / short  # the shortest ones along a side
     run_arrays = 8 * RUN_SIZES[model].arrays * grid**2
     wave_arrays = 8 * 20 * waves**2  # about twenty numbers for each wave of the spectrum

@@ -43,7 +43,7 @@ class LoopsFigure(TruthFigure):
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """A study that does not come back is one more."""
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
+        yield from not_unloaded(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:

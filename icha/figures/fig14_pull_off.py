@@ -43,7 +43,7 @@ class PullOffFigure(StudyFigure):
         """Studies of the second panel that are not there, and studies that do not come back, are more."""
         yield from studies_problems(campaign, "load_studies", self.load_studies or ())
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, in_part=False)
+        yield from not_unloaded(campaign, ("study",), self.study, partly=False)
 
 
 DECLARATION = Declaration(

@@ -63,9 +63,13 @@ _PALE = 0.35
 
 
 class LinearFit(NamedTuple):
-    """A straight line by least squares, its coefficient of determination, and the exponent of a power law.
+    """A straight line by least squares.
 
-    The coefficient is None where y is constant, the exponent where x or y is not positive.
+    Attributes
+    ----------
+    slope, intercept : coefficients of the line.
+    r_squared : coefficient of determination; None if y is constant.
+    exponent : that of a power law through the same points; None if x or y is not positive.
     """
 
     slope: float
@@ -170,16 +174,8 @@ def _draw_parts(ax, runs, looks):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
-            ax.bar(
-                place,
-                share,
-                0.8,
-                bottom=above if share > 0 else below,
-                ec="black",
-                lw=0.4,
-                alpha=None if applicable else _PALE,
-                **PARTS[name][1],
-            )
+            bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name][1]
+            ax.bar(place, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)
         look = looks.look(contact, applicable=applicable)
         ax.plot(place, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, theories for their first surface, and boundary elements at a finite range beside them, if any."""
+    """Return the runs, theories for their first surface, and boundary elements at a finite range, if any."""
     theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
     found = {"campaign": files.path(results.DATASET), "references": theories}
     return found | finite_range_error(campaign, options.study, files)
@@ -49,9 +49,9 @@ DECLARATION = Declaration(
     inputs=inputs,
 )
 
-# Height of the panels of differences, in heights of those above them.
+# Height of the panels of differences over that of the panels above them.
 _LOWER = 0.42
-# Loads that both models are given are the same to this part, for each has its tolerance.
+# Largest relative difference of loads that are the same, since each model has its tolerance.
 _SAME_LOAD = 1e-6
 
 
@@ -71,8 +71,8 @@ def figure(
     dataset, entries = campaign[study].to_dataset(), finite_range_errors(model_error, study)
     differences = _differences(curves, entries, references)
     fig = new_figure(TWO_COLUMNS, 4.5)
-    rows = ["ab", "c" + ("d" if differences[1] else "b")]
-    axes = fig.subplot_mosaic(";".join(rows), height_ratios=(1, _LOWER))
+    mosaic = "ab;cd" if differences[1] else "ab;cb"
+    axes = fig.subplot_mosaic(mosaic, height_ratios=(1, _LOWER))
     left, right = axes["a"], axes["b"]
     (p, areas), (_, gaps) = draw_curves(curves, {left: area_points, right: gap_points}, unloading=True)
     if curves.unloaded:
@@ -90,29 +90,28 @@ def figure(
     _label_separations(right, gaps)
     left.set_ylabel(AREA_LABEL)
     right.set_ylabel(gap_label(dataset))
-    for ax, difference in zip((axes["c"], axes.get("d")), differences, strict=True):
-        if ax is not None:
-            _draw_difference(ax, difference, len(curves.lines))
+    for letter, difference in zip("cd", differences, strict=True):
+        if difference:
+            _draw_difference(axes[letter], difference, len(curves.lines))
     for letter, ax in axes.items():
         ax.set_xlim(x)
         panel_label(ax, letter)
-    for letter, below in (("a", "c"), ("b", "d")):
-        axes[letter].tick_params(labelbottom=below not in axes)
-        axes.get(below, axes[letter]).set_xlabel(PRESSURE_LABEL)
+        lowest = letter in mosaic.split(";")[1]
+        ax.tick_params(labelbottom=lowest)
+        ax.set_xlabel(PRESSURE_LABEL if lowest else "")
     add_legend(fig, [left, right], curves, whose_theories(dataset) if references is not None else {})
     return fig
 
 
 def _label_separations(ax, gaps):
-    """Label the separations by plain numbers, round ones where they span less than two powers of ten."""
+    """Label the separations by plain numbers, round ones if they span less than two powers of ten."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.yaxis.set_minor_formatter(NullFormatter())
     if np.log10(gaps.max() / gaps.min()) < 1.5:
-        ax.set_yticks(
-            [t for t in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5) if gaps.min() / 1.4 < t < gaps.max() * 1.4]
-        )
+        low, high = ax.get_ylim()
+        ax.set_yticks([tick for tick in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5) if low < tick < high])
 
 
 class _Difference(NamedTuple):
@@ -241,41 +240,33 @@ def _draw_solutions(panels, looks, entries):
 
 def _draw_references(left, right, references, limits):
     """Draw theories of rough contact and published points within the limits of the loads."""
-    p = references["reduced_pressure"].values
+    p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
-    look = {"color": BLACK, "lw": 1, "zorder": 2}
-    left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **look)
+    left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **black)
     linear = references["linear_pressure"].values
-    own = linear >= limits[0] / 1.5
-    area = references["bush_gibson_thomas_area_fraction"].values
-    left.plot(linear[own], area[own], label="Bush, Gibson & Thomas", **look | {"ls": "--", "color": GREY})
+    touching = linear >= limits[0] / 1.5
+    area = references["bush_gibson_thomas_area_fraction"].values[touching]
+    left.plot(linear[touching], area, label="Bush, Gibson & Thomas", **black | {"ls": "--", "color": GREY})
     if "gfmd_reduced_pressure" in references:
         points = (references["gfmd_reduced_pressure"].values, references["gfmd_area_fraction"].values)
         left.plot(*points, "x", color=BLACK, ms=6, mew=1.2, label="GFMD, no adhesion", zorder=5)
     if "persson_reduced_separation" in references:
-        separation = references["persson_reduced_separation"].values
-        right.plot(p[shown], separation[shown], label="Yang & Persson", **look)
+        right.plot(p[shown], references["persson_reduced_separation"].values[shown], label="Yang & Persson", **black)
 
 
 def _draw_separate_summits(left, right, references, dataset, colours):
-    """Thin lines of the theories of separate summits, where the references have them; Fuller & Tabor by material."""
-    area, look = references.get("summit_area_fraction"), {"lw": 0.8, "zorder": 1.8}
-    dashes = {"Greenwood & Williamson": (0, (5, 2, 1, 2)), "Fuller & Tabor": (0, (1, 1.5))}
+    """Draw theories of separate summits as thin lines, if the references have them; Fuller & Tabor by material."""
     curves = []
     if "greenwood_williamson_reduced_pressure" in references:
-        values = [references[f"greenwood_williamson_reduced_{name}"].values for name in ("pressure", "separation")]
-        curves.append(("Greenwood & Williamson", GREY, *values))
-    if "fuller_tabor_reduced_pressure" in references:
-        for k, name in enumerate(references["fuller_tabor_material"].values.tolist()):
-            slope = float(references["fuller_tabor_rms_slope"][k])
-            if name in colours and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
-                own = references.isel(fuller_tabor_curve=k)
-                values = [own[f"fuller_tabor_reduced_{quantity}"].values for quantity in ("pressure", "separation")]
-                curves.append(("Fuller & Tabor", colours[name], *values))
-    for name, colour, p, separation in curves:
-        pushed = p > 0
-        for ax, values in ((left, area.values), (right, separation)):
-            ax.plot(p[pushed], values[pushed], color=colour, ls=dashes[name], **look)
-    for name in dict.fromkeys(name for name, *_ in curves):
-        for ax in (left, right):
-            ax.plot([], [], color=GREY, ls=dashes[name], label=name, **look)
+        curves.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))
+    for k in range(references.sizes.get("fuller_tabor_curve", 0)):
+        own = references.isel(fuller_tabor_curve=k)
+        material, slope = str(own["fuller_tabor_material"].values), float(own["fuller_tabor_rms_slope"])
+        if material in colours and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
+            curves.append(("Fuller & Tabor", (0, (1, 1.5)), colours[material], "fuller_tabor", own))
+    for label, dashes, colour, name, theory in curves:
+        p, separation = (theory[f"{name}_reduced_{quantity}"].values for quantity in ("pressure", "separation"))
+        look = {"ls": dashes, "lw": 0.8, "zorder": 1.8}
+        for ax, values in ((left, theory["summit_area_fraction"].values), (right, separation)):
+            ax.plot(p[p > 0], values[p > 0], color=colour, **look)
+            ax.plot([], [], color=GREY, label=label, **look)

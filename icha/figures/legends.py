@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from icha.figures.looks import MODEL_MARKERS, NOT_APPLICABLE, Scale
 from icha.figures.style import GREY, legend_handle
@@ -20,8 +17,6 @@ FEWER_SEEDS = "crossed: mean over n seeds, fewer than asked for"
 
 # More names than this are written smaller.
 _MANY_NAMES = 12
-# Inches that an entry takes beside its name, and a character of it, in 8 point; and of the height of a row.
-_BESIDE, _CHARACTER, _ROW = 0.7, 0.062, 0.155
 _MOST_COLUMNS = 4
 _PALE_GREY = "0.72"
 
@@ -41,34 +36,31 @@ def legend_below(
     if scale:
         scale.draw(figure, list(panels))
     handles = dict(handles) | _marks(figure)
-    if handles:
-        size = 8 if len(handles) <= _MANY_NAMES else 7
-        lengths = [_printed_length(name) * size / 8 for name in handles]
-        columns = next(
-            (count for count in range(_MOST_COLUMNS, 1, -1) if _width(lengths, count) < figure.get_figwidth()), 1
-        )
-        rows = -(-len(handles) // columns)
-        figure.set_figheight(figure.get_figheight() + 0.06 + _ROW * size / 8 * rows)
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)
+    look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
+    for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
+        legend = figure.legend(handles.values(), handles.keys(), ncols=columns, **look)
+        size = legend.get_window_extent().size / figure.dpi
+        if size[0] < figure.get_figwidth() or columns == 1:
+            figure.set_figheight(figure.get_figheight() + size[1])
+            break
+        legend.remove()
     _spread_numbers(figure)
 
 
 def _marks(figure):
-    """What the legend says of crossed and pale marks, as far as a panel has some."""
+    """Return what the legend says of crossed and pale marks, if a panel has some."""
     shown = named_handles(figure.axes)
     ring = {"ls": "none", "marker": "o", "ms": 5, "mew": 0.9, "mfc": "white"}
+    cross = ring | {"marker": "x", "mew": 0.7}
     looks = {
-        FEWER_SEEDS: (
-            legend_handle(color=GREY, **ring),
-            legend_handle(color=GREY, **ring | {"marker": "x", "mew": 0.7}),
-        ),
+        FEWER_SEEDS: (legend_handle(color=GREY, **ring), legend_handle(color=GREY, **cross)),
         NOT_APPLICABLE: legend_handle(color=_PALE_GREY, **ring | {"ls": "-", "lw": 0.9}),
     }
     return {name: look for name, look in looks.items() if name in shown}
 
 
 def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
-    """What is named in some panels, each name once."""
+    """Return what is named in some panels, each name once."""
     found: dict[str, object] = {}
     for axes in panels:
         for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -77,53 +69,46 @@ def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
 
 
 def model_handle(name: str, **look: object) -> Line2D:
-    """What a legend shows of a model."""
+    """Return what a legend shows of a model."""
     return legend_handle(**{"ls": "none", "marker": MODEL_MARKERS[name], "color": GREY, "mec": GREY, "ms": 6} | look)
 
 
 def words_handle(text: str) -> dict[str, object]:
-    """An explanation in a legend, without a look of its own."""
+    """Return an explanation in a legend, without a look."""
     return {text: legend_handle(color=GREY, ls="none")}
 
 
-def _width(lengths, columns):
-    """Inches that so many columns of names take, at most as many as there are names."""
-    parts = np.array_split(lengths, min(columns, len(lengths)))
-    return sum(_BESIDE + _CHARACTER * max(part) for part in parts)
-
-
-def _printed_length(name):
-    """About how many characters a name has when its formulas are set."""
-    return len(re.sub(r"\\mathrm|\\prime|\\ast|\\bar|[{}$^_]", "", name).replace(r"\Delta\gamma", "Δγ"))
-
-
-# Where the number of seeds may stand beside a mark: points to the right, or to the left, and up.
-_NUMBER_PLACES = [(side * right, up) for right, up in ((5, -8), (5, 5), (9, -2), (5, -17), (5, 14)) for side in (1, -1)]
+# Positions of the number of seeds beside a mark, in points to the right and up, the best one first.
+_NUMBER_OFFSETS = [(side * x, y) for x, y in ((5, -8), (5, 5), (9, -2), (5, -17), (5, 14)) for side in (1, -1)]
 _NUMBER = {"fontsize": 6.5, "textcoords": "offset points", "annotation_clip": True}
 
 
 def write_seed_count(axes: Axes, count: int, x: float, y: float, **look: object) -> None:
-    """Write a number of seeds beside a mark; `legend_below` moves numbers that would overlap."""
+    """Write a number of seeds beside a mark; `legend_below` moves numbers that overlap."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=1.5, foreground="white")]
-    axes.annotate(f"n={count}", (x, y), _NUMBER_PLACES[0], path_effects=halo, **_NUMBER, **look)
+    axes.annotate(f"n={count}", (x, y), _NUMBER_OFFSETS[0], path_effects=halo, **_NUMBER, **look)
 
 
 def _spread_numbers(figure):
-    """Move numbers of seeds that would lie on each other, or out of their panel, to another side of their mark."""
+    """Move numbers of seeds that overlap, or lie outside of their panel, to another side of their mark."""
     panels = [each for axes in figure.axes for each in (axes, *axes.child_axes)]
     numbers = [(axes, text) for axes in panels for text in axes.texts if text.get_text().startswith("n=")]
     if numbers:
         figure.draw_without_rendering()
     taken = []
     for axes, text in numbers:
-        frame, boxes = axes.get_window_extent(), {}
-        for place in _NUMBER_PLACES:
-            text.set(ha="left" if place[0] > 0 else "right", position=place)
-            boxes[place] = text.get_window_extent()
-        free = [place for place, box in boxes.items() if not any(box.overlaps(other) for other in taken)]
-        inside = [place for place in free if frame.contains(*boxes[place].min) and frame.contains(*boxes[place].max)]
-        place = (inside or free or _NUMBER_PLACES)[0]
-        text.set(ha="left" if place[0] > 0 else "right", position=place)
-        taken.append(boxes[place])
+        frame, found = axes.get_window_extent(), []
+        for offset in _NUMBER_OFFSETS:
+            box = _move(text, offset)
+            overlaps = any(box.overlaps(other) for other in taken)
+            found.append((overlaps, not (frame.contains(*box.min) and frame.contains(*box.max)), offset))
+        _, _, offset = min(found, key=lambda each: each[:2])
+        taken.append(_move(text, offset))
+
+
+def _move(text, offset):
+    """Move a number of seeds to an offset from its mark; return the box that it fills."""
+    text.set(ha="left" if offset[0] > 0 else "right", position=offset)
+    return text.get_window_extent()

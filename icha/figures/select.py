@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import REFERENCE_MODEL, first_of
+from icha.contact.models import REFERENCE_MODEL, first_model
 from icha.datasets.labels import LABELS, RunLabels, place_of, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.style import number, slope_label
@@ -118,7 +118,7 @@ def is_applicable(run: xr.Dataset) -> bool:
 
 def shown_model(study: xr.Dataset) -> str:
     """The model whose runs figures show first of a study: asperities, or else the study's first."""
-    return first_of(study["model"].values.tolist())
+    return first_model(study["model"].values.tolist())
 
 
 def _check_study(campaign, study):

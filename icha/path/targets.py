@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
-from icha.support.rules import LENGTH, NUMBER, POSITIVE, Real
+from icha.support.rules import LENGTH, NUMBER, POSITIVE, FloatRange
 
 # Largest reduced pressure and area fraction of a target. Beyond them asperities lose their identity, and soon after the
 # mean planes of a surface without adhesion meet.
@@ -26,7 +26,7 @@ UNRESOLVED_REST = 1e-10
 # Largest difference between work and change of energy in a long step without events, relative to the work so far.
 UNBALANCED_WORK = 3e-6
 
-STEP = Real("h_rms", least=MIN_STEP, most=MAX_STEP)
+STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Quantity:
 
     name: str
     unit: str
-    rule: Real
+    rule: FloatRange
     argument: str = ""
     controlled: str | None = None
     pressure_unit: str = ""
@@ -67,8 +67,8 @@ class Quantity:
 
 REDUCED_PRESSURE, RELATIVE_LOAD = "reduced_pressure", "relative_load"
 AREA_FRACTION, MEAN_SEPARATION = "area_fraction", "mean_separation"
-_PRESSURES = Real(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True)
-_AREAS = Real(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True)
+_PRESSURES = FloatRange(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True)
+_AREAS = FloatRange(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True)
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
@@ -168,7 +168,7 @@ class Path:
             raise ValueError(f"unload: expected True or False, got {unload!r}")
         if control not in (SEPARATION_CONTROL, LOAD_CONTROL):
             raise ValueError(f"control: {control!r} must be one of {SEPARATION_CONTROL}, {LOAD_CONTROL}")
-        max_step = STEP.checked("max_step", max_step)
+        max_step = STEP.validate("max_step", max_step)
         values = _validate_list(kind, lists[kind])
         recorded: list[tuple[str, float]] = _validate_snapshots(
             [(kind, values[-1])] if snapshots is None else snapshots
@@ -200,7 +200,7 @@ def _validate_list(kind, values):
         listed = None
     if listed is None:
         raise ValueError(f"{name}: expected a list of numbers, got {values!r}")
-    values = [rule.checked(f"{name}[{k}]", value) for k, value in enumerate(listed)]
+    values = [rule.validate(f"{name}[{k}]", value) for k, value in enumerate(listed)]
     if not values:
         raise ValueError(f"{name}: the list is empty; expected at least one number")
     for k, (one, following) in enumerate(itertools.pairwise(values), start=1):
@@ -214,7 +214,7 @@ def _validate_snapshots(snapshots):
     """Return kinds and values of the snapshots."""
     recorded = []
     for label, kind, value in _label_pairs("snapshots", snapshots):
-        pair = kind, QUANTITIES[kind].rule.checked(label, value)
+        pair = kind, QUANTITIES[kind].rule.validate(label, value)
         if pair in recorded:
             raise ValueError(f"{label}: {kind} {value!r} is given twice; remove one of them")
         recorded.append(pair)
@@ -227,7 +227,7 @@ def _validate_turning_points(turning_points, last):
     for k, (label, kind, value) in enumerate(_label_pairs("turning_points", turning_points)):
         unloading = k % 2 == 0
         rule = NUMBER if unloading and kind in LOADS else QUANTITIES[kind].rule
-        value = rule.checked(label, value)
+        value = rule.validate(label, value)
         if kind == REDUCED_PRESSURE and 0 < abs(value) < LEAST_PRESSURE:
             raise ValueError(
                 f"{label}: {value!r} is too small a load; expected 0, or an absolute value of at least "

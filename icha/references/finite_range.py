@@ -167,9 +167,9 @@ def contact_state(
     progress: Callable[[str], None] | None = None,
 ) -> NodalState:
     """Solve the contact at one load, as `finite_range_solution` does; return it node by node."""
-    target = POSITIVE.checked("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
+    target = POSITIVE.validate("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
     fine = refine(surface, material, refinement, progress)
-    state = _solve_nonadhesive(fine, material, target, TOLERANCE.checked("tolerance", tolerance))
+    state = _solve_nonadhesive(fine, material, target, TOLERANCE.validate("tolerance", tolerance))
     if material.surface_energy == 0:
         return state
     contact = GapContact(fine, material, tolerance, state.gap)
@@ -181,7 +181,7 @@ def refine(
 ) -> Surface:
     """Return the surface on the grid of the solution, which must resolve the attraction; report it as progress."""
     surface.require_periodic("the solution by boundary elements")
-    fine = surface.refined(REFINEMENT.checked("refinement", refinement))
+    fine = surface.refined(REFINEMENT.validate("refinement", refinement))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
     if material.surface_energy > 0:
         numbers += (

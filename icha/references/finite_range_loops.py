@@ -75,10 +75,10 @@ def finite_range_loop(
     NotSolved
         If the solver does not reach its tolerance, or the load is not reached; the message names the last state.
     """
-    target = POSITIVE.checked("largest_reduced_pressure", largest_reduced_pressure)
-    step = POSITIVE.checked("separation_step", separation_step) * surface.rms_height
+    target = POSITIVE.validate("largest_reduced_pressure", largest_reduced_pressure)
+    step = POSITIVE.validate("separation_step", separation_step) * surface.rms_height
     fine = refine(surface, material, refinement, progress)
-    solver = _LoopSolver(fine, material, TOLERANCE.checked("tolerance", tolerance))
+    solver = _LoopSolver(fine, material, TOLERANCE.validate("tolerance", tolerance))
     legs = _load_and_unload(solver, step, target * surface.rms_slope * material.contact_modulus, progress)
     return _dataset(surface, solver, legs, separation_step, seed)
 

@@ -54,9 +54,9 @@ class SelfAffineSpectrum:
     def __post_init__(self):
         """Check the values."""
         for name in ("period", "rolloff_wavelength", "short_wavelength"):
-            object.__setattr__(self, name, LENGTH.checked(name, getattr(self, name)))
-        object.__setattr__(self, "rms_slope", SLOPE.checked("rms_slope", self.rms_slope))
-        object.__setattr__(self, "hurst", HURST.checked("hurst", self.hurst))
+            object.__setattr__(self, name, LENGTH.validate(name, getattr(self, name)))
+        object.__setattr__(self, "rms_slope", SLOPE.validate("rms_slope", self.rms_slope))
+        object.__setattr__(self, "hurst", HURST.validate("hurst", self.hurst))
         if self.rolloff_wavelength > self.period * (1 + _ROUNDING):
             raise ValueError(
                 f"rolloff_wavelength: {self.rolloff_wavelength!r} m must not exceed the period {self.period!r} m"
@@ -138,8 +138,8 @@ class SelfAffineSpectrum:
         ValueError
             Naming the argument whose value is not allowed.
         """
-        grid = GRID.checked("grid", grid)
-        seed = SEED.checked("seed", seed)
+        grid = GRID.validate("grid", grid)
+        seed = SEED.validate("seed", seed)
         if amplitudes not in AMPLITUDES:
             raise ValueError(f"amplitudes: {amplitudes!r} must be one of {', '.join(AMPLITUDES)}")
         cells = self.cells_per_short_wave(grid)

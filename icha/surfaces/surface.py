@@ -16,7 +16,7 @@ import numpy as np
 import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
-from icha.support.rules import LENGTH, SLOPE, Integer, Real
+from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.surfaces.square import problem_with_heights
 
 # What lies beyond the square: the same square again and again, or nothing but the half-space.
@@ -24,7 +24,7 @@ PERIODIC, FREE = "periodic", "free"
 BOUNDARIES = (PERIODIC, FREE)
 
 # Heights from the lowest to the highest, over the period.
-_STEEPNESS = Real(least=1e-24, most=1e9)
+_STEEPNESS = FloatRange(least=1e-24, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
 
@@ -84,9 +84,9 @@ class Surface:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
         if problem := problem_with_heights(heights):
             raise ValueError(f"heights: {problem}")
-        object.__setattr__(self, "period", LENGTH.checked("period", self.period))
+        object.__setattr__(self, "period", LENGTH.validate("period", self.period))
         with np.errstate(over="ignore"):
-            _STEEPNESS.checked("heights: their range over the period", np.ptp(heights) / self.period)
+            _STEEPNESS.validate("heights: their range over the period", np.ptp(heights) / self.period)
         heights -= heights.mean()
         heights.flags.writeable = False
         object.__setattr__(self, "heights", heights)
@@ -197,7 +197,7 @@ class Surface:
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """The same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
-        rms_slope = SLOPE.checked("rms_slope", rms_slope)
+        rms_slope = SLOPE.validate("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
         # Known already; `cached_property` keeps its values there.
@@ -214,7 +214,7 @@ class Surface:
             If the factor is not an integer of at least 1, or the surface is a free square.
         """
         self.require_periodic("a trigonometric interpolant")
-        if Integer(1).checked("factor", factor) == 1:
+        if IntegerRange(1).validate("factor", factor) == 1:
             return self
         # Slow to import, and seldom needed.
         from scipy.signal import resample

@@ -9,12 +9,12 @@ import scipy
 from job import attributes, job_context
 
 from icha.asperity.material import Material
-from icha.contact.checkpoints import prepared
+from icha.contact.checkpoints import prepare_checkpoints
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
-from icha.simulation import ConvergenceError, simulate, unfollowed
+from icha.simulation import ConvergenceError, empty_run, simulate
 
 # Errors of the machine, not of the run: the job fails, and the next call repeats it.
 MACHINE_ERRORS = (OSError, MemoryError, ImportError)
@@ -52,7 +52,7 @@ def run_sweep(
         if not isinstance(error, ValueError):
             reason = f"{type(error).__name__}, unexpected: {error}"
             progress(traceback.format_exc())
-        dataset = unfollowed(*contact, reason, model=model, seed=seed)
+        dataset = empty_run(*contact, reason, model=model, seed=seed)
     if "incomplete" in dataset.attrs:
         progress(f"Failed: {dataset.attrs['incomplete']}")
     write_dataset(dataset.assign_attrs(attributes), output)
@@ -60,7 +60,8 @@ def run_sweep(
 
 def _checkpoints(output, asked, inputs):
     """Return the folder of checkpoints, without those of another surface, path or code."""
-    return prepared(pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {np.__version__} {scipy.__version__}")
+    versions = f"{np.__version__} {scipy.__version__}"
+    return prepare_checkpoints(pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {versions}")
 
 
 if "snakemake" in globals():

@@ -271,7 +271,7 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
     if problem := problem_with_heights(heights):
         raise ValueError(f"holds {problem}; {_EXPECTED}")
     heights = heights.astype(float) * metres_per_unit
-    if not LENGTH.holds(float(np.ptp(heights))):
+    if not LENGTH.contains(float(np.ptp(heights))):
         raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {_EXPECTED}, and another unit")
     return heights
 

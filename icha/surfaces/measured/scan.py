@@ -93,7 +93,7 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     reading += "".join(f"; {remark}" for remark in (found.remark, _replaced(how, found)) if remark)
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     scan = Scan(found.heights.astype(float) * unit, tuple(size), (reading,), coordinate_unit, format_, found.data)
-    if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
+    if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
         raise UnfitTopography(
             "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; expected the size here"
         )
