@@ -179,7 +179,7 @@ def test_a_call_that_has_no_jobs_takes_nothing_from_those_that_run(job, tmp_path
     assert ended(job(WORK, ICHA_OWNER=earlier)) == (0, "")
     # With jobs to start it owns the results, but not if they are not those any more that it has looked at.
     (job.results / "runs/b.nc").write_text("another result")
-    with pytest.raises(SystemExit, match=r"runs/b\.nc has changed since"):
+    with pytest.raises(SystemExit, match=r"runs/b\.nc has changed while"):
         own.begin()
     (job.results / "runs/b.nc").unlink()
     own.begin()
