@@ -95,7 +95,9 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> list[Entry]:
             file.set_auto_scale(False)
             for group in _groups(file):
                 for variable in group.variables.values():
-                    found.setdefault((kind_of(name), group.path, *_described(variable)), []).append(_range(variable))
+                    found.setdefault((file_pattern(name), group.path, *_described(variable)), []).append(
+                        _range(variable)
+                    )
     entries = []
     for key, ranges in found.items():
         smallest, largest = ([value for value in values if value is not None] for values in zip(*ranges, strict=True))
@@ -110,7 +112,7 @@ def dictionary_csv(entries: Iterable[Entry]) -> str:
     return text.getvalue()
 
 
-def kind_of(path: str) -> str:
+def file_pattern(path: str) -> str:
     """Return the path with placeholders for what differs between files of its kind."""
     return next((kind for kind in _KINDS if re.fullmatch(re.sub("<.*?>", "[^/]+", kind), path)), path)
 

@@ -117,7 +117,7 @@ def test_every_run_of_both_models_is_taken_out_unchanged(runs):
         assert set(taken.variables) - {"model", "surface", "material"} == kept
         for name in kept:
             np.testing.assert_array_equal(taken[name].values, original[name].values, err_msg=f"{each} {name}")
-    with pytest.raises(ValueError, match=r"no model 'other'; there are asperities, boundary_elements"):
+    with pytest.raises(ValueError, match=r"no model 'other'; expected one of asperities, boundary_elements"):
         select_run(tree, labels("other"))
 
 
