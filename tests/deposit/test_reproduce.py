@@ -155,7 +155,7 @@ def test_single_runs(deposit, reproduce, computed, tmp_path):
         assert status == 0 and f"identical: {len(runs) + 1} files" in said, said  # and the surface of both
         assert computed[-1][1] == [f"results/tiny/runs/{run}.nc" for run in runs]
     status, said = reproduce(own, "--only", "load/plate/seed3/slope1/soft")
-    assert status == 2 and "has no such run; allowed: smallest, or one of its 2 runs" in said and HARD in said
+    assert status == 2 and "has no such run; expected smallest, or one of its 2 runs" in said and HARD in said
 
 
 def test_the_smallest_run_is_the_smallest_that_is_complete(deposit, reproduce, computed, tmp_path):
