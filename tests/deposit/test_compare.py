@@ -18,7 +18,7 @@ from icha.deposit.compare import (
     WITHIN,
     compare_folders,
     compare_values,
-    table,
+    format_comparison,
     write_json,
 )
 
@@ -137,7 +137,7 @@ def test_a_planted_difference_is_found_and_nothing_else(planted, folders):
     assert comparison.verdict == file.verdict == (WITHIN if verdict == WITHIN else DIFFERENT)
     renaming = planted in ("type", "dimension") or planted.startswith(("missing", "extra"))
     assert renaming or set(found) == {name}
-    assert name.lstrip("/") in table(comparison) and verdict in table(comparison)
+    assert name.lstrip("/") in format_comparison(comparison) and verdict in format_comparison(comparison)
 
 
 def test_the_same_content_is_identical_however_it_is_stored(folders):
@@ -219,7 +219,7 @@ def test_files_that_are_missing_extra_damaged_or_drawn_otherwise(change, path, v
         {path: verdict} if path else {}
     )
     assert comparison.verdict == of_all
-    assert path is None or path.split("/")[0] in table(comparison)
+    assert path is None or path.split("/")[0] in format_comparison(comparison)
     assert compare_folders(*twice, ["figures/b.pdf"]).verdict == IDENTICAL
     write_json(comparison, tmp_path / "out.json")
     assert json.loads((tmp_path / "out.json").read_text())["verdict"] == of_all
@@ -252,8 +252,8 @@ def test_the_same_difference_in_many_files_is_one_line(tmp_path):
         path = f"runs/load/rough/seed{k}/slope1/soft.nc"
         write(tmp_path / "deposit" / path)
         write(tmp_path / "rerun" / path, changed("pressure", 3, 1e3 * (1 + k * 1e-8)))
-    text = table(compare_folders(tmp_path / "deposit", tmp_path / "rerun"))
+    text = format_comparison(compare_folders(tmp_path / "deposit", tmp_path / "rerun"))
     assert text.count("pressure") == 1 and "3e-08 at most (3 files, most in runs/load/rough/seed3" in text
     write(tmp_path / "rerun" / path, changed("pressure", 3, 2e3))
-    lines = table(compare_folders(tmp_path / "deposit", tmp_path / "rerun")).splitlines()
+    lines = format_comparison(compare_folders(tmp_path / "deposit", tmp_path / "rerun")).splitlines()
     assert "different" in lines[2] and "within tolerance" in lines[3]  # after headings and counts
