@@ -8,7 +8,7 @@ from icha.asperity.jkr import JKR
 from icha.checks.run import check_run
 from icha.contact.model import NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
-from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.equilibrium.interacting_asperities import InteractingAsperities, contact_of
 from icha.path.follow import follow
 from icha.path.targets import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
 from icha.surfaces.summits import find_summits
@@ -27,10 +27,6 @@ def surface():
 def large():
     """Enough summits that one event is not a per cent of the area."""
     return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
-
-
-def contact_of(surface, material, model=InteractingAsperities):
-    return model(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)
 
 
 BOTH = pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
@@ -121,6 +117,10 @@ def test_the_path_starts_where_the_first_asperity_makes_contact(surface):
     assert run.spot_count.values.tolist() == [0, 1]
 
 
+def model_of(surface, model):
+    return model(JKR(BARE), find_summits(surface), surface.rms_height, surface.rms_slope)
+
+
 def test_no_step_is_longer_than_asked(surface):
     seen = []
 
@@ -130,7 +130,7 @@ def test_no_step_is_longer_than_asked(surface):
             seen.append((state.separation - reached.separation) / self.rms_height)
             return reached
 
-    contact = contact_of(surface, BARE, Watched)
+    contact = model_of(surface, Watched)
     for _ in follow(contact, Path(reduced_pressures=[1e-2], max_step=0.07)):
         pass
     assert 0.069 < max(seen) <= 0.07 * (1 + 1e-9)
@@ -148,7 +148,7 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface):
             return super().equilibrium(state, separation, control)
 
     path = Path(reduced_pressures=[1e-3, 1e-1])
-    stops = follow(contact_of(surface, BARE, Failing), path)
+    stops = follow(model_of(surface, Failing), path)
     assert next(stops).target.value == 1e-3
     with pytest.raises(NotConverged, match=r"after 1 of 2 stops: on purpose"):
         next(stops)
