@@ -28,7 +28,7 @@ from icha.figures.curves import (
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure, finite_range_error
 from icha.figures.ensembles import draw_members, mark_fewer
 from icha.figures.select import asked_of_entry, errors_of_run, finite_range_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_figure, panel_label
 from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ _LOWER = 0.42
 _SAME_LOAD = 1e-6
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree, references: xr.Dataset | None = None, model_error: xr.DataTree | None = None, *, study: str
 ) -> Figure:

@@ -14,7 +14,7 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigu
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
 from icha.figures.select import errors_of_run, finite_range_errors, snapshots_of_materials
-from icha.figures.style import BLACK, logarithmic_axes, new_panels, styled
+from icha.figures.style import BLACK, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +39,7 @@ _LEAST_NODES = 25
 _MOST_MARKERS, _BESIDE_MARKERS = 40, 14
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree,
     model_error: xr.DataTree | None = None,

@@ -17,7 +17,7 @@ from icha.figures.curves import (
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
-from icha.figures.style import BLACK, DASHES, GREY, legend_handle, material_label, new_panels, styled
+from icha.figures.style import BLACK, DASHES, GREY, in_style, legend_handle, material_label, new_panels
 from icha.support.input_files import read_columns
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ DECLARATION = Declaration(
 )
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree,
     tables: Sequence[str | os.PathLike] = (),

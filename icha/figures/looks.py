@@ -20,10 +20,10 @@ from icha.figures.style import (
     COLOURS,
     GREY,
     INTERFACE,
+    choose_unit,
     legend_handle,
     material_label,
     slope_label,
-    unit_for,
 )
 
 if TYPE_CHECKING:
@@ -279,7 +279,7 @@ def materials_scale(interfaces: xr.Dataset, materials: Sequence[str]) -> Scale:
         return Scale([material_label(interfaces, material) for material in materials])
     (name,) = differing
     symbol, unit = INTERFACE[name]
-    factor, prefixed = unit_for(float(own[name].max()), unit)
+    factor, prefixed = choose_unit(float(own[name].max()), unit)
     return Scale([f"{factor * value:.4g}" for value in own[name].values.tolist()], f"{symbol} ({prefixed})")
 
 

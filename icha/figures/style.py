@@ -61,7 +61,7 @@ RC = {
 
 
 @contextmanager
-def _in_style():
+def _style():
     """Draw in the style above, whatever the user's settings."""
     import matplotlib as mpl
 
@@ -72,7 +72,7 @@ def _in_style():
 
 
 # Decorator of functions that draw a figure.
-styled = _in_style()
+in_style = _style()
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -99,7 +99,7 @@ def new_panels(
 
 def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
     """Write a figure to both formats, without the date and the name of the software."""
-    with _in_style():
+    with _style():
         with whole_file(png) as temporary:
             figure.savefig(temporary, format="png", metadata={"Software": None})
         with whole_file(pdf) as temporary:
@@ -154,7 +154,7 @@ def panel_label(axes, letter: str) -> None:
     axes.set_title(f"({letter})", loc="left", fontweight="bold")
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Return a value in text, such as `0.01`, `25`, or `3.2 × 10⁻⁵` in mathtext."""
     if value == 0:
         return "0"
@@ -169,16 +169,16 @@ def number(value: float) -> str:
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
-def unit_for(value: float, unit: str) -> tuple[float, str]:
+def choose_unit(value: float, unit: str) -> tuple[float, str]:
     """Return factor and name of the prefixed unit in which `value` (SI) lies between 1 and 1000."""
     exponent = 0 if value == 0 else int(np.floor(np.log10(abs(value)) / 3 + 1e-12)) * 3
     exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
     return 10.0**-exponent, f"{_PREFIXES[exponent]}{unit}"
 
 
-def quantity(value: float, unit: str) -> str:
+def format_quantity(value: float, unit: str) -> str:
     """Return a value with a prefixed unit, such as `25 MPa`."""
-    factor, name = unit_for(value, unit)
+    factor, name = choose_unit(value, unit)
     return f"{value * factor:.4g} {name}"
 
 
@@ -200,11 +200,11 @@ def material_label(study, material: str) -> str:
     for name in ("contact_modulus", "surface_energy"):
         symbol, unit = INTERFACE[name]
         value = float(own[name])
-        factor, prefixed = unit_for(float(study[name].max()), unit)
+        factor, prefixed = choose_unit(float(study[name].max()), unit)
         words.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
         alike &= study[name] == own[name]
     if int(alike.sum()) > 1:
-        words.append(f"range {quantity(float(own['interaction_range']), 'm')}")
+        words.append(f"range {format_quantity(float(own['interaction_range']), 'm')}")
     return ", ".join(words)
 
 
