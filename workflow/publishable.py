@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from icha.configuration.load import Configuration
-from icha.configuration.publication import needed
+from icha.configuration.publication import missing_metadata
 from icha.deposit.metadata import licence_problem
 from icha.deposit.program import Source, program_source, refuse_other_environment
 
@@ -15,7 +15,7 @@ def publishable_source(configuration: Configuration, project: str, results: str)
     now or when any of the results was made.
     """
     publication = configuration.campaign.published()
-    wrong = [f"{configuration.origin}: {line}" for line in needed(publication)]
+    wrong = [f"{configuration.origin}: {line}" for line in missing_metadata(publication)]
     if problem := licence_problem(configuration.campaign):
         wrong.append(": ".join([configuration.origin, *problem]))
     try:

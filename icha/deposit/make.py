@@ -54,7 +54,7 @@ def make_deposit(
     results : the campaign's folder of results.
     files : what of it is published, by paths from there: at least config.used.yaml, checks.json and the campaign
         dataset.
-    campaign : what was asked for, with complete metadata (`icha.configuration.publication.needed`).
+    campaign : what was asked for, with complete metadata (`icha.configuration.publication.missing_metadata`).
     source : the source of the program.
     jobs : those that made the results.
     cost : what computing the campaign is expected to take.

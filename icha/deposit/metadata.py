@@ -117,7 +117,7 @@ def citation_cff(publication: Publication, revision: str) -> str:
 
     Parameters
     ----------
-    publication : what is to be cited; complete (`icha.configuration.publication.needed`).
+    publication : what is to be cited; complete (`icha.configuration.publication.missing_metadata`).
     revision : the state of the program that made the data.
     """
     licence = known_licence(publication.license)
