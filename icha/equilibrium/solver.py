@@ -129,7 +129,7 @@ def apply_events(state: IterationState, point: Point, margin: float) -> tuple[It
 
 
 def _hash_places(state):
-    """Return a checksum of the positions of the spots, which tells whether they are the same as before."""
+    """Return a checksum of the positions of the spots, equal for the same spots."""
     sites = state.sites
     places = np.rint(sites.position[sites.status == CONTACT] / (_SAME_PLACE * state.problem.asperities.period))
     return hashlib.sha256(np.sort(places @ (1.0, 2 / _SAME_PLACE)).tobytes()).digest()

@@ -135,7 +135,7 @@ class _Cycle:
 
     @property
     def loading(self) -> bool:
-        """Whether the surfaces approach each other."""
+        """True if the surfaces approach each other."""
         return self.leg % 2 == 0
 
     @property
@@ -269,7 +269,7 @@ class _Cycle:
             return False
         scale = effort
         if step.width > 0 and self.contact.pressure(state) < 0:
-            # In tension there is no loading curve with the same error.
+            # Loading has no curve in tension to compare with, which would have the same error.
             scale = min(effort, max(10 * self.jump_energy, _LEAST_LOSS * effort))
         unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > UNBALANCED_WORK * scale
         return step.has_jump or not unbalanced or width <= self.longest / 256
