@@ -20,10 +20,10 @@ from icha.figures.style import (
     ONE_COLUMN,
     TWO_COLUMNS,
     VERMILLION,
+    choose_unit,
+    format_quantity,
+    in_style,
     new_figure,
-    quantity,
-    styled,
-    unit_for,
 )
 from icha.support.atomic_files import whole_file
 from icha.surfaces.moments import radial_power_spectrum
@@ -33,7 +33,7 @@ LEAST_POWER = 1e-3  # of a filtered spectrum, over the least power of the scan; 
 
 
 def draw(kind: str, data: xr.Dataset | xr.DataTree, path: Path) -> None:
-    """Draw the result of `icha.datasets.format.kind_of` into a file."""
+    """Draw the result of `icha.datasets.format.identify_file` into a file."""
     _save((_run if kind == RUN else _surface if kind == SURFACE else _campaign)(data), path)
 
 
@@ -48,7 +48,7 @@ def _save(figure: Figure, path: Path) -> None:
     echo(f"plot: {shown(path)}")
 
 
-@styled
+@in_style
 def _run(run: xr.Dataset) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.2)
     axes = figure.subplots(1, 2)
@@ -57,7 +57,7 @@ def _run(run: xr.Dataset) -> Figure:
     return figure
 
 
-@styled
+@in_style
 def _campaign(tree: xr.DataTree) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.2 * len(tree.children))
     rows = figure.subplots(len(tree.children), 2, squeeze=False)
@@ -97,7 +97,7 @@ def _label_axes(axes, data: xr.Dataset) -> None:
     axes[0].set_yscale(scale)
 
 
-@styled
+@in_style
 def _surface(surface: xr.Dataset) -> Figure:
     spectrum = "power_spectrum" in surface
     figure = new_figure(TWO_COLUMNS if spectrum else ONE_COLUMN, 3.2)
@@ -109,7 +109,7 @@ def _surface(surface: xr.Dataset) -> Figure:
     return figure
 
 
-@styled
+@in_style
 def _scans(scans: Mapping) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.0 * len(scans))
     for (left, right), (name, scan) in zip(figure.subplots(len(scans), 2, squeeze=False), scans.items(), strict=True):
@@ -120,10 +120,10 @@ def _scans(scans: Mapping) -> Figure:
         if scan.cutoff is not None:
             k, used = radial_power_spectrum(scan.used)
             visible = used > LEAST_POWER * power[power > 0].min()
-            label = f"as used, cut off at {quantity(scan.cutoff, 'm')}"
+            label = f"as used, cut off at {format_quantity(scan.cutoff, 'm')}"
             right.loglog(k[visible], used[visible], color=GREEN, ls="--", label=label)
         if (noise := scan.noise) is not None:
-            rms, wavelength = (quantity(float(f"{length:.2g}"), "m") for length in (noise.rms, noise.wavelength))
+            rms, wavelength = (format_quantity(float(f"{length:.2g}"), "m") for length in (noise.rms, noise.wavelength))
             right.axhline(noise.power, color=VERMILLION, lw=0.8, ls=":", label=f"noise floor, {rms} rms")
             right.axvline(2 * np.pi / noise.wavelength, color=VERMILLION, lw=0.8, label=f"noise below {wavelength}")
         right.axvline(np.pi / scan.measured.spacing / 4, color=GREY, lw=0.8, ls="-.", label="waves of 8 pixels")
@@ -135,7 +135,7 @@ def _draw_map(ax, heights: np.ndarray, side: float, label: str) -> None:
     """Draw heights (n, n), in m, on a square with this side, in m."""
     step = max(1, len(heights) // 1024)
     visible = heights[::step, ::step]
-    (factor, unit), (lateral_factor, lateral) = (unit_for(value, "m") for value in (np.abs(visible).max(), side))
+    (factor, unit), (lateral_factor, lateral) = (choose_unit(value, "m") for value in (np.abs(visible).max(), side))
     extent = np.array([0, side, 0, side]) * lateral_factor
     image = ax.imshow(visible * factor, extent=extent, origin="lower")
     ax.figure.colorbar(image, ax=ax, label=f"{label} ({unit})")
