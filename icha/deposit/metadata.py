@@ -117,7 +117,7 @@ def citation_cff(publication: Publication, revision: str) -> str:
 
     Parameters
     ----------
-    publication : complete metadata (`icha.configuration.publication.needed`).
+    publication : complete metadata (`icha.configuration.publication.missing_metadata`).
     revision : that of the program that made the data.
     """
     licence = known_licence(publication.license)
