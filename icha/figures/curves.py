@@ -101,10 +101,8 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
         lines.append(Curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
-    truths = (
-        group_by_contact(campaign, study_runs(campaign, other, ragged=False, model=REFERENCE_MODEL)) if other else []
-    )
-    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in truths]
+    truths = study_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
+    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in group_by_contact(campaign, truths)]
     changed = {"ls": "-" if looks.scale or any(len(group.runs) > 1 for group in groups) else "none"}
     changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
