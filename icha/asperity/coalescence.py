@@ -6,7 +6,7 @@ The height of the equivalent spot follows from the present equilibrium (`icha.eq
 import numpy as np
 from scipy.spatial import cKDTree
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.surfaces.square import periodic_difference
 
 
@@ -47,7 +47,7 @@ def disjoint_pairs(pairs):
     return np.array(chosen, dtype=int).reshape(-1, 2)
 
 
-def equivalent_spots(law: SpotLaw, position_i, a_i, R_i, position_j, a_j, R_j, period):
+def equivalent_spots(law: JKR, position_i, a_i, R_i, position_j, a_j, R_j, period):
     """Return centre (k, 2), contact radius and radius of curvature (k,) of the spots that replace pairs i, j, m."""
     a, R, fraction = law.union(a_i, R_i, a_j, R_j)
     offset = periodic_difference(position_j, position_i, period)

@@ -18,7 +18,10 @@ _MAX_NEWTON_STEPS = 200
 
 @dataclass(frozen=True)
 class JKR:
-    """Contact of one paraboloid with an elastic half-space; an `icha.asperity.law.SpotLaw`."""
+    """Contact of one paraboloid with an elastic half-space.
+
+    The solver of many spots needs no more of a law than the methods of this class.
+    """
 
     material: Material
 

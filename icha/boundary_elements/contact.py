@@ -30,7 +30,7 @@ from icha.boundary_elements.patches import (
     patch_events,
     unpacked,
 )
-from icha.contact.checkpoints import Kept
+from icha.contact.checkpoints import CheckpointedContact
 from icha.contact.model import (
     COALESCENCE,
     JUMP_IN,
@@ -41,9 +41,9 @@ from icha.contact.model import (
     Control,
     Events,
     NotConverged,
+    count_summits,
     gap_bins,
     largest_tension,
-    summit_counts,
 )
 from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
 from icha.surfaces.summits import Asperities, locate_summits
@@ -187,7 +187,7 @@ class BoundaryElements:
 
     def events_between(self, before: CellState, after: CellState) -> Events:
         """The events on the path from one state to a later one."""
-        return Events.joined(after.history[len(before.history) :])
+        return Events.concatenate(after.history[len(before.history) :])
 
     # --- on the way -----------------------------------------------------------------------------------------------
 
@@ -282,7 +282,7 @@ class PatchObservables:
 
     def of_contact(self) -> dict:
         """What holds for all states."""
-        return summit_counts(self.contact.asperities)
+        return count_summits(self.contact.asperities)
 
     def of_step(self, state: CellState) -> dict:
         """Residuals of the equilibrium, events so far, and how far Wu's formula is known to hold."""
@@ -290,7 +290,7 @@ class PatchObservables:
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
-        events = Events.joined(state.history)
+        events = Events.concatenate(state.history)
         counts = {
             name: events.count(kind)
             for name, kind in (
@@ -419,9 +419,9 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     )
 
 
-def resumable(contact: BoundaryElements, folder: pathlib.Path) -> Kept:
+def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:
     """The contact with its equilibria kept in a folder, from which a path that was stopped resumes."""
     programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
     others = repr((contact.spacing, contact.law.material, programs)).encode()
     of = hashlib.sha256(contact.heights.tobytes() + others).hexdigest()
-    return Kept(contact, of[:32], folder, packed, unpacked)
+    return CheckpointedContact(contact, of[:32], folder, packed, unpacked)

@@ -10,7 +10,7 @@ import numpy as np
 from icha.boundary_elements.newton import FRONT_TOLERANCE
 from icha.boundary_elements.patches import CellState
 from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control, Events, NotConverged
-from icha.contact.models import HELD_CELLS, HELD_PART
+from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
 
 # Relative error of a held load or area.
 _HELD = 5e-10
@@ -89,7 +89,7 @@ def _needed(contact, state, control):
         scale = max(abs(contact.pressure(state)), _NO_LOAD * unit)
     enough = _HELD * scale
     if control.quantity == AREA_FRACTION and not contact.adhesive:
-        enough = max(enough, min(HELD_CELLS * contact.spacing**2 / contact.area, HELD_PART * scale))
+        enough = max(enough, min(AREA_TOLERANCE_CELLS * contact.spacing**2 / contact.area, AREA_TOLERANCE_PART * scale))
     return scale, enough
 
 

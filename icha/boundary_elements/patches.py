@@ -128,7 +128,7 @@ def packed(state: CellState, before: CellState) -> dict[str, np.ndarray]:
     """The arrays that a state is made of, with the events since the one before."""
     arrays = {each.name: getattr(state, each.name) for each in fields(state) if each.name not in ("rates", "history")}
     arrays |= {f"rates_{k}": rate for k, rate in enumerate(state.rates or ())}
-    events = Events.joined(state.history[len(before.history) :])
+    events = Events.concatenate(state.history[len(before.history) :])
     return arrays | {f"event_{name}": getattr(events, name) for name in Events.__match_args__}
 
 
@@ -215,7 +215,7 @@ def patch_events(
     def of_new(kind, which, sign):
         return _events(kind, after, new, new_count, energy_of_cells, which, sign, summits, grid, spacing)
 
-    return Events.joined(
+    return Events.concatenate(
         [
             of_new(JUMP_IN, np.flatnonzero(parts_of_new == 0), -1.0),
             of_old(JUMP_OFF, np.flatnonzero(parts_of_old == 0), 1.0),
@@ -228,7 +228,7 @@ def patch_events(
 def _events(kind, state, labels, count, energy_of_cells, which, sign, summits, grid, spacing):
     """Events of one kind to patches `which`, (k,), of a state; of a jump the energy of its patch is set free."""
     if not len(which):
-        return Events.joined(())
+        return Events.concatenate(())
     energy = np.bincount(labels, energy_of_cells(state), count + 1)[1:]
     position = centres(state.cells, grid, labels, count, state.fraction) * spacing
     return Events(

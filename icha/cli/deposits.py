@@ -102,13 +102,13 @@ def reproduce(
     the deposit is damaged or missing, or cannot be computed again.
     """
     from icha.deposit.compare import compare_folders, write_json
-    from icha.deposit.reproduce import Refused, asked_runs, campaign_name, prepare, with_surfaces
+    from icha.deposit.reproduce import Refused, campaign_name, find_runs, prepare, with_surfaces
     from icha.deposit.verify import Damaged
 
     try:
         with _intact(deposit, large) as original:
             name = campaign_name(original)
-            runs = asked_runs(only or (), original)
+            runs = find_runs(only or (), original)
             _introduce(deposit, original, folder)
             target = (folder or Path(tempfile.mkdtemp(prefix="icha-reproduce-"))).resolve()
             try:
@@ -182,9 +182,9 @@ def _run(project: Path, targets: list[str], cores: str | None, anyway: bool) -> 
 
 def _print_comparison(comparison) -> bool:
     """Print the comparison; return whether everything is reproduced."""
-    from icha.deposit.compare import DIFFERENT, IDENTICAL, TOLERANCE, table
+    from icha.deposit.compare import DIFFERENT, IDENTICAL, TOLERANCE, format_comparison
 
-    echo(f"\ncomparison of the deposit with the new results:\n\n{table(comparison)}\n")
+    echo(f"\ncomparison of the deposit with the new results:\n\n{format_comparison(comparison)}\n")
     files = format_count(len(comparison.files), "file")
     if not comparison.files or comparison.verdict == DIFFERENT:
         echo("different: not everything is reproduced", fg="red")

@@ -19,10 +19,10 @@ from icha.figures.style import (
     ONE_COLUMN,
     TWO_COLUMNS,
     VERMILLION,
+    choose_unit,
+    format_quantity,
+    in_style,
     new_figure,
-    quantity,
-    styled,
-    unit_for,
 )
 from icha.support.atomic_files import whole_file
 from icha.surfaces.moments import radial_power_spectrum
@@ -38,7 +38,7 @@ def draw(kind: str, data: xr.Dataset | xr.DataTree, path: Path) -> None:
         drawing(data).savefig(temporary, format=path.suffix[1:], dpi=150)
 
 
-@styled
+@in_style
 def _run(run: xr.Dataset) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.2)
     axes = figure.subplots(1, 2)
@@ -47,7 +47,7 @@ def _run(run: xr.Dataset) -> Figure:
     return figure
 
 
-@styled
+@in_style
 def _campaign(tree: xr.DataTree) -> Figure:
     names = list(tree.children)
     figure = new_figure(TWO_COLUMNS, 3.2 * len(names))
@@ -88,7 +88,7 @@ def _label(axes, data):
     axes[0].set_yscale("linear" if loops else "log")
 
 
-@styled
+@in_style
 def _surface(surface: xr.Dataset) -> Figure:
     spectrum = "power_spectrum" in surface
     figure = new_figure(TWO_COLUMNS if spectrum else ONE_COLUMN, 3.2)
@@ -109,7 +109,7 @@ def draw_scans(scans: Mapping, path: Path) -> None:
         _scans(scans).savefig(temporary, format=path.suffix[1:], dpi=150)
 
 
-@styled
+@in_style
 def _scans(scans: Mapping) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.0 * len(scans))
     for (left, right), (name, scan) in zip(figure.subplots(len(scans), 2, squeeze=False), scans.items(), strict=True):
@@ -121,10 +121,10 @@ def _scans(scans: Mapping) -> Figure:
             k, used = radial_power_spectrum(scan.used)
             # What is left of the shortest waves after the filter is rounding.
             shown = used > 1e-3 * power[power > 0].min()
-            cut = f"as used, cut off at {quantity(scan.cutoff, 'm')}"
+            cut = f"as used, cut off at {format_quantity(scan.cutoff, 'm')}"
             right.loglog(k[shown], used[shown], color=GREEN, ls="--", label=cut)
         if (noise := scan.noise) is not None:
-            rms, wavelength = (quantity(float(f"{length:.2g}"), "m") for length in (noise.rms, noise.wavelength))
+            rms, wavelength = (format_quantity(float(f"{length:.2g}"), "m") for length in (noise.rms, noise.wavelength))
             right.axhline(noise.power, color=VERMILLION, lw=0.8, ls=":", label=f"noise floor, {rms} rms")
             right.axvline(2 * np.pi / noise.wavelength, color=VERMILLION, lw=0.8, label=f"noise below {wavelength}")
         right.axvline(np.pi / scan.measured.spacing / 4, color=GREY, lw=0.8, ls="-.", label="waves of 8 pixels")
@@ -136,7 +136,7 @@ def _map(ax, heights, scale, side, label):
     """Heights (n, n), multiplied with a scale, in m, on a square of a side, m."""
     every = max(1, len(heights) // 1024)
     shown = heights[::every, ::every] * scale
-    (factor, unit), (along, lateral) = (unit_for(value, "m") for value in (np.abs(shown).max(), side))
+    (factor, unit), (along, lateral) = (choose_unit(value, "m") for value in (np.abs(shown).max(), side))
     image = ax.imshow(shown * factor, extent=np.array([0, side, 0, side]) * along, origin="lower")
     ax.figure.colorbar(image, ax=ax, label=f"{label} ({unit})")
     ax.set_xlabel(f"x ({lateral})")

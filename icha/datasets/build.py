@@ -1,4 +1,4 @@
-"""The builder of datasets: values by name, and a table of the vocabulary that describes them."""
+"""Building datasets from values by name, and a table of the vocabulary that describes them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
-    """The dataset of some values, in the order of the table, coordinates last.
+    """Build a dataset, in the order of the table, coordinates last.
 
     Parameters
     ----------
     table : descriptions of the variables (`icha.datasets.variables`).
-    values : of those variables that the dataset has; numbers, texts or arrays of the shapes of their dimensions.
+    values : numbers, texts or arrays of the variables that the dataset has.
     attrs : global attributes.
 
     Raises
@@ -35,14 +35,14 @@ def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, s
 
 
 def describe_variables(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]:
-    """Variables of some values with their dimensions, types and attributes, in the order of the table."""
+    """Make variables with dimensions, types and attributes, in the order of the table."""
     if unknown := values.keys() - table.keys():
         raise ValueError(f"variables without a description: {', '.join(sorted(unknown))}")
     return {name: make_variable(table[name], values[name]) for name in table if name in values}
 
 
 def make_variable(description: Variable, values: Any) -> xr.Variable:
-    """A variable with the dimensions, type and attributes of its description."""
+    """Make a variable with the dimensions, type and attributes of its description."""
     import xarray as xr
 
     dtype = object if description.dtype is str else description.dtype
@@ -50,38 +50,36 @@ def make_variable(description: Variable, values: Any) -> xr.Variable:
 
 
 def get_values(thing: Any, *names: str) -> dict[str, Any]:
-    """Values that a surface, a material or a spectrum has under the names of their variables."""
+    """Return attributes of a surface, a material or a spectrum that have the names of variables."""
     return {name: getattr(thing, name) for name in names}
 
 
 def stack_rows(
     table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
 ) -> dict[str, np.ndarray]:
-    """Rows of values, one for each position along a dimension, as arrays of all variables that begin with it.
+    """Stack rows of values, one for each position along a dimension, to arrays of the variables that begin with it.
 
-    Parameters
-    ----------
-    sizes : of further dimensions.
+    `sizes` are those of further dimensions.
     """
-    names = [name for name, own in table.items() if own.dims[:1] == (dim,) and name != dim]
+    names = [name for name, described in table.items() if described.dims[:1] == (dim,) and name != dim]
     shapes = {name: (len(rows), *(sizes[each] for each in table[name].dims[1:])) for name in names}
     values = {name: np.array([row[name] for row in rows]).reshape(shapes[name]) for name in names}
     return values | ({dim: np.arange(len(rows))} if dim in table else {})
 
 
 def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
-    """The variables of a table along a ragged dimension, of which every row has as many values as it likes.
+    """Concatenate the variables of a table along a ragged dimension, along which rows have different lengths.
 
-    They stand one after the other, and `<dim>_<instance>` says to which row each belongs.
+    `<dim>_<instance>` is the row of each value.
     """
     index = f"{dim}_{instance}"
-    names = [name for name, own in table.items() if own.dims == (dim,) and name != index]
+    names = [name for name, described in table.items() if described.dims == (dim,) and name != index]
     values = {name: np.concatenate([np.empty(0), *(row[name] for row in rows)]) for name in names}
     return values | {index: np.repeat(np.arange(len(rows)), [len(row[names[0]]) for row in rows])}
 
 
 def bin_values(quantity: str, edges: np.ndarray) -> dict[str, np.ndarray]:
-    """Values of the variables of `bin_table`."""
+    """Return the values of the variables of `bin_table`."""
     return {
         f"{quantity}_bin_edges": edges,
         f"{quantity}_bin_centre": (edges[:-1] + edges[1:]) / 2,

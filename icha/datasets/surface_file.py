@@ -1,4 +1,4 @@
-"""The file of a surface: its heights, statistics and power spectrum, and where it comes from."""
+"""The file of a surface: its heights, statistics, power spectrum and origin."""
 
 import os
 from collections.abc import Mapping
@@ -25,15 +25,15 @@ def write_surface(
     measured=None,
     attrs: Mapping[str, str] = {},
 ) -> None:
-    """Write a topography, its statistics and power spectrum, and where it comes from.
+    """Write a topography with its statistics, power spectrum and origin.
 
     Parameters
     ----------
     path : the file.
-    surface : the topography; the campaigns keep it at rms slope 1.
-    name, seed : what the campaign calls it.
-    spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` that it realises, if any.
-    measured : the `icha.surfaces.measured.topography.PreparedTopography` whose heights, scaled, it has, if any.
+    surface : the topography; campaigns scale it to rms slope 1.
+    name, seed : its labels in the campaign.
+    spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` of a random surface.
+    measured : the `icha.surfaces.measured.topography.PreparedTopography` of a measured surface, before scaling.
     attrs : further global attributes.
     """
     n = surface.grid
@@ -78,9 +78,9 @@ def write_surface(
 
 
 def as_measured(surface: xr.Dataset) -> float:
-    """Factor from the heights of a surface file to those that were measured; 1 of what was not measured.
+    """Return the factor from the heights of a surface file to the measured heights; 1 if it was not measured.
 
-    All topographies are kept at rms slope 1, whatever their own.
+    All topographies are stored at rms slope 1.
     """
     if "measured_rms_slope" not in surface:
         return 1.0
@@ -99,7 +99,7 @@ def read_surface(path: str | os.PathLike) -> Surface:
 
 
 def surface_of(dataset: xr.Dataset, path: str | os.PathLike) -> Surface:
-    """The topography of what was read of a surface file; errors as `read_surface`."""
+    """Return the topography in the dataset of a surface file; errors as `read_surface`."""
     for name in ("height", "period"):
         if name not in dataset:
             raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
@@ -119,7 +119,6 @@ def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
         If the file cannot be read or does not hold them.
     """
     names = [f"spectral_moment_{order}" for order in (0, 2, 4)]
-
     with readable(path), xr.open_dataset(path, engine="netcdf4") as dataset:
         if missing := [name for name in names if name not in dataset]:
             raise ValueError(f"{path}: not a surface file, it has no variable {missing[0]!r}")

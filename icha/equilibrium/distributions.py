@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.contact.model import GAPS_PER_DECADE, PRESSURE_BINS, gap_bins
 from icha.equilibrium.sites import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, row_blocks, windows
@@ -73,7 +73,7 @@ def _cover_grid(period, grid, centres, radii, free):
     return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
 
 
-def gap_distribution(law: SpotLaw, surface: Surface, state: ContactState) -> GapDistribution:
+def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDistribution:
     """Return P(u) from the gaps of all grid cells; a cell on the edge of a spot counts with its part outside the spot.
 
     The integral of P(u) + A/A0 + overlap is 1 + beyond_edges. If the node of a cell lies inside a spot, the part of the
@@ -115,7 +115,7 @@ def _gap_bin(u, edges):
     return index
 
 
-def pressure_distribution(law: SpotLaw, surface: Surface, spots: Spots) -> PressureDistribution:
+def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> PressureDistribution:
     """Return P(p) over the nominal area from the closed form for every spot, without a grid.
 
     The integral of P(p) is A/A0; the sum of density times width times mean over the bins is F/A0. The last bin, which

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.contact.model import PRESSURE, Control
 from icha.contact.models import RESIDUAL_TOLERANCE, SMALLEST_LOAD
 from icha.equilibrium.sites import Problem, Sites
@@ -44,7 +44,7 @@ def nominal_derivative(problem: Problem, quantity: str, a, R):
     return 2 * np.pi * a / problem.area
 
 
-def radius_response(law: SpotLaw, a, R, approach, jump_off):
+def radius_response(law: JKR, a, R, approach, jump_off):
     """Return da/d(delta) of each spot: zero past jump-off, bounded close to it, where it is infinite."""
     slope = np.zeros(len(a))
     touching = (a > 0) & (approach >= jump_off)

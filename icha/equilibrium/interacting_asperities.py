@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, largest_tension, summit_counts
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, count_summits, largest_tension
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_response
 from icha.equilibrium.sites import ContactState, Problem, Sites
@@ -111,7 +111,7 @@ class InteractingAsperities(Problem):
 
     def events_between(self, before: ContactState, after: ContactState) -> Events:
         """Return the events on the path from one state to a later one."""
-        return Events.joined(after.history[len(before.history) :])
+        return Events.concatenate(after.history[len(before.history) :])
 
     def observables(self, surface: Surface) -> AsperityObservables:
         """Return the observables of the states on a surface."""
@@ -133,7 +133,7 @@ class AsperityObservables:
 
     def of_contact(self) -> dict:
         """Return what is the same in all states."""
-        return summit_counts(self.contact.asperities)
+        return count_summits(self.contact.asperities)
 
     def of_step(self, state: ContactState) -> dict:
         """Return the residual, the numbers of events, and the part of single spots outside Wu's formula."""

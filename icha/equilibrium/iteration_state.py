@@ -106,6 +106,6 @@ class IterationState:
     def events(self) -> Events:
         """Return the events so far."""
         if not self.log:
-            return Events.joined(())
+            return Events.concatenate(())
         kind, position, members, energy, _ = zip(*self.log, strict=True)
         return Events(np.array(kind, np.int8), np.array(position), np.array(members, int), np.array(energy, float))

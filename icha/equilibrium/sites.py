@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.contact.model import Events
 from icha.half_space.ewald import HalfSpace
 from icha.surfaces.summits import Asperities
@@ -26,7 +26,7 @@ class Problem:
     jump_in : (n,) float, approaches at which the asperities jump into contact, m.
     """
 
-    law: SpotLaw
+    law: JKR
     asperities: Asperities
     rms_height: float
     rms_slope: float = 1.0
@@ -133,7 +133,7 @@ class Sites:
         return len(self.height)
 
     @classmethod
-    def none(cls, law: SpotLaw, asperities: Asperities) -> Sites:
+    def none(cls, law: JKR, asperities: Asperities) -> Sites:
         """Return a table without sites."""
         kinds = {"asperity": int, "members": int, "union": object, "split_number": int, "status": np.int8}
         kinds |= {"was_in_contact": bool}
@@ -147,7 +147,7 @@ class Sites:
         """Whether each site is in contact or a candidate, (n,) bool."""
         return self.status != REMOVED
 
-    def append(self, law: SpotLaw, *, status, was_in_contact, split_number=-1, **more) -> Sites:
+    def append(self, law: JKR, *, status, was_in_contact, split_number=-1, **more) -> Sites:
         """Return the table with k more sites; the named arguments hold for all of them, other arrays are (k, ...)."""
         count = len(more["height"])
         more |= {

@@ -1,6 +1,6 @@
 """Coalescence of spots, the splitting of unions on unloading, and new contacts that lie inside other spots.
 
-Overlapping spots become one spot, by the rule of the law (`icha.asperity.law.SpotLaw.union`). The height of the union
+Overlapping spots become one spot, by the rule of the law (`icha.asperity.jkr.JKR.union`). The height of the union
 is the one with which it is in equilibrium when it is made. The equations are singular where the edge of one spot runs
 through the centre of another.
 """

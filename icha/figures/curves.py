@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.contact.models import MODELS
-from icha.datasets.labels import RunLabels
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.hysteresis import mean_legs
@@ -23,6 +22,7 @@ from icha.figures.looks import (
     Looks,
 )
 from icha.figures.select import (
+    ContactRuns,
     Snapshots,
     group_by_contact,
     name_of_place,
@@ -33,7 +33,7 @@ from icha.figures.select import (
     study_runs,
     unloading_legs,
 )
-from icha.figures.style import line_artist, logarithmic_axes
+from icha.figures.style import legend_handle, logarithmic_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,32 +50,20 @@ UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 
 
 def gap_label(data: xr.Dataset) -> str:
-    """What the mean gap of runs is called: of periodic surfaces the mean separation, of free squares not."""
+    """Return the label of the mean gap, which is the mean separation on periodic surfaces but not on free squares."""
     return GAP_LABEL if (data["boundary"] == "free").any() else SEPARATION_LABEL
 
 
 class Curve(NamedTuple):
-    """A line of the runs of one contact.
+    """The runs of one contact, and the look of their markers, arguments of `Axes.plot`."""
 
-    Attributes
-    ----------
-    labels : labels of the first run.
-    runs : the steps of each run at the targets of its study, by seed.
-    unloading : the legs of each run that unload.
-    look : arguments of `Axes.plot` for its markers.
-    asked : number of seeds asked for.
-    """
-
-    labels: RunLabels
-    runs: dict[int, xr.Dataset]
-    unloading: list[list[xr.Dataset]]
+    runs: ContactRuns
     look: dict
-    asked: int
 
     @property
-    def contact(self) -> Contact:
-        """Material, surface and rms slope."""
-        return self.labels.material, self.labels.surface, self.labels.rms_slope
+    def stops(self) -> dict[int, xr.Dataset]:
+        """Steps of the runs at the targets of their study, by seed."""
+        return {seed: path_steps(run) for seed, run in self.runs.runs.items()}
 
 
 class Curves(NamedTuple):
@@ -97,7 +85,7 @@ class Curves(NamedTuple):
     @property
     def unloaded(self) -> bool:
         """Whether any run is unloaded."""
-        return any(leg for line in self.lines for leg in line.unloading)
+        return any(unloading_legs(run) for line in self.lines for run in line.runs.runs.values())
 
 
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None) -> Curves:
@@ -105,27 +93,21 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     groups = group_by_contact(campaign, study_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
     materials = dataset["material"].values.tolist()
-    looks = Looks(
-        campaign, dataset, sorted((each.contact for each in groups), key=lambda contact: materials.index(contact[0]))
-    )
+    contacts = sorted((group.contact for group in groups), key=lambda contact: materials.index(contact[0]))
+    looks = Looks(campaign, dataset, contacts)
     name, lines = model_name(dataset), []
     for group in groups:
         look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.scale else "none"}
         if name != ASPERITIES_NAME:
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
-        lines.append(_curve(group, look, [unloading_legs(run) for run in group.runs.values()]))
-    others = boundary_elements or (study if name == ASPERITIES_NAME else None)
-    truths = group_by_contact(campaign, runs_by_boundary_elements(campaign, others)) if others else []
-    beside = [_curve(truth, cross_look(looks, truth.contact), []) for truth in truths]
-    changed = {"ls": "-" if looks.scale or any(len(line.runs) > 1 for line in lines) else "none"}
+        lines.append(Curve(group, look))
+    other = boundary_elements or (study if name == ASPERITIES_NAME else None)
+    truths = group_by_contact(campaign, runs_by_boundary_elements(campaign, other)) if other else []
+    beside = [Curve(truth, cross_look(looks, truth.contact)) for truth in truths]
+    changed = {"ls": "-" if looks.scale or any(len(group.runs) > 1 for group in groups) else "none"}
     changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
     return Curves(lines, beside, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if beside else {}))
-
-
-def _curve(group, look, unloading):
-    stops = {seed: path_steps(run) for seed, run in group.runs.items()}
-    return Curve(group.labels, stops, unloading, look, group.asked)
 
 
 def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict:
@@ -224,17 +206,17 @@ def _draw_line(axes, line, points, *, lines):
     """Draw a run by markers; of several seeds their mean at common loads by a line, and their scatter."""
     from icha.analysis.common_loads import at_common_loads
 
-    members = [points(run) for run in line.runs.values()]
+    members, asked = [points(run) for run in line.stops.values()], line.runs.asked
     if len(members) > 1:
         load, values = at_common_loads(members, logarithmic=True)
         if len(load):
-            draw_members(axes, load, values, line.look, positive=True, lines=lines, asked=line.asked)
+            draw_members(axes, load, values, line.look, positive=True, lines=lines, asked=asked)
             return np.tile(load, len(values)), values.ravel()
     # Runs without a common load have no mean.
     for load, values in members:
         axes.plot(load, values, **line.look)
-        if len(members) < line.asked:
-            mark_fewer(axes, load, values, np.isfinite(values)[None], line.look, line.asked)
+        if len(members) < asked:
+            mark_fewer(axes, load, values, np.isfinite(values)[None], line.look, asked)
     return tuple(map(np.concatenate, zip(*members, strict=True)))
 
 
@@ -242,10 +224,10 @@ def _draw_crosses(axes, line, points):
     """Draw a line by boundary elements; of several seeds their means at common loads."""
     from icha.analysis.common_loads import at_common_loads
 
-    load, values = at_common_loads([points(run) for run in line.runs.values()], logarithmic=True)
+    load, values = at_common_loads([points(run) for run in line.stops.values()], logarithmic=True)
     mean = values.mean(axis=0)
     axes.plot(load, mean, **line.look)
-    mark_fewer(axes, load, mean, np.isfinite(values), line.look, line.asked)
+    mark_fewer(axes, load, mean, np.isfinite(values), line.look, line.runs.asked)
     return load, mean
 
 
@@ -256,19 +238,20 @@ def _draw_unloading(panels, line):
     """
     import xarray as xr
 
-    slope = next(iter(line.runs.values()))["rms_slope"]
-    for leg in mean_legs([[("unloading", leg) for leg in legs] for legs in line.unloading]):
+    runs = line.runs.runs.values()
+    slope = next(iter(runs))["rms_slope"]
+    for leg in mean_legs([[("unloading", leg) for leg in unloading_legs(run)] for run in runs]):
         states = xr.Dataset({name: ("step", values) for name, values in leg.values.items()}).assign(rms_slope=slope)
         for axes, points in panels.items():
             load, values = points(states)
-            # Just before separation loads are as small as can be.
+            # Just before separation loads are arbitrarily small.
             pressed = np.where(load > 0, load, np.nan)
-            axes.add_artist(line_artist(pressed, values, color=line.look["mec"], **UNLOADING))
+            axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **UNLOADING))
 
 
 def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, object] = {}) -> None:
     """Add the legend of the curves and of what else is named in the panels, and their scale of colours, if any."""
-    seeds = lines_handles(len(line.runs) for line in curves.lines)
+    seeds = lines_handles(len(line.runs.runs) for line in curves.lines)
     handles = curves.handles | dict(further) | seeds | named_handles(panels)
     legend_below(figure, handles, scale=curves.looks.scale, panels=panels)
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import Field
 
-from icha.contact.models import MODELS, REFERENCE_MODEL, first_of
+from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
@@ -171,7 +171,7 @@ class RunFigure(StudyFigure):
 
     def run(self, campaign: Campaign) -> RunLabels:
         """Return the run that is shown: the first with adhesion, or the first of all, of those requested."""
-        model = first_of(campaign.studies[self.study].models)
+        model = first_model(campaign.studies[self.study].models)
         wanted = self.model_dump(include={"surface", "seed", "rms_slope", "material"}, exclude_none=True)
         runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
         runs = [run for run in runs if wanted.items() <= run._asdict().items()]

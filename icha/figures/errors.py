@@ -14,7 +14,16 @@ from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.legends import legend_below, words_handle
 from icha.figures.looks import Looks, interfaces_of
 from icha.figures.select import NothingToDraw, asked_of_entry, study_errors
-from icha.figures.style import DASHES, GREY, legend_handle, logarithmic_axes, material_label, new_panels, number, styled
+from icha.figures.style import (
+    DASHES,
+    GREY,
+    format_number,
+    in_style,
+    legend_handle,
+    logarithmic_axes,
+    material_label,
+    new_panels,
+)
 from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
@@ -82,7 +91,7 @@ class _Curve(NamedTuple):
         return self.truth == FINITE_RANGE and float(self.errors["surface_energy"]) > 0
 
 
-@styled
+@in_style
 def draw_errors(
     campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, quantities: tuple[Quantity, ...]
 ) -> Figure:
@@ -192,7 +201,7 @@ def _finish(panels, quantities):
     if high < _ONE_LOAD * low:
         load = float(f"{np.sqrt(low * high):.3g}")
         panels[0, 0].set_xlim(load / _ONE_LOAD, load * _ONE_LOAD)
-        panels[0, 0].set_xticks([load], [number(load)])
+        panels[0, 0].set_xticks([load], [format_number(load)])
         for ax in panels.ravel():
             ax.minorticks_off()
     for ax, quantity in zip(panels[-1], quantities, strict=True):

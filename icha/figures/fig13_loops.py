@@ -26,7 +26,7 @@ from icha.figures.select import (
     runs_by_boundary_elements,
     unloading_legs,
 )
-from icha.figures.style import GREY, legend_handle, new_panels, slope_label, styled
+from icha.figures.style import GREY, in_style, legend_handle, new_panels, slope_label
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class _Loop(NamedTuple):
     truths: list[xr.Dataset]
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree,
     loops: Sequence[xr.Dataset] | None = None,

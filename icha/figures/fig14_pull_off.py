@@ -15,7 +15,16 @@ from icha.figures.ensembles import Points, points_handles
 from icha.figures.hysteresis import detached_lines, name_model
 from icha.figures.legends import legend_below
 from icha.figures.looks import looks_of_studies
-from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_panels, number, slope_label, styled, unit_for
+from icha.figures.style import (
+    GREY,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    choose_unit,
+    format_number,
+    in_style,
+    new_panels,
+    slope_label,
+)
 from icha.support.values import Problem, list_of_names
 
 if TYPE_CHECKING:
@@ -60,7 +69,7 @@ _SPAN = 30.0
 _LINE = {"lw": 0.9}
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (), quantity: str = "pull_off_pressure"
 ) -> Figure:
@@ -75,7 +84,7 @@ def figure(
     looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     points = itertools.chain(*by_slope.values(), *by_load.values())
     largest = max(float(run[quantity]) for point in points for run in point.runs.values())
-    factor, unit = unit_for(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
+    factor, unit = choose_unit(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
     counts = []
@@ -113,7 +122,7 @@ def _label_loads(ax, loads):
     if loads.min() > 0 and loads.max() > 2 * loads.min():
         ax.set_xscale("log")
         ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-        ax.xaxis.set_major_formatter(lambda value, _: number(value))
+        ax.xaxis.set_major_formatter(lambda value, _: format_number(value))
         ax.xaxis.set_minor_formatter(NullFormatter())
     elif np.ptp(loads) < 1e-3 * np.abs(loads).max():
         ax.set_xlim(0, 2 * loads.max())

@@ -15,7 +15,7 @@ from icha.figures.hysteresis import detached_lines, name_model
 from icha.figures.legends import legend_below
 from icha.figures.looks import looks_of_studies
 from icha.figures.select import ContactRuns, NothingToDraw
-from icha.figures.style import GREY, logarithmic_axes, new_panels, styled, unit_for
+from icha.figures.style import GREY, choose_unit, in_style, logarithmic_axes, new_panels
 from icha.support.values import Flag, Problem, list_of_names
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ class LinearFit(NamedTuple):
     exponent: float | None
 
 
-@styled
+@in_style
 def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy: bool = True) -> Figure:
     """Draw the loss of all runs of the studies, averaged over the seeds, and its parts where there is adhesion."""
     from matplotlib.patches import Patch
@@ -106,7 +106,7 @@ def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
     quantity = "hysteresis_loss_over_surface_energy" if over_surface_energy else "hysteresis_loss"
     area = "largest_contact_area_fraction"
     largest = max(np.abs(Points(line, quantity).means).max() for line in runs.values())
-    factor, unit = (1.0, "") if over_surface_energy else unit_for(largest, "J/m²")
+    factor, unit = (1.0, "") if over_surface_energy else choose_unit(largest, "J/m²")
     drawn = {key: Points(line, area, quantity, factor=factor) for key, line in runs.items()}
     handles = looks.handles(ls="none") if looks.scale else {}
     for (contact, applicable), line in drawn.items():

@@ -17,13 +17,13 @@ from icha.figures.select import NothingToDraw, is_applicable, run_on_topography,
 from icha.figures.style import (
     BLACK,
     GREY,
+    choose_unit,
+    in_style,
     legend_handle,
     logarithmic_axes,
     material_label,
     new_panels,
     slope_label,
-    styled,
-    unit_for,
 )
 from icha.support.values import Problem
 
@@ -87,7 +87,7 @@ _SIZE = 5.0
 _LEAST_SIZE = 1.6
 
 
-@styled
+@in_style
 def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: object) -> Figure:
     """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
     labels, run = run_on_topography(campaign, study, surface, **which)
@@ -109,8 +109,8 @@ def _draw_places(ax, run, surface, events):
     adhesive = float(run["surface_energy"]) > 0
     heights = surface["height"].transpose("y", "x").values * float(run["rms_height"]) / float(surface["rms_height"])
     period = float(run["period"])
-    length, length_unit = unit_for(period, "m")
-    height, height_unit = unit_for(float(np.abs(heights).max()), "m")
+    length, length_unit = choose_unit(period, "m")
+    height, height_unit = choose_unit(float(np.abs(heights).max()), "m")
     highest = float(np.abs(heights).max()) * height
     side = period * length
     # Light, so that the marks show.

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from icha.datasets.results import ResultFiles
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs
-from icha.figures.style import BLUE, GREY, VERMILLION, new_panels, styled
+from icha.figures.style import BLUE, GREY, VERMILLION, in_style, new_panels
 from icha.support.values import Positive
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ DECLARATION = Declaration(
 )
 
 
-@styled
+@in_style
 def figure(*, tabor_parameter: float = 3.0) -> Figure:
     """Draw the law in its own units, a in (Δγ R²/E*)^(1/3), δ in (Δγ² R/E*²)^(1/3) and F in Δγ R."""
     from icha.asperity.jkr import JKR

@@ -28,7 +28,7 @@ from icha.figures.curves import (
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure, finite_range_error
 from icha.figures.ensembles import draw_members, mark_fewer
 from icha.figures.select import asked_of_entry, errors_of_run, finite_range_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_figure, panel_label
 from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ _LOWER = 0.42
 _SAME_LOAD = 1e-6
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree, references: xr.Dataset | None = None, model_error: xr.DataTree | None = None, *, study: str
 ) -> Figure:
@@ -132,19 +132,19 @@ def _differences(curves, entries, references):
     from icha.references.persson import persson_area
 
     # The limit of a short range comes first: the other one with adhesion only bounds it.
-    truths = {truth.contact: truth for truth in curves.beside}
+    truths = {truth.runs.contact: truth for truth in curves.beside}
     areas, separations = [], []
     for line in curves.lines:
-        if truth := truths.get(line.contact):
-            asked = min(line.asked, truth.asked)
-            areas.append((line, *_from_runs(line.runs, truth.runs, area_points, logarithmic=True), asked))
-            separations.append((line, *_from_runs(line.runs, truth.runs, gap_points, logarithmic=False), asked))
+        if truth := truths.get(line.runs.contact):
+            asked = min(line.runs.asked, truth.runs.asked)
+            areas.append((line, *_from_runs(line, truth, area_points, logarithmic=True), asked))
+            separations.append((line, *_from_runs(line, truth, gap_points, logarithmic=False), asked))
             continue
-        for errors in errors_of_run(entries, line.labels, "surface", "rms_slope", "material"):
+        for errors in errors_of_run(entries, line.runs.labels, "surface", "rms_slope", "material"):
             if np.isfinite(errors["area_error"].values).any():
                 errors = errors.dropna("reduced_pressure", how="all", subset=["area_error"])
                 load, asked = errors["reduced_pressure"].values, asked_of_entry(errors)
-                own = errors.sel(seed=[seed for seed in line.runs if seed in errors["seed"].values])
+                own = errors.sel(seed=[seed for seed in line.runs.runs if seed in errors["seed"].values])
                 areas.append((line, load, _per_cent(own["area_error"]), asked))
                 separations.append((line, load, _per_cent(own["separation_error"]), asked))
                 break
@@ -161,14 +161,14 @@ def _differences(curves, entries, references):
     return [*found, _Difference(drawn, r"$\bar{u}/\bar{u}_{\mathrm{Persson}}-1$  (%)")]
 
 
-def _from_runs(runs, truths, points, *, logarithmic):
+def _from_runs(line, truth, points, *, logarithmic):
     """Return loads, and differences (seeds, loads) of runs from those by boundary elements with the same seed.
 
     They are at the runs' own loads as far as boundary elements reach, between whose stops values are interpolated.
     """
     from icha.analysis.common_loads import at_common_loads, interpolated
 
-    members = []
+    members, runs, truths = [], line.stops, truth.stops
     for seed in [seed for seed in runs if seed in truths]:
         (load, values), (true_load, true_values) = points(runs[seed]), points(truths[seed])
         pressed = true_load > 0
@@ -193,11 +193,11 @@ def _from_theory(lines, points, theory):
     found = []
     for line in lines:
         members = []
-        for run in line.runs.values():
+        for run in line.stops.values():
             load, values = points(run)
             load, values = load[load > 0], values[load > 0]
             members.append((load, 100 * (values / theory(load) - 1)))
-        found.append((line, *at_common_loads(members, logarithmic=False), line.asked))
+        found.append((line, *at_common_loads(members, logarithmic=False), line.runs.asked))
     return found
 
 

@@ -14,7 +14,7 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigu
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
 from icha.figures.select import errors_of_run, finite_range_errors, snapshots_of_materials
-from icha.figures.style import BLACK, logarithmic_axes, new_panels, styled
+from icha.figures.style import BLACK, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +39,7 @@ _LEAST_NODES = 25
 _MOST_MARKERS, _BESIDE_MARKERS = 40, 14
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree,
     model_error: xr.DataTree | None = None,
@@ -77,11 +77,13 @@ def figure(
         loads = [float(state_of(run, at)["reduced_pressure"]) for run, at in line.members]
         load = float(np.mean(loads))
         solutions = _solutions(finite_range_errors(model_error, study), line.runs, loads)
-        distributions = _of_boundary_elements(line.truths, solutions)
-        if distributions:
-            _draw_beside(left, right, distributions, look["color"])
-            top = max(top, distributions.pressures[1].max(initial=0.0))
-            beside.append(distributions.name)
+        truth = _boundary_elements(line.truths, solutions)
+        if truth:
+            beside.append(truth.name)
+            top = max(top, truth.pressures[1].max(initial=0.0))
+            dashed = BESIDE_LINE | {"color": look["color"], "marker": MODEL_MARKERS[truth.name]}
+            for ax, (at, density) in ((left, truth.gaps), (right, truth.pressures)):
+                ax.plot(at, density, markevery=1 + len(at) // _BESIDE_MARKERS, **dashed)
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
@@ -107,36 +109,41 @@ def _finish(left, right, pressures, highest, load):
     right.set_ylabel(r"$P(p)\; E^{\ast}h_{\mathrm{rms}}^{\prime}$")
 
 
-def _draw_beside(left, right, distributions, colour):
-    """Draw the distributions of boundary elements."""
-    marker = MODEL_MARKERS[distributions.name]
-    for ax, (at, density) in ((left, distributions.gaps), (right, distributions.pressures)):
-        every = 1 + len(at) // _BESIDE_MARKERS
-        ax.plot(at, density, color=colour, marker=marker, markevery=every, **BESIDE_LINE)
-
-
 class _Beside(NamedTuple):
-    """What is drawn of boundary elements: which they are, u/h_rms and P(u) h_rms, p/(E* h'_rms) and P(p) E* h'_rms."""
+    """Distributions of boundary elements.
+
+    Attributes
+    ----------
+    name : name of the boundary elements in legends.
+    gaps : u/h_rms and P(u) h_rms.
+    pressures : p/(E* h'_rms) and P(p) E* h'_rms.
+    """
 
     name: str
     gaps: tuple[np.ndarray, np.ndarray]
     pressures: tuple[np.ndarray, np.ndarray]
 
 
-def _of_boundary_elements(truths, solutions):
-    """Means over the seeds of the distributions of runs in the limit of a short range, or of solutions; or None."""
+def _boundary_elements(truths, solutions):
+    """Return means over the seeds of runs in the limit of a short range, or else of solutions, if there are any."""
     if truths:
-        (u, gaps), (p, pressures) = gap_densities(truths), joined_pressure_densities(truths)
-        return _Beside(SHORT_RANGE, (u, gaps.mean(axis=0)), (p, pressures.mean(axis=0)))
-    if not solutions:
+        name, distributions = SHORT_RANGE, (gap_densities(truths), joined_pressure_densities(truths))
+    elif solutions:
+        first, grid = solutions[0], int(solutions[0]["solution_grid"])
+        name, distributions = (
+            FINITE_RANGE,
+            [
+                join(
+                    first[f"{quantity}_bin_edges"].values,
+                    np.array([solution[f"{quantity}_density"].values for solution in solutions]),
+                    grid,
+                )
+                for quantity, join in (("gap", _gap_densities), ("pressure", _pressure_densities))
+            ],
+        )
+    else:
         return None
-    gaps, pressures = (
-        np.array([solution[name].values for solution in solutions]) for name in ("gap_density", "pressure_density")
-    )
-    first, grid = solutions[0], int(solutions[0]["solution_grid"])
-    u, gaps = _gap_densities(first["gap_bin_edges"].values, gaps, grid)
-    p, pressures = _pressure_densities(first["pressure_bin_edges"].values, pressures, grid)
-    return _Beside(FINITE_RANGE, (u, gaps.mean(axis=0)), (p, pressures.mean(axis=0)))
+    return _Beside(name, *((at, densities.mean(axis=0)) for at, densities in distributions))
 
 
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, S
 from icha.figures.looks import NOT_APPLICABLE_ALONE
 from icha.figures.maps import block_means, circles_in_cell, draw_spots, draw_whole
 from icha.figures.select import is_applicable, run_on_topography
-from icha.figures.style import material_label, new_panels, number, styled, unit_for
+from icha.figures.style import choose_unit, format_number, in_style, material_label, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +75,7 @@ _RED = (0.9, 0.0, 0.05)
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree,
     surface: xr.Dataset,
@@ -117,7 +117,7 @@ def figure(
     whole.set_title(area if solved is None else f"asperities, {area}", loc="right")
     if solved is not None:
         _draw_solution(panels, view, run, at, solved)
-    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {number(pressure)}"
+    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {format_number(pressure)}"
     title = f"{labels.surface}, {material_label(campaign[study].to_dataset(), labels.material)}, {load}"
     fig.suptitle(title if is_applicable(run) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")
     _frame(panels, enlarged, view)
@@ -201,8 +201,8 @@ def _view(run, at, surface):
     heights = surface["height"].transpose("y", "x").values
     factor = float(run["rms_height"]) / float(surface["rms_height"])
     highest = max(float(heights.max()), -float(heights.min())) * factor
-    length, length_unit = unit_for(period, "m")
-    height, height_unit = unit_for(highest, "m")
+    length, length_unit = choose_unit(period, "m")
+    height, height_unit = choose_unit(highest, "m")
     spots = spots_of(run, at)
     radius = spots["spot_radius"].values
     x, y = spots["spot_x"].values * length, spots["spot_y"].values * length

@@ -17,7 +17,7 @@ from icha.figures.curves import (
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
-from icha.figures.style import BLACK, DASHES, GREY, legend_handle, material_label, new_panels, styled
+from icha.figures.style import BLACK, DASHES, GREY, in_style, legend_handle, material_label, new_panels
 from icha.support.input_files import read_columns
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ DECLARATION = Declaration(
 )
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree,
     tables: Sequence[str | os.PathLike] = (),
@@ -85,15 +85,13 @@ def figure(
     """
     curves = study_curves(campaign, study, boundary_elements)
     dataset, colours = campaign[study].to_dataset(), curves.looks.colours
-    # Of curves that lie on each other all stay visible: later materials have smaller markers.
-    size = {name: max(7.0 * 0.7**k, 1.6) for k, name in enumerate(curves.looks.materials)}
+    # All of several curves that coincide stay visible: markers are open, and smaller for every further material.
+    looks = {name: {"mfc": "none", "ms": max(7.0 * 0.7**k, 1.6)} for k, name in enumerate(curves.looks.materials)}
 
     fig, [(left, right)] = new_panels(3.5, sharey=True)
     if not curves.looks.scale:
-        own = [
-            line._replace(look=line.look | {"mfc": "none", "ms": size[line.labels.material]}) for line in curves.lines
-        ]
-        curves = curves._replace(lines=own)
+        lines = [line._replace(look=line.look | looks[line.runs.labels.material]) for line in curves.lines]
+        curves = curves._replace(lines=lines)
     draw_curves(curves, {left: area_points, right: _points_at_load}, unloading=True)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
         _draw_measured(left, right, table, known, colours.get(known["material"], BLACK), DASHES[k % len(DASHES)])
@@ -103,14 +101,11 @@ def figure(
 
     further = {"unloading": legend_handle(color=GREY, **UNLOADING)} if curves.unloaded else {}
     if not curves.looks.scale:
-        further = {material_label(dataset, name): _open(colours[name], size[name]) for name in size} | further
+        for name, look in looks.items():
+            shape = {"ls": "none", "marker": "o", "mew": 1.1, "color": colours[name]}
+            further[material_label(dataset, name)] = legend_handle(**shape | look)
     add_legend(fig, [left, right], curves, further)
     return fig
-
-
-def _open(colour, size):
-    """What the legend shows of a material."""
-    return legend_handle(ls="none", marker="o", color=colour, mfc="none", mew=1.1, ms=size)
 
 
 def _draw_measured(left, right, table, known, colour, dashes):

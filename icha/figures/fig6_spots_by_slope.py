@@ -12,7 +12,7 @@ from icha.figures.legends import legend_below
 from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale
 from icha.figures.maps import circles_in_cell, draw_spots
 from icha.figures.select import is_applicable, pick, study_runs
-from icha.figures.style import new_panels, number, slope_label, styled, unit_for
+from icha.figures.style import choose_unit, format_number, in_style, new_panels, slope_label
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ _KINDS = ("relative_load", "area_fraction")
 _TITLES = {"relative_load": r"$F/(E^{\ast}A_0)$", "area_fraction": "$A/A_0$"}
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree,
     *,
@@ -71,12 +71,12 @@ def figure(
     colours = dict(zip(slopes, Scale([f"{slope:g}" for slope in slopes]).colours, strict=True))
 
     fig, [panels] = new_panels(3.8, sharey=True)
-    length, unit = unit_for(float(own[slopes[0]]["period"]), "m")
+    length, unit = choose_unit(float(own[slopes[0]]["period"]), "m")
     for ax, kind in zip(panels, _KINDS, strict=True):
         value = _draw_slopes(ax, own, kind, colours, length)
         ax.set_aspect("equal")
         ax.set_xlabel(f"x ({unit})")
-        ax.set_title(f"{_TITLES[kind]} = {number(value)}", loc="right")
+        ax.set_title(f"{_TITLES[kind]} = {format_number(value)}", loc="right")
     panels[0].set_ylabel(f"y ({unit})")
     names = {
         slope: slope_label(slope) + ("" if is_applicable(run) else f" ({NOT_APPLICABLE_ALONE})")

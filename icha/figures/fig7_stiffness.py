@@ -10,7 +10,7 @@ from icha.datasets import results
 from icha.figures.curves import PRESSURE_LABEL, add_legend, draw_curves, plausible, study_curves, whose_theories
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure
 from icha.figures.select import NothingToDraw
-from icha.figures.style import BLACK, new_panels, styled
+from icha.figures.style import BLACK, in_style, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +28,7 @@ DECLARATION = Declaration(
 )
 
 
-@styled
+@in_style
 def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study: str) -> Figure:
     """Draw all runs of a study, and theory for its first surface (`icha.references.theories`), if any."""
     curves = study_curves(campaign, study)

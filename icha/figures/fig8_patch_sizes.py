@@ -13,7 +13,7 @@ from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
 from icha.figures.select import snapshots_of_materials
-from icha.figures.style import logarithmic_axes, new_panels, styled, unit_for
+from icha.figures.style import choose_unit, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,7 @@ _BINS_PER_DECADE = 8
 _CURVE_POINTS = 300
 
 
-@styled
+@in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
     """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds."""
     lines = snapshots_of_materials(campaign, study, kind, target)
@@ -39,7 +39,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1, sharex=True)
     period = float(lines[0].members[0][0]["period"])
-    factor, unit = unit_for(period, "m")
+    factor, unit = choose_unit(period, "m")
     cell = (period * factor) ** 2
     for line, look in zip(lines, each_look, strict=True):
         areas, true_areas = (

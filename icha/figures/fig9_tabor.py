@@ -13,7 +13,7 @@ from icha.figures.ensembles import Points, points_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.looks import Looks
 from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, snapshot_label, study_runs
-from icha.figures.style import GREY, material_label, new_panels, styled
+from icha.figures.style import GREY, in_style, material_label, new_panels
 from icha.support.values import Problem
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ _STATE = ("contact_area_fraction", "reduced_separation")
 _LEAST_REACH = 0.05
 
 
-@styled
+@in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
     """Draw all runs of a study at one snapshot."""
     from icha.analysis.model_error import state_of

@@ -17,18 +17,13 @@ from icha.contact.models import MODELS
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.style import (
     BLACK,
-    BLUE,
     COLOURS,
-    GREEN,
     GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILLION,
+    INTERFACE,
+    choose_unit,
     legend_handle,
     material_label,
     slope_label,
-    unit_for,
 )
 
 if TYPE_CHECKING:
@@ -41,8 +36,7 @@ if TYPE_CHECKING:
 Contact = tuple[str, str, float | None]
 
 # Okabe and Ito's colours without black, which is for theories, and darker ones of the same hues.
-MATERIAL_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
-MATERIAL_COLOURS += ("#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
+MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
 PLACE_MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
 ASPERITIES_NAME = MODELS["asperities"].words
@@ -210,11 +204,10 @@ def interfaces_of(datasets: Iterable[xr.Dataset]) -> xr.Dataset:
     """Return modulus, surface energy and range of the materials of several datasets."""
     import xarray as xr
 
-    names = [name for name, *_ in _QUANTITIES]
     found = {}
     for dataset in datasets:
         for material in dataset["material"].values.tolist():
-            found.setdefault(material, dataset[names].sel(material=material))
+            found.setdefault(material, dataset[list(INTERFACE)].sel(material=material))
     return xr.concat(found.values(), "material", coords="minimal", compat="override")
 
 
@@ -231,11 +224,6 @@ def _pale(look):
 _MOST_TICKS = 9
 # The brightest colours of the map do not show on white.
 _BRIGHTEST = 0.9
-_QUANTITIES = (
-    ("contact_modulus", r"$E^{\ast}$", "Pa"),
-    ("surface_energy", r"$\Delta\gamma$", "J/m²"),
-    ("interaction_range", "range of attraction", "m"),
-)
 
 
 class Scale:
@@ -286,11 +274,12 @@ def places_scale(places: Sequence[tuple[str, float | None]]) -> Scale:
 def materials_scale(interfaces: xr.Dataset, materials: Sequence[str]) -> Scale:
     """The scale of materials, by the quantity in which they differ if it is one."""
     own = interfaces.sel(material=list(materials))
-    differing = [each for each in _QUANTITIES if len(np.unique(own[each[0]].values)) > 1]
+    differing = [name for name in INTERFACE if len(np.unique(own[name].values)) > 1]
     if len(differing) != 1:
         return Scale([material_label(interfaces, material) for material in materials])
-    ((name, symbol, unit),) = differing
-    factor, prefixed = unit_for(float(own[name].max()), unit)
+    (name,) = differing
+    symbol, unit = INTERFACE[name]
+    factor, prefixed = choose_unit(float(own[name].max()), unit)
     return Scale([f"{factor * value:.4g}" for value in own[name].values.tolist()], f"{symbol} ({prefixed})")
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import icha.figures
 from icha.figures.declaration import Declaration
-from icha.figures.style import GREY, new_figure, save, styled
+from icha.figures.style import GREY, in_style, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,7 +76,7 @@ def _read(files):
     return read_campaign(files) if has_groups(files) else read_dataset(files)
 
 
-@styled
+@in_style
 def _empty_page(reason) -> Figure:
     figure = new_figure(5.0, 2.5)
     figure.text(0.5, 0.5, textwrap.fill(reason, 60), ha="center", va="center", color=GREY, parse_math=False)

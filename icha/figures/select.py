@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import REFERENCE_MODEL, first_of
+from icha.contact.models import REFERENCE_MODEL, first_model
 from icha.datasets.labels import LABELS, RunLabels, place_of, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE
-from icha.figures.style import number, slope_label
+from icha.figures.style import format_number, slope_label
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -118,7 +118,7 @@ def is_applicable(run: xr.Dataset) -> bool:
 
 def shown_model(study: xr.Dataset) -> str:
     """The model whose runs figures show first of a study: asperities, or else the study's first."""
-    return first_of(study["model"].values.tolist())
+    return first_model(study["model"].values.tolist())
 
 
 def _check_study(campaign, study):
@@ -284,7 +284,7 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
     if kind == "pull_off":
         return "pull-off"
-    return f"{_KIND_LABELS[kind]} = {number(value)}"
+    return f"{_KIND_LABELS[kind]} = {format_number(value)}"
 
 
 def study_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:

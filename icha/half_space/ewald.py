@@ -64,11 +64,6 @@ def short_mean(alpha, contact_modulus, period):
     return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
 
 
-def _distance(first, second, period):
-    difference = periodic_difference(first, second, period)
-    return np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)
-
-
 class _SmoothSum:
     """Smooth half of the Ewald sum, as non-uniform FFTs between points.
 
@@ -116,22 +111,6 @@ class _SmoothSum:
         mirrored = np.conj(c[::-1, ::-1])
         modes = (0.5 * self._green) * (c + mirrored) + (-0.5j / scale * self._laplacian) * (c - mirrored)
         return self._unit * distribute.execute(modes).real
-
-
-def _point_kernels(r, alpha, contact_modulus):
-    """Return the short-ranged displacement at distances r > 0 by unit moments k = 0, 1, 2, three arrays.
-
-    They are erfc(alpha r)/r, its plane Laplacian, and 1/r^5, over pi E*.
-    """
-    scale = 1 / (np.pi * contact_modulus)
-    inverse, x2 = 1 / r, (alpha * r) ** 2
-    gauss = 2 * alpha / np.sqrt(np.pi) * scale * np.exp(-x2)
-    force = erfc(alpha * r)
-    force *= scale * inverse
-    inverse *= inverse
-    moment = (force + gauss) * inverse
-    moment += 2 * alpha**2 * gauss
-    return force, moment, scale * inverse**2 / r
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,8 +197,19 @@ class Ewald:
         return scale * value[0], scale * laplacian[0]
 
     def kernels(self, r):
-        """Return the short-ranged displacement at distances r by unit moments k = 0, 1, 2."""
-        return _point_kernels(np.maximum(r, self.floor), self.alpha, self.contact_modulus)
+        """Return the short-ranged displacement at distances r by unit moments k = 0, 1, 2, three arrays.
+
+        They are erfc(alpha r)/r, its plane Laplacian, and 1/r^5, over pi E*.
+        """
+        r, alpha, scale = np.maximum(r, self.floor), self.alpha, 1 / (np.pi * self.contact_modulus)
+        inverse, x2 = 1 / r, (alpha * r) ** 2
+        gauss = 2 * alpha / np.sqrt(np.pi) * scale * np.exp(-x2)
+        force = erfc(alpha * r)
+        force *= scale * inverse
+        inverse *= inverse
+        moment = (force + gauss) * inverse
+        moment += 2 * alpha**2 * gauss
+        return force, moment, scale * inverse**2 / r
 
     def replaced(self, r):
         """Return the whole displacement at distances r by unit moments k = 0, 1, 2, as the Ewald sum gives it."""
@@ -289,7 +279,8 @@ class HalfSpace:
     def _assemble(cls, ewald, points, before, later, earlier):
         """Append the pairs of the points that the half-space `before` does not have; without one, all pairs."""
         n, known = len(points), 0 if before is None else len(before.points)
-        r = _distance(points[later], points[earlier], ewald.period)
+        difference = periodic_difference(points[later], points[earlier], ewald.period)
+        r = np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)
         rows = scipy.sparse.coo_matrix((r, (later - known, earlier)), shape=(n - known, n)).tocsr()
         later, earlier, r = np.repeat(np.arange(known, n), np.diff(rows.indptr)), rows.indices, rows.data
         start, kernels = rows.indptr, ewald.kernels(r)

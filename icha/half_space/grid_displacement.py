@@ -19,7 +19,7 @@ import numpy as np
 import scipy.fft
 from scipy.special import erf
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.half_space.ewald import short_mean, smooth_mode
 from icha.half_space.free_square import basis, image_field
 from icha.support.parallel import blocks, on_cores
@@ -63,7 +63,7 @@ class DisplacementField:
     free : whether the square is single.
     """
 
-    law: SpotLaw
+    law: JKR
     period: float
     grid: int
     centres: np.ndarray

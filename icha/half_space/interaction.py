@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.half_space.ewald import NEIGHBOURS_ONCE, Ewald, HalfSpace
 
 # Distances, in radii of a spot, within which its displacement is exact, and beyond which force and second moment
@@ -62,7 +62,7 @@ class Interaction:
     replaced : three (k,) arrays, displacement by unit moments, which the exact displacement replaces there.
     """
 
-    law: SpotLaw
+    law: JKR
     half_space: HalfSpace
     radius_of_curvature: np.ndarray
     largest_radius: np.ndarray
@@ -72,7 +72,7 @@ class Interaction:
     replaced: tuple
 
     @classmethod
-    def between(cls, law: SpotLaw, half_space: HalfSpace, radius_of_curvature, largest_radius) -> Interaction:
+    def between(cls, law: JKR, half_space: HalfSpace, radius_of_curvature, largest_radius) -> Interaction:
         """Find the exact pairs for contact radii up to `largest_radius` (n,), m; zero for spots without any."""
         ewald = half_space.ewald
         later, earlier, r = half_space.pairs
@@ -158,7 +158,7 @@ class Tangent:
 
 
 def displacement_at(
-    law: SpotLaw, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
+    law: JKR, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
 ) -> np.ndarray:
     """Return the displacement w (n,) at any points by spots, the sum of eq. (9), m.
 

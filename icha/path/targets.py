@@ -36,7 +36,6 @@ class Quantity:
     Attributes
     ----------
     name : name in targets and in files.
-    unit : unit of its values.
     rule : range of values that a target may have.
     argument : argument of `Path` that lists such targets; empty if there is none.
     controlled : quantity that the solver holds instead of the separation; None if the separation is imposed.
@@ -44,7 +43,6 @@ class Quantity:
     """
 
     name: str
-    unit: str
     rule: FloatRange
     argument: str = ""
     controlled: str | None = None
@@ -72,10 +70,10 @@ _AREAS = FloatRange(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True)
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        Quantity(REDUCED_PRESSURE, "1", _PRESSURES, "reduced_pressures", PRESSURE, "pressure_unit"),
-        Quantity(RELATIVE_LOAD, "1", POSITIVE, "", PRESSURE, "contact_modulus"),
-        Quantity(AREA_FRACTION, "1", _AREAS, "area_fractions", CONTROLLED_AREA),
-        Quantity(MEAN_SEPARATION, "m", LENGTH, "mean_separations"),
+        Quantity(REDUCED_PRESSURE, _PRESSURES, "reduced_pressures", PRESSURE, "pressure_unit"),
+        Quantity(RELATIVE_LOAD, POSITIVE, "", PRESSURE, "contact_modulus"),
+        Quantity(AREA_FRACTION, _AREAS, "area_fractions", CONTROLLED_AREA),
+        Quantity(MEAN_SEPARATION, LENGTH, "mean_separations"),
     )
 }
 LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)

@@ -66,7 +66,7 @@ def test_reasons_are_named_one_after_the_other():
     assert asperity_applicability(math.inf) == asperity_applicability(1.0, (), 0.25) == ""
     assert asperity_applicability(0.138, ["spikes", "pits"], 0.3) == (
         "asperity model not applicable: full contact has the lower energy (U_full/dgamma = 0.138, less than 1); "
-        "spikes; pits; contact area A/A0 = 0.3, beyond 0.25"
+        "spikes; pits; contact area A/A0 = 0.3, more than 0.25"
     )
 
 

@@ -90,7 +90,7 @@ def test_what_is_wrong_is_told_without_what_acts_on_a_terminal(load):
 def test_pipes_and_devices_are_not_opened(tmp_path, refused):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    with pytest.raises(ConfigurationError, match="pipe: is a pipe; .*a YAML file"):
+    with pytest.raises(ConfigurationError, match=r"pipe: is a pipe; .*a YAML file"):
         load_configuration(pipe)
     with pytest.raises(ConfigurationError, match="is a device; allowed"):
         load_configuration(Path("/dev/zero"))

@@ -1,4 +1,4 @@
-"""The validators of others see what is wrong with a deposit's files; those that cannot fail would say nothing."""
+"""The validators of other projects find problems in the files of a deposit."""
 
 import re
 import socket
@@ -18,7 +18,7 @@ NAMES = ("sha256sum", "compliance-checker", "cf-units")
 def deposit(folder, unit="Pa", where="study"):
     """A netCDF file with a variable in a group, whose axis is in the group above; and its checksum."""
     folder.mkdir()
-    (folder / "ro-crate-metadata.json").write_text("{}")  # by which a deposit is known
+    (folder / "ro-crate-metadata.json").write_text("{}")  # which every deposit has
     with netCDF4.Dataset(folder / "data.nc", "w") as data:
         data.setncatts({"Conventions": "CF-1.11", "title": "Loads", "history": "made up"})
         data.createDimension("step", 3)

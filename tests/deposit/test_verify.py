@@ -1,4 +1,4 @@
-"""Deposits of strangers: what is wrong is found, nothing outside is read or written, and limits hold."""
+"""Deposits from unknown makers: problems are found, no other file is read or written, and limits hold."""
 
 import os
 import random
@@ -127,7 +127,7 @@ def test_what_unpacks_to_far_more_is_not_unpacked_unless_asked(pack, monkeypatch
     folder = pack({"zeros": bytes(10_000_000)})
     monkeypatch.setattr(verify, "ALLOWANCE", 1000)
     (problem,) = verify_deposit(folder.with_name("tiny.zip"))
-    assert "to 10 MB; allowed: 50 times its size" in problem
+    assert "to 10 MB; expected at most 50 times its size" in problem
     assert verify_deposit(folder.with_name("tiny.zip"), large=True) == []
 
 
@@ -135,7 +135,7 @@ def test_what_unpacks_to_far_more_is_not_unpacked_unless_asked(pack, monkeypatch
 def test_the_number_of_files_is_bounded(ending, folder, monkeypatch):
     monkeypatch.setattr(verify, "MOST_FILES", 2)
     (problem,) = verify_deposit(folder.with_name(folder.name + ending))
-    assert "files or more; allowed: 2, or more with --large" in problem
+    assert "files or more; expected at most 2. Use --large" in problem
 
 
 @pytest.mark.parametrize("declared", [3, 5, 10_000_000])
@@ -167,7 +167,7 @@ def test_unpacking_needs_room(folder, monkeypatch):
 
 def test_a_large_text_is_not_read_as_a_whole(folder, monkeypatch):
     monkeypatch.setattr(verify, "LARGEST_TEXT", 3)
-    with pytest.raises(ValueError, match="allowed: 3 B"):
+    with pytest.raises(ValueError, match="expected at most 3 B"):
         read_text(folder, "README.md")
 
 

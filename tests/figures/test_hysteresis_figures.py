@@ -5,12 +5,11 @@ import pytest
 import separate_asperities as separate
 import small_campaign as small
 import xarray as xr
+from drawn import legend
 from matplotlib.colors import to_hex
 
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.files import read_dataset
 from icha.datasets.labels import RunLabels
-from icha.datasets.surface_file import write_surface
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, linear_fit, shares
@@ -20,13 +19,6 @@ from icha.figures.select import ContactRuns
 MODULES = (fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map)
 NAMES = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))
 DEPTHS = {"gentle": -0.6, "middle": -0.1, "hard": 0.5}
-
-
-@pytest.fixture(scope="module")
-def surface(tmp_path_factory):
-    path = tmp_path_factory.mktemp("surface") / "s.nc"
-    write_surface(path, small.surface(), name="rough", seed=1)
-    return read_dataset(path)
 
 
 @pytest.fixture(scope="module")
@@ -44,10 +36,6 @@ def one(material="sticky", **changed):
 def draw(module, tree, surface, study):
     options = {"studies": [study]} if module is fig15_loss else {"study": study}
     return module.figure(tree, **({"surface": surface} if module is fig16_snap_map else {}), **options)
-
-
-def legend(figure):
-    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def curves(axes):
@@ -293,11 +281,6 @@ def test_fig14_tells_slopes_of_the_loads_apart(tree):
     assert len(figure.axes[1].containers) == len(looks) == 4
     # Materials, slopes, and the seeds.
     assert len(legend(figure)) == 2 + 2 + 1
-
-
-def test_fig14_names_what_there_is(tree):
-    with pytest.raises(ValueError, match=r"no study 'harder'.*there are slopes, gentle, middle, hard"):
-        fig14_pull_off.figure(tree, study="slopes", load_studies=["hard", "harder"])
 
 
 # --- figure 15 --------------------------------------------------------------------------------------------------

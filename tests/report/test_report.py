@@ -21,7 +21,7 @@ from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr
 from icha.figures.captions import caption_of
 from icha.figures.select import path_steps
-from icha.figures.style import quantity, save
+from icha.figures.style import format_quantity, save
 from icha.report import report, studies
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, read_benchmark, write_times, write_times_page
@@ -355,7 +355,7 @@ def test_surfaces_show_spectra_and_where_measurements_come_from(write, tmp_path)
     factor = 0.321 / float(measured["rms_slope"])
     scanned = re.findall(r"<tr><th>scan</th>.*?</tr>", text)[-1]
     for value in (float(measured["rms_height"]) * factor, 1 / (float(measured["rms_curvature"]) * factor)):
-        assert f">{quantity(value, 'm')}<" in scanned
+        assert f">{format_quantity(value, 'm')}<" in scanned
     assert '<img class="chart"' not in section(write(surfaces=[plain.drop_dims("psd_bin")]), "surfaces", "checks")
 
 

@@ -72,7 +72,7 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
     harmonic = x**2 - y**2 + 2 * x * y  # of the five-point Laplacian, too
     holey = harmonic.copy()
     holey[4:7, 3:6] = np.nan
-    with refused("missing", r"9 among 100; allowed: fill"):
+    with refused("missing", r"9 of 100 points without a height; expected fill"):
         prepared(holey, boundary="free")
     result = prepared(holey, boundary="free", missing="fill")
     np.testing.assert_allclose(result.surface.heights, centred(harmonic), atol=1e-11)
@@ -80,7 +80,7 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
     # Those outside of the square that is used matter to nobody.
     assert prepared(np.pad(harmonic, ((0, 0), (2, 2)), constant_values=np.nan), boundary="free")
     holey[:, 2:9] = np.nan
-    with pytest.raises(UnfitTopography, match="up to half"):
+    with pytest.raises(UnfitTopography, match="at most half"):
         prepared(holey, boundary="free", missing="fill")
 
 
@@ -209,7 +209,7 @@ def test_weights_of_the_cutoff_are_those_of_the_standard(prepared):
 @pytest.mark.parametrize("cutoff", [3.9, 65.1])
 def test_a_cutoff_that_the_scan_does_not_hold_is_refused(prepared, cutoff):
     heights = np.random.default_rng(1).normal(size=(65, 65))
-    with refused("cutoff", "allowed: from 4 pixels, 4 m, to the side of the square, 65 m"):
+    with refused("cutoff", "expected from 4 pixels, 4 m, to the side of the square, 65 m"):
         prepared(heights, boundary="window", taper=0.1, size=(65.0, 65.0), cutoff=cutoff)
 
 
@@ -239,14 +239,14 @@ def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
         (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points"),
         (np.arange(12.0)[:, None], "path", "is a line scan"),
         (np.arange(24.0).reshape(12, 2), "path", "is a line scan"),
-        (np.full((12, 12), np.nan), "path", "no height at all"),
-        (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "would make up 132 of 144"),
-        (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 among 144"),
+        (np.full((12, 12), np.nan), "path", "no height"),
+        (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "cannot fill 132 of 144"),
+        (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 of 144"),
     ],
 )
 @pytest.mark.parametrize("detrend", ["none", "tilt"])
 def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
-    missing = "fill" if "make up" in words else "refuse"
+    missing = "fill" if "cannot fill" in words else "refuse"
     with refused(key, words):
         prepared(heights, boundary="free", detrend=detrend, missing=missing, size=(6.0, 6.0))
 
@@ -257,7 +257,7 @@ def test_messages_are_short_and_in_units_of_people(tmp_path, prepared):
         scan(tmp_path / "words.txt", height_unit=NM, size=SIZE)
     assert len(str(raised.value)) < 200
     crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}
-    with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* up to x = 4 um, y = 3 um"):
+    with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* at most x = 4 um, y = 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=crop)
     with pytest.raises(UnfitTopography, match=r"needs a square, and the scan is 4 um x 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), boundary="periodic")
