@@ -53,7 +53,6 @@ def test_a_path_that_was_stopped_goes_on_to_the_same_last_bit(monkeypatch, case,
     # What was being looked for when it was stopped is looked for again, nothing else.
     assert further == needed - half
     assert followed(monkeypatch, case, prepare_checkpoints(folder, "this path"), None)[1] == 0
-    assert followed(monkeypatch, case, prepare_checkpoints(folder, "another"), None)[1] == needed
 
 
 def test_what_was_kept_of_another_path_is_never_taken_for_this_ones(tmp_path, monkeypatch):
