@@ -163,7 +163,7 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
 
 
 def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
-    """Keys of two mappings with the values of both; None where there is no value."""
+    """Pair the values of two mappings by their keys, with None for a missing value."""
     return ((key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b]))
 
 
