@@ -13,7 +13,7 @@ from icha.contact.model import Control, NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
 from icha.equilibrium import solver
 from icha.equilibrium.interacting_asperities import InteractingAsperities, contact_of
-from icha.half_space.ewald import HalfSpace
+from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.square import periodic_difference
 from icha.surfaces.summits import Asperities, find_summits
@@ -254,7 +254,7 @@ def assert_consistent(contact, state):
         law.approach(spots.contact_radius, spots.radius_of_curvature), spots.approach, atol=1e-10 * contact.rms_height
     )
     a, R = spots.contact_radius, spots.radius_of_curvature
-    half_space = HalfSpace.at(spots.position, period, law.material.contact_modulus)
+    half_space = PointHalfSpace.at(spots.position, period, law.material.contact_modulus)
     w = Interaction.between(law, half_space, R, a).displacement(a)
     error = spots.approach + w + state.separation - spots.height
     # The sum over the spots alone is split otherwise than that over the sites of the solve.
