@@ -50,7 +50,7 @@ def run(
         list[str] | None,
         typer.Argument(
             metavar="[TARGET]...",
-            help=f"What to make: {', '.join(TARGETS)}, or a file. Default: all. After `--`: options of Snakemake.",
+            help=f"Targets: {', '.join(TARGETS)}, or a file. Default: all. After `--`: options of Snakemake.",
             show_default=False,
         ),
     ] = None,
@@ -161,7 +161,7 @@ def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, 
     Raises
     ------
     UserError
-        If the answer is no, or there is no terminal to ask at.
+        If the answer is no, or without a terminal.
     """
     from icha.planning.requirements import wanting
 
@@ -212,7 +212,7 @@ def _planned_jobs(output: str) -> str:
 
 
 def _refuse_unknown_targets(output: str, targets: list[str], campaign) -> None:
-    """Raise `UserError` if Snakemake ended because there is no such target."""
+    """Raise `UserError` if Snakemake ended because of an unknown target."""
     unknown = re.findall(r"^No rule to produce (.+) \(if you use", output, re.MULTILINE)
     if "\nInputFunctionException" in output:  # a file that a rule could make, but not of this campaign
         unknown = [name for name in targets if name not in TARGETS and not name.startswith("-")]
@@ -408,7 +408,7 @@ def _print_checks(campaign, results: Path) -> None:
     checks = read_checks(results / files.checks)
     passed = sum(check.passed for check in checks)
     echo(f"checks:  {passed if passed < len(checks) else 'all'} of {len(checks)} passed: the equations are solved")
-    echo("Whether the models are applicable is a separate question:")
+    echo("Applicability of the models, which is a separate question:")
     _print_validity(found_validity(results / files.dataset))
 
 
