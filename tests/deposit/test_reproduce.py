@@ -237,8 +237,8 @@ def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, m
     assert status == 1 and "3 B are free" in output and list((tmp_path / "temporary").iterdir()) == []
 
 
-def test_whatever_differs_of_the_program_is_counted(tmp_path):
-    """Of the package and of the workflow, which decides as much."""
+def test_different_files_of_the_program_are_counted(tmp_path):
+    """In the package and in the workflow."""
     ours = {"Snakefile", *(f"icha/{path.name}" for path in (REPOSITORY / "icha").glob("*.py"))}
     (tmp_path / "SHA256SUMS").write_text(f"{64 * '0'}  source/docs/model.md\n{64 * '0'}  README.md\n")
     everything = changed_files(tmp_path)
