@@ -45,6 +45,7 @@ from icha.contact.model import (
     largest_tension,
     summit_counts,
 )
+from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
 from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
 from icha.surfaces.summits import Asperities, locate_summits
 from icha.surfaces.surface import Surface
@@ -100,6 +101,11 @@ class BoundaryElements:
     def largest_area_fraction(self) -> float:
         """All of it: full contact ends a path by itself."""
         return 1.0
+
+    @property
+    def path_accuracy(self) -> PathAccuracy:
+        """Accuracy to which a path resolves its events."""
+        return MODELS[REFERENCE_MODEL].accuracy
 
     def untouched(self) -> CellState:
         """The state at which the first summit, or a plateau without any, is about to make contact."""

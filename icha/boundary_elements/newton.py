@@ -24,10 +24,10 @@ from icha.contact.model import FullContact, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL
 
 # Largest deviation of sqrt(G/dgamma) along a front in equilibrium.
-FRONT_TOLERANCE = 1e-9
+FRONT_TOLERANCE = 1e-6
 # Of the displacement in contact, over the gap at which a cell is free: on the way to rest, over the error of the front,
 # at most; and at rest, over the tolerance of the front.
-_GAP_TO_FRONT, _GAP_TO_TOLERANCE = 1e-1, 0.02
+_GAP_TO_FRONT, _GAP_TO_TOLERANCE = 1e-1, 1e-3
 # Of the displacement, near to rest and where energies are in doubt. Relative change of an energy that is rounding.
 _NEAR, _SAME_ENERGY = 1e-5, 1e-12
 # Of a step, so much of its size times sqrt(G/dgamma) leads neither up nor down.

@@ -7,7 +7,7 @@ import numpy as np
 from icha.checks.findings import IDENTITY_LIMIT, Finding
 from icha.contact.models import RESIDUAL_TOLERANCE, model_of
 from icha.path.energy_balance import integration_error, pressure_jump, unresolved_work
-from icha.path.targets import UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST
+from icha.path.targets import UNRESOLVED_LOSS
 
 # What the hysteresis loss of a run consists of.
 LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump", "loss_unattributed")
@@ -76,7 +76,7 @@ def check_loop(run) -> Iterator[Finding]:
         yield (
             "loop closes",
             abs(loss) / scale,
-            IDENTITY_LIMIT + _error_of_work(run) / scale + 3 * UNBALANCED_WORK * _met_one_way(run),
+            IDENTITY_LIMIT + _error_of_work(run) / scale + 3 * model_of(run.attrs).accuracy.balance * _met_one_way(run),
             "hysteresis loss without adhesion or union by rule, where nothing is irreversible, over the largest work",
         )
 
@@ -165,7 +165,7 @@ def _left_open(run):
 
     An event moves the work by what it changes the pressure by, times its distance from the middle of its step; and one
     that changes the stiffness alone by a part of the difference that this makes to the integral. No step may leave more
-    open than UNRESOLVED_LOSS of what jumps have set free, or than UNRESOLVED_REST of the work and losses so far.
+    open than UNRESOLVED_LOSS of what jumps have set free, or than the model's accuracy of a loss, of the work and losses.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant
@@ -175,4 +175,4 @@ def _left_open(run):
     set_free = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))
     lost = run["work"] - run["stored_energy"]
     effort = float(np.sum(np.abs(np.diff(run["work"])) + np.abs(np.diff(lost))))
-    return min(work, np.count_nonzero(events) * max(UNRESOLVED_LOSS * set_free, UNRESOLVED_REST * effort))
+    return min(work, np.count_nonzero(events) * max(UNRESOLVED_LOSS * set_free, model_of(run.attrs).accuracy.loss * effort))

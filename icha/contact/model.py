@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 import numpy as np
 
 if TYPE_CHECKING:
+    from icha.contact.models import PathAccuracy
     from icha.surfaces.summits import Asperities
     from icha.surfaces.surface import Surface
 
@@ -104,6 +105,10 @@ class ContactModel(Protocol[S]):
     @property
     def largest_area_fraction(self) -> float:
         """Contact area over nominal area beyond which the model covers no state."""
+
+    @property
+    def path_accuracy(self) -> PathAccuracy:
+        """Accuracy to which a path resolves its events."""
 
     def untouched(self) -> S:
         """The state at which contact is about to be made first."""

@@ -49,6 +49,24 @@ MODEL_PAPER = Paper(
 
 
 @dataclass(frozen=True)
+class PathAccuracy:
+    """Accuracy to which a path resolves what a model does between two equilibria.
+
+    Parameters
+    ----------
+    event : separation within which an event that changes the pressure is located, in units of h_rms.
+    loss : part of the work and losses so far that the events of one step may leave unknown.
+    balance : part of the work so far by which work and energy of a step without events may disagree.
+    tension : part of the largest tension so far by which the largest one may be missed where the path is smooth.
+    """
+
+    event: float = 1e-12
+    loss: float = 1e-10
+    balance: float = 3e-6
+    tension: float = 1e-8
+
+
+@dataclass(frozen=True)
 class Model:
     """A contact model.
 
@@ -68,6 +86,7 @@ class Model:
     unites : whether spots unite by a rule, which may cost or gain a little energy.
     periodic_only : whether it cannot press a square with free edges.
     least_cells : grid cells per shortest wavelength that it needs at least; 0 if it needs none.
+    accuracy : to which a path resolves its events.
     resumable : whether its equilibria take so long that a run keeps them (`resumable(contact, folder)` of its module).
     """
 
@@ -84,6 +103,7 @@ class Model:
     unites: bool = False
     periodic_only: bool = False
     least_cells: int = 0
+    accuracy: PathAccuracy = PathAccuracy()
     resumable: bool = False
 
 
@@ -134,6 +154,8 @@ MODELS = {
         by_cells=True,
         periodic_only=True,
         least_cells=4,
+        # Fronts that hop from cell to cell lose energy in steps that only a finer grid resolves.
+        accuracy=PathAccuracy(event=1e-5, loss=1e-4, balance=1e-4, tension=1e-5),
         resumable=True,
     ),
 }

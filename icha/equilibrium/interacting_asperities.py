@@ -10,6 +10,7 @@ import numpy as np
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, largest_tension, summit_counts
+from icha.contact.models import DEFAULT_MODEL, MODELS, PathAccuracy
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.equations import derivative, held_value, stored_energy
 from icha.equilibrium.equilibrium import equilibrium
@@ -35,6 +36,11 @@ class InteractingAsperities(Problem):
     def largest_area_fraction(self) -> float:
         """Contact area over nominal area beyond which spots have lost their identity."""
         return _LARGEST_AREA
+
+    @property
+    def path_accuracy(self) -> PathAccuracy:
+        """Accuracy to which a path resolves its events."""
+        return MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:
         """The state at which the first asperity is about to make contact."""

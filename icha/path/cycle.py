@@ -18,23 +18,19 @@ from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.energy_balance import Step, Waypoint, between_stops
 from icha.path.loading import Course, halved
 from icha.path.stops import CLOSE_TO_A_JUMP, SAME_EXCESS, SAME_SEPARATION, InsideJump, Queue, Stop, first_passed
-from icha.path.targets import LOADS, MEAN_SEPARATION, UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST, Path
+from icha.path.targets import LOADS, MEAN_SEPARATION, UNRESOLVED_LOSS, Path
 
 # Where nothing jumps, the part of the work so far that may be unknown after a step.
 UNRESOLVED_WORK = 2e-4
 # Unions and their undoing are found within this part of the longest step.
 UNITING_STEP = 1 / 16
 # Of the work so far, the part by which the pressure's curvature may matter in a step without events, unless work and
-# energy agree to UNBALANCED_WORK.
+# energy agree.
 _CURVED_WORK = 1e-4
-# A loss that is less than this part of the work is known no better than one that is as large: fronts of boundary
-# elements lose such parts in hops from cell to cell, which no short step resolves.
+# A loss that is less than this part of the work is known no better than one that is as large.
 _LEAST_LOSS = 1e-2
-# The first contact is made and the last one broken within this change of separation, in h_rms.
-SHARP = 1e-12
-# Of the largest tension so far, the part by which it may be missed between two equilibria: at an event, and else.
+# Of the largest tension so far, the part by which it may be missed at an event.
 _MISSED_TENSION = 1e-3
-_MISSED_SMOOTH_TENSION = 1e-8
 
 
 @dataclass(frozen=True)
@@ -84,7 +80,7 @@ def resolved(
     NotConverged
         If an equilibrium is not found even with the shortest step.
     """
-    unit = contact.rms_height
+    unit, sharp = contact.rms_height, contact.path_accuracy.event * contact.rms_height
     while True:
         collective = direction > 0 and contact.adhesive and width < CLOSE_TO_A_JUMP * unit
         try:
@@ -96,8 +92,8 @@ def resolved(
         step = Step.between(contact, start, beyond)
         settled = replace(stride, event_at=np.inf) if step.sudden else stride
         # Within the accuracy of an equilibrium an event may happen after a long step and not after a short one.
-        passed = step.sudden and direction * start.separation + SHARP * unit >= stride.event_at
-        if width <= SHARP * unit or passed:
+        passed = step.sudden and direction * start.separation + sharp >= stride.event_at
+        if width <= sharp or passed:
             return beyond, step, settled
         work_known = _is_work_known(contact, beyond, step, account, longest)
         if work_known and _is_tension_known(contact, start, beyond, step, account):
@@ -130,9 +126,9 @@ def _equilibrium(contact, start, separation, collective):
 
 def _is_work_known(contact, beyond, step, account, longest):
     """Whether the work in a step is known."""
-    effort = account.effort + abs(step.work) + abs(step.lost)
+    accuracy, effort = contact.path_accuracy, account.effort + abs(step.work) + abs(step.lost)
     jumped = UNRESOLVED_LOSS * (account.jumped + step.set_free(contact))
-    if step.unresolved > (max(jumped, UNRESOLVED_REST * effort) if jumped else UNRESOLVED_WORK * effort):
+    if step.unresolved > (max(jumped, accuracy.loss * effort) if jumped else UNRESOLVED_WORK * effort):
         return False
     # What a union makes of two spots depends on how far they overlap when it is found.
     if step.unites and abs(step.width) > UNITING_STEP * longest:
@@ -141,7 +137,7 @@ def _is_work_known(contact, beyond, step, account, longest):
     if step.width > 0 and contact.pressure(beyond) < 0:
         # There is no way in here that has the same error.
         scale = min(effort, max(10 * account.jumped, _LEAST_LOSS * effort))
-    unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.lost) > UNBALANCED_WORK * scale
+    unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.lost) > accuracy.balance * scale
     return step.sudden or not unbalanced or abs(step.width) <= longest / 256
 
 
@@ -166,7 +162,7 @@ def _largest_tension(contact, start, beyond, step, account):
     # The tangents meet below the curve.
     meet = (q - end_slope * step.width - p) / (slope - end_slope)
     lowest = p + slope * meet
-    if lowest >= account.lowest or min(p, q) - lowest <= _MISSED_SMOOTH_TENSION * abs(lowest):
+    if lowest >= account.lowest or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
         return None
     from scipy.interpolate import CubicHermiteSpline  # here, for it takes long to import and no way in needs it
 
@@ -215,7 +211,7 @@ def cycle(contact: ContactModel, path: Path, longest: float, course: Course) -> 
         course = course.met(stop.target, state)
         yield Waypoint(stop.target, state, 0)
     top = () if contact.adhesive else (start.separation + _ABOVE_CONTACT * contact.rms_height,)
-    stride = Stride(SHARP * contact.rms_height if contact.adhesive else longest)
+    stride = Stride(contact.path_accuracy.event * contact.rms_height if contact.adhesive else longest)
     here = Position(start, stride, course, stations=top)
     yield between_stops(start, 0)
     here = yield from _Leg(contact, 0, longest).follow(here, stops)

@@ -21,10 +21,6 @@ DEFAULT_STEP = 0.15
 # Of the energy that jumps have set free so far, the part that may be unknown after a step for not knowing where in it
 # its events happened.
 UNRESOLVED_LOSS = 5e-4
-# The same of the work so far, where jumps set next to nothing free: the equilibria leave more of it open.
-UNRESOLVED_REST = 1e-10
-# Of the work so far, the part by which work and energy may disagree in a step without events that is not short.
-UNBALANCED_WORK = 3e-6
 
 STEP = Real("h_rms", least=MIN_STEP, most=MAX_STEP)
 
