@@ -175,4 +175,6 @@ def _left_open(run):
     set_free = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))
     lost = run["work"] - run["stored_energy"]
     effort = float(np.sum(np.abs(np.diff(run["work"])) + np.abs(np.diff(lost))))
-    return min(work, np.count_nonzero(events) * max(UNRESOLVED_LOSS * set_free, model_of(run.attrs).accuracy.loss * effort))
+    return min(
+        work, np.count_nonzero(events) * max(UNRESOLVED_LOSS * set_free, model_of(run.attrs).accuracy.loss * effort)
+    )
