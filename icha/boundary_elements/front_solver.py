@@ -33,7 +33,8 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 class FrontTolerances:
     """Tolerances of the front; measured effects in docs/short_range.md.
 
-    The residual of a cell is |K/K_c - 1| with K/K_c = sqrt(G/dgamma). Displacement errors are over the critical opening.
+    The residual of a cell is |K/K_c - 1| with K/K_c = sqrt(G/dgamma). Errors of displacements are over the critical
+    opening.
 
     Parameters
     ----------

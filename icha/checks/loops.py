@@ -165,7 +165,7 @@ def _left_open(run):
 
     An event moves the work by what it changes the pressure by, times its distance from the middle of its step; and one
     that changes the stiffness alone by a part of the difference that this makes to the integral. No step may leave more
-    open than UNRESOLVED_LOSS of what jumps have set free, or than the model's accuracy of a loss, of the work and losses.
+    open than UNRESOLVED_LOSS of what jumps have set free, or than the model's accuracy of the work and losses so far.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant
@@ -175,6 +175,5 @@ def _left_open(run):
     set_free = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))
     lost = run["work"] - run["stored_energy"]
     effort = float(np.sum(np.abs(np.diff(run["work"])) + np.abs(np.diff(lost))))
-    return min(
-        work, np.count_nonzero(events) * max(UNRESOLVED_LOSS * set_free, model_of(run.attrs).accuracy.loss * effort)
-    )
+    unknown = max(UNRESOLVED_LOSS * set_free, model_of(run.attrs).accuracy.loss * effort)
+    return min(work, np.count_nonzero(events) * unknown)

@@ -18,8 +18,8 @@ from icha.path.targets import AREA_FRACTION, BETWEEN
 
 RESIDUAL_LIMIT = 1e-8
 TARGET_LIMIT = 1e-8
-# Fronts of boundary elements come to rest to 1e-9.
-FRONT_LIMIT = 1e-5
+# Residual of a front of boundary elements that has converged, or stagnated and is accepted.
+FRONT_LIMIT = 1e-4
 # Where they are within their cells is known less well, so that the area may seem to fall by a little where they enter
 # others.
 CELL_LIMIT = 1e-3
