@@ -141,7 +141,7 @@ def solve_active_set(
         If pressures or the active set are not found.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
-    keep, gap, before = np.full(len(contact.cells), sticky), None, np.inf
+    keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
     for _ in range(_MAX_CHANGES):
         if len(contact.cells) == space.size:
             raise FullContact("the contact runs over the whole surface")
@@ -152,7 +152,7 @@ def solve_active_set(
             gap, misfit, separation = _gap(space, topography, contact, separation, load, dtype)
         error = np.abs(misfit).max(initial=0.0)
         if not error <= tolerance:
-            part = _CHANGING if dtype == np.float32 else _SETTLED
+            part = _CHANGING if changing and dtype == np.float32 else _SETTLED
             contact = _corrected(space, contact, misfit, max(part, 0.5 * tolerance / error), load is not None)
             gap, misfit, separation = _gap(space, topography, contact, separation, load, dtype, gap)
         left = np.abs(misfit).max(initial=0.0)
@@ -165,9 +165,9 @@ def solve_active_set(
                 return ElasticContact(*_arrays(contact), gap, separation, misfit, tolerance)
             if not left <= LEAST_GAIN * before:
                 raise NotConverged(f"the pressures in contact did not converge (displacement error {left:.1e} cells)")
-            before = left
+            before, changing = left, False
             continue
-        before = np.inf
+        before, changing = np.inf, True
         fraction = np.where(closing, 1.0, contact.fraction)
         cells, *values, keep = merge_cells(
             contact.cells[staying],

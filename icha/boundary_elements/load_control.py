@@ -17,7 +17,7 @@ _MET = 5e-10
 # Relative error from which trials are solved to the tolerances of an equilibrium, and from which slopes are reused.
 _CLOSE, _SAME_SLOPES = 1e-3, 1e-4
 # Residuals of the front in the first coarse trial, and in those after it.
-_FIRST_RESIDUAL, _RESIDUAL = 1e-2, 1e-3
+_FIRST_RESIDUAL, _RESIDUAL = 3e-2, 1e-3
 # Separations that differ by less, in h_rms, are the same.
 _SAME_SEPARATION = 1e-13
 # Unit of the error of a load of zero, over stiffness times h_rms: attraction and repulsion of about this size cancel.

@@ -41,7 +41,7 @@ class _Extent(NamedTuple):
 
 
 # Few places get wider windows and more steps.
-_EXTENTS = (_Extent(20, 0.05, 60), _Extent(4, 0.25, 20))
+_EXTENTS = (_Extent(20, 0.05, 60), _Extent(4, 0.5, 20))
 
 
 def relax_in_windows(

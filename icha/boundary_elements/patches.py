@@ -66,8 +66,8 @@ def unpack(arrays: dict[str, np.ndarray], before: CellState) -> CellState:
     return CellState(**values, rates=rates, history=(*before.history, events) if len(events) else before.history)
 
 
-# Overestimate of a counted area per free edge of a cell, over the area of a cell (Yastrebov, Anciaux & Molinari, Tribol.
-# Int. 114 (2017) 161, eq. 9).
+# Overestimate of a counted area per free edge, over the area of a cell (Yastrebov, Anciaux & Molinari, Tribol. Int. 114
+# (2017) 161, eq. 9).
 BEYOND_EDGES = (np.pi - 1 + np.log(2)) / 24
 
 

@@ -58,12 +58,14 @@ class PathAccuracy:
     loss : part of the work and losses so far that the events of one step may leave unknown.
     balance : part of the work so far by which work and energy of a step without events may disagree.
     tension : part of the largest tension so far by which the largest one may be missed where the path is smooth.
+    predicts_steps : whether the length of a step follows from the errors of the one before; else it doubles.
     """
 
     event: float = 1e-12
     loss: float = 1e-10
     balance: float = 3e-6
     tension: float = 1e-8
+    predicts_steps: bool = False
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ MODELS = {
         periodic_only=True,
         least_cells=4,
         # Fronts that hop from cell to cell lose energy in steps that only a finer grid resolves.
-        accuracy=PathAccuracy(event=1e-5, loss=1e-4, balance=1e-4, tension=1e-5),
+        accuracy=PathAccuracy(event=1e-5, loss=1e-4, balance=1e-5, tension=1e-5, predicts_steps=True),
         resumable=True,
     ),
 }

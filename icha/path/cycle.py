@@ -35,10 +35,20 @@ _MISSED_TENSION = 1e-3
 
 @dataclass(frozen=True)
 class Stride:
-    """How far the next step may go, m, and where, counted along the leg, events were seen that are not resolved yet."""
+    """Length of the next step, and what limits it.
+
+    Attributes
+    ----------
+    length : largest length of the next step, m.
+    event_at : where, along the leg, events were found that are not resolved yet, m.
+    event_width : length of a step that resolves these events, m.
+    smooth : length of steps without events, m.
+    """
 
     length: float
     event_at: float = np.inf
+    event_width: float = 0.0
+    smooth: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -103,7 +113,11 @@ def resolved(
             stride, width = settled, weakest - start.separation
         else:
             if step.sudden:
-                stride = replace(stride, event_at=min(stride.event_at, direction * beyond.separation))
+                resolved_width = 0.5 * width * min(1.0, _unknown_work(contact, step, account) / step.unresolved)
+                event_at = min(stride.event_at, direction * beyond.separation)
+                stride = replace(stride, event_at=event_at, event_width=resolved_width)
+            else:
+                stride = replace(stride, smooth=min(stride.smooth, 0.5 * width))
             width *= 0.5
         stride = replace(stride, length=min(stride.length, width))
 
@@ -126,19 +140,25 @@ def _equilibrium(contact, start, separation, collective):
 
 def _is_work_known(contact, beyond, step, account, longest):
     """Whether the work in a step is known."""
-    accuracy, effort = contact.path_accuracy, account.effort + abs(step.work) + abs(step.lost)
-    jumped = UNRESOLVED_LOSS * (account.jumped + step.set_free(contact))
-    if step.unresolved > (max(jumped, accuracy.loss * effort) if jumped else UNRESOLVED_WORK * effort):
+    if step.unresolved > _unknown_work(contact, step, account):
         return False
     # What a union makes of two spots depends on how far they overlap when it is found.
     if step.unites and abs(step.width) > UNITING_STEP * longest:
         return False
-    scale = effort
+    accuracy = contact.path_accuracy
+    scale = effort = account.effort + abs(step.work) + abs(step.lost)
     if step.width > 0 and contact.pressure(beyond) < 0:
         # There is no way in here that has the same error.
         scale = min(effort, max(10 * account.jumped, _LEAST_LOSS * effort))
     unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.lost) > accuracy.balance * scale
     return step.sudden or not unbalanced or abs(step.width) <= longest / 256
+
+
+def _unknown_work(contact, step, account):
+    """Work that the events of a step may leave unknown, J/m^2."""
+    effort = account.effort + abs(step.work) + abs(step.lost)
+    jumped = UNRESOLVED_LOSS * (account.jumped + step.set_free(contact))
+    return max(jumped, contact.path_accuracy.loss * effort) if jumped else UNRESOLVED_WORK * effort
 
 
 def _is_tension_known(contact, start, beyond, step, account):
@@ -320,9 +340,25 @@ class _Leg:
 
     def _arrived(self, here, state, step, first):
         """Where the path is after a step, and how far it may go next; after the very `first`, as far as ever."""
-        length = self.longest if first else min(self.longest, 2 * here.stride.length)
         account, course = here.account.after(self.contact, step, state), here.course.after(state, self.loading)
-        return replace(here, state=state, stride=replace(here.stride, length=length), account=account, course=course)
+        stride = self._next_stride(here.stride, step, account, self.direction * state.separation)
+        if first:
+            stride = replace(stride, length=self.longest)
+        return replace(here, state=state, stride=stride, account=account, course=course)
+
+    def _next_stride(self, stride, step, account, at):
+        """Stride after a step that ended `at` (m, along the leg): twice as long, or as far as errors allow."""
+        longer = min(self.longest, 2 * stride.length)
+        if not self.contact.path_accuracy.predicts_steps:
+            return replace(stride, length=longer)
+        if step.sudden:
+            return replace(stride, length=max(longer, stride.smooth))
+        distance = stride.event_at - at
+        if 0 < distance < np.inf:
+            return replace(stride, length=distance if distance <= stride.event_width else 0.5 * distance)
+        # The error of a step grows with its cube.
+        allowed = longer if 8 * step.integration_error <= _CURVED_WORK * account.effort else stride.length
+        return replace(stride, length=allowed, smooth=max(stride.smooth, abs(step.width)))
 
     def _is_apart(self, state):
         """Whether nothing touches, as high up as where contact was about to be made first."""
