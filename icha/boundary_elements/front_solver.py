@@ -8,11 +8,11 @@ softer bonds, which shortens it (Levenberg and Marquardt).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from icha.boundary_elements.cells import adjacent, mask_of, merge_cells
 from icha.boundary_elements.elastic_contact import (
@@ -414,23 +414,29 @@ def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accurac
     norm = float(np.linalg.norm(right))
     if not norm > 0:
         return np.zeros_like(right)
-    basis, hessenberg = np.zeros((_MAX_KRYLOV + 1, len(right)), right.dtype), np.zeros((_MAX_KRYLOV + 1, _MAX_KRYLOV))
+    basis, triangle = np.zeros((_MAX_KRYLOV + 1, len(right)), right.dtype), np.zeros((_MAX_KRYLOV, _MAX_KRYLOV))
     basis[0] = right / norm
-    goal = np.zeros(_MAX_KRYLOV + 1)
-    goal[0] = norm
+    rotations, goal = [], [norm]
     for count in range(1, _MAX_KRYLOV + 1):
         vector, known = matrix(preconditioner(basis[count - 1])), basis[:count]
-        for _ in range(2):  # twice is enough
-            shares = known @ vector
-            hessenberg[:count, count - 1] += shares
-            vector = vector - shares @ known
-        hessenberg[count, count - 1] = size = np.linalg.norm(vector)
-        if not np.isfinite(size):
+        shares = known @ vector
+        vector = vector - shares @ known
+        correction = known @ vector  # orthogonal to rounding after the second time
+        vector -= correction @ known
+        column, size = (shares + correction).tolist(), float(np.linalg.norm(vector))
+        # Givens rotations keep the Hessenberg matrix of the shares triangular.
+        for row, (cosine, sine) in enumerate(rotations):
+            one, other = column[row : row + 2]
+            column[row : row + 2] = cosine * one + sine * other, cosine * other - sine * one
+        length = math.hypot(column[-1], size)
+        if not 0 < length < math.inf:
             return np.full_like(right, np.nan)
-        small = hessenberg[: count + 1, :count]
-        weights = scipy.linalg.lstsq(small, goal[: count + 1], check_finite=False)[0]
-        left = np.linalg.norm(small @ weights - goal[: count + 1])
-        if left <= accuracy * norm or size <= 0:
+        rotations.append((column[-1] / length, size / length))
+        column[-1] = length
+        triangle[:count, count - 1] = column
+        goal[-1:] = rotations[-1][0] * goal[-1], -rotations[-1][1] * goal[-1]
+        if abs(goal[-1]) <= accuracy * norm or size <= 0:
             break
         basis[count] = vector / size
+    weights = np.linalg.solve(triangle[:count, :count], goal[:count])
     return preconditioner(weights.astype(right.dtype) @ basis[:count])

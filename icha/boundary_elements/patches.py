@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 from scipy.ndimage import label
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from icha.boundary_elements.cells import adjacent, find_among, mask_of
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
@@ -81,11 +79,19 @@ def label_patches(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
         np.stack([one, other], axis=1)[(one > 0) & (other > 0)]
         for one, other in ((labels[0], labels[-1]), (labels[:, 0], labels[:, -1]))
     ]
-    rows, columns = np.concatenate(pairs).T
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1))
-    _, component = connected_components(graph, directed=False)
+    root = list(range(count + 1))
+
+    def find_root(number):
+        while root[number] != number:
+            number = root[number]
+        return number
+
+    for one, other in np.unique(np.concatenate(pairs), axis=0).tolist():
+        one, other = sorted((find_root(one), find_root(other)))
+        root[other] = one
     # Numbered in the order of their first cells; 0 is outside.
-    return component[labels.ravel()[cells]], int(component.max())
+    roots, numbers = np.unique([find_root(number) for number in root], return_inverse=True)
+    return numbers[labels.ravel()[cells]], len(roots) - 1
 
 
 def labels_at(places: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.ndarray:
